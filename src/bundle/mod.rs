@@ -1,0 +1,300 @@
+//! A vehicle bundle on disk: reading with every check, writing as one atomic step.
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | `vehicle.toml` | name, version, reference lengths, mass, surfaces, contact patches, training domain, provenance |
+//! | `hull.stl` | the watertight hull in the body frame, binary STL |
+//! | `patches.safetensors` | `face_surface` u16 `[faces]` |
+//! | `sdf.safetensors` | `distance` i16 `[nx, ny, nz]` in steps given, with origin and spacing, in the metadata |
+//! | `submergence.safetensors` | `points`, `normals` f32 `[n, 3]` by rising z within a surface, `offsets` u32 `[K + 1]` |
+//! | `network.safetensors` | weights and statistics; absent until the vehicle is trained |
+//! | `spec.toml` | the vehicle file that the bundle was built from, for the record; may be absent |
+//! | `SHA256SUMS` | checksums of all of these, in the form of `sha256sum` |
+
+mod checksums;
+mod tensors;
+mod vehicle_file;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::domain::Domain;
+use crate::geometry::distance::SignedDistanceGrid;
+use crate::geometry::stl::{StlError, read_stl, write_stl};
+use crate::geometry::submergence::{Samples, SamplesError};
+use crate::geometry::surfaces::Hull;
+use crate::model::kernel::Isa;
+use crate::model::{Model, Weights};
+use crate::vehicle::{Vehicle, VehicleError};
+use tensors::TensorError;
+use vehicle_file::VehicleFile;
+
+/// The file that makes a folder a bundle.
+pub const VEHICLE_FILE: &str = "vehicle.toml";
+const HULL_FILE: &str = "hull.stl";
+const PATCHES_FILE: &str = "patches.safetensors";
+const SDF_FILE: &str = "sdf.safetensors";
+const SUBMERGENCE_FILE: &str = "submergence.safetensors";
+const NETWORK_FILE: &str = "network.safetensors";
+const SPEC_FILE: &str = "spec.toml";
+const SUMS_FILE: &str = "SHA256SUMS";
+
+/// Format of the bundles that this program writes, and the newest that it reads.
+pub const FORMAT: u32 = 1;
+
+/// No file of a bundle is larger [bytes].
+const MAX_FILE_BYTES: u64 = 256 << 20;
+
+/// Everything in a bundle.
+#[derive(Debug, Clone)]
+pub struct Bundle {
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// Version, raised with every change.
+    pub version: u32,
+    /// The weights and the domain in which they were learnt; none until the vehicle is trained.
+    pub trained: Option<(Weights, Domain)>,
+    /// Signed distance to the hull.
+    pub distance: SignedDistanceGrid,
+    /// The vehicle file that it was built from.
+    pub spec: Option<String>,
+}
+
+/// Why a bundle was refused. The message names the file and what is wrong with it.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {fault}", .path.display())]
+pub struct BundleError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+/// What is wrong with a file of a bundle.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// Missing or unreadable.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    /// Larger than any bundle's file is.
+    #[error("{bytes} bytes, more than the {MAX_FILE_BYTES} that are read")]
+    TooLarge {
+        /// Its size.
+        bytes: u64,
+    },
+    /// Written by a newer program.
+    #[error("format {found} is newer than {FORMAT}, the newest that this program reads: update wade")]
+    NewerFormat {
+        /// The format of the file.
+        found: u32,
+    },
+    /// Not TOML, or a key is missing, unknown or of the wrong type.
+    #[error("{0}")]
+    Toml(#[from] toml::de::Error),
+    /// The bundle's name is not its folder's.
+    #[error("name = \"{name}\" differs from the folder's name")]
+    Name {
+        /// The name in the file.
+        name: String,
+    },
+    /// A name that could not be part of a path or of a service's name.
+    #[error("name = \"{name}\" must be 1 to 64 of a-z, 0-9, - and _")]
+    NameSyntax {
+        /// The name in the file.
+        name: String,
+    },
+    /// A line that is no checksum and file name.
+    #[error("line {line} is not a checksum, two spaces and a file name")]
+    ChecksumSyntax {
+        /// Number of the line, from 1.
+        line: usize,
+    },
+    /// A file of the bundle without a checksum.
+    #[error("no checksum in {SUMS_FILE}")]
+    NoChecksum,
+    /// Bytes that are not those that were written.
+    #[error("damaged: its SHA-256 is not the one in {SUMS_FILE}")]
+    Checksum,
+    /// A tensor file.
+    #[error("{0}")]
+    Tensor(#[from] TensorError),
+    /// The hull.
+    #[error("{0}")]
+    Stl(#[from] StlError),
+    /// The samples.
+    #[error("{0}")]
+    Samples(#[from] SamplesError),
+    /// Values that make no vehicle.
+    #[error("{0}")]
+    Vehicle(#[from] VehicleError),
+    /// A reference to a surface that does not exist.
+    #[error("there is no surface called \"{name}\"")]
+    UnknownSurface {
+        /// The name.
+        name: String,
+    },
+    /// A range whose ends are not finite and in order.
+    #[error("domain.{quantity} is no range")]
+    Domain {
+        /// The quantity.
+        quantity: &'static str,
+    },
+    /// The two places that state where the weights come from disagree.
+    #[error("provenance \"{weights}\" in {NETWORK_FILE}, \"{vehicle}\" here")]
+    Provenance {
+        /// In the weights.
+        weights: String,
+        /// In the vehicle file.
+        vehicle: String,
+    },
+    /// The vehicle file speaks of weights that are not there, or the other way round.
+    #[error("provenance and domain are stated where there are weights, and only there")]
+    Untrained,
+    /// Serving needs weights.
+    #[error("the bundle has no weights yet: train it first")]
+    NoWeights,
+}
+
+fn at(path: &Path) -> impl FnOnce(Fault) -> BundleError {
+    let path = path.to_owned();
+    move |fault| BundleError { path, fault }
+}
+
+/// The files of a bundle in memory, their checksums verified.
+struct Files {
+    directory: PathBuf,
+    files: BTreeMap<&'static str, Vec<u8>>,
+}
+
+impl Files {
+    /// Reads and verifies every file; the vehicle file first, since a newer format may well have other files.
+    fn read(directory: &Path) -> Result<(Self, VehicleFile), BundleError> {
+        let path = directory.join(VEHICLE_FILE);
+        let bytes = read_bounded(&path)?;
+        let vehicle_file = VehicleFile::parse(&bytes, directory).map_err(at(&path))?;
+        let sums_path = directory.join(SUMS_FILE);
+        let sums = checksums::parse(&read_bounded(&sums_path)?).map_err(at(&sums_path))?;
+        let mut files = BTreeMap::from([(VEHICLE_FILE, bytes)]);
+        for name in [HULL_FILE, PATCHES_FILE, SDF_FILE, SUBMERGENCE_FILE, NETWORK_FILE, SPEC_FILE] {
+            let path = directory.join(name);
+            if [NETWORK_FILE, SPEC_FILE].contains(&name) && !path.exists() && !sums.contains_key(name) {
+                continue;
+            }
+            files.insert(name, read_bounded(&path)?);
+        }
+        for (name, bytes) in &files {
+            checksums::verify(&sums, name, bytes).map_err(at(&directory.join(name)))?;
+        }
+        Ok((Self { directory: directory.to_owned(), files }, vehicle_file))
+    }
+
+    /// Parses one file, with the path in the error.
+    fn parse<T, E: Into<Fault>>(
+        &self,
+        name: &'static str,
+        parse: impl FnOnce(&[u8]) -> Result<T, E>,
+    ) -> Result<T, BundleError> {
+        let bytes = self.files.get(name).map(Vec::as_slice).unwrap_or_default();
+        parse(bytes).map_err(|error| at(&self.directory.join(name))(error.into()))
+    }
+
+    fn vehicle(&self, file: &VehicleFile) -> Result<Vehicle, BundleError> {
+        let mesh = self.parse(HULL_FILE, read_stl)?;
+        let face_surface = self.parse(PATCHES_FILE, tensors::read_patches)?;
+        let samples = self.parse(SUBMERGENCE_FILE, |bytes| {
+            let parts = tensors::read_samples(bytes)?;
+            Ok::<_, Fault>(Samples::from_parts(&parts.points, &parts.normals, &parts.offsets)?)
+        })?;
+        self.parse(VEHICLE_FILE, |_| {
+            let vehicle = file.vehicle(Hull { mesh, face_surface }, samples)?;
+            vehicle.validate()?;
+            Ok::<_, Fault>(vehicle)
+        })
+    }
+
+    fn trained(&self, file: &VehicleFile) -> Result<Option<(Weights, Domain)>, BundleError> {
+        if !self.files.contains_key(NETWORK_FILE) {
+            return self.parse(VEHICLE_FILE, |_| match file.training()? {
+                None => Ok(None),
+                Some(_) => Err(Fault::Untrained),
+            });
+        }
+        let weights = self.parse(NETWORK_FILE, tensors::read_weights)?;
+        self.parse(VEHICLE_FILE, |_| {
+            let (provenance, domain) = file.training()?.ok_or(Fault::Untrained)?;
+            if provenance != weights.provenance {
+                return Err(Fault::Provenance { weights: weights.provenance, vehicle: provenance });
+            }
+            Ok(Some((weights, domain)))
+        })
+    }
+}
+
+/// Reads what serving needs; the signed distance grid is verified but not unpacked.
+pub fn load(directory: &Path, isa: Isa) -> Result<Model, BundleError> {
+    let (files, vehicle_file) = Files::read(directory)?;
+    let vehicle = files.vehicle(&vehicle_file)?;
+    let (weights, domain) = files.trained(&vehicle_file)?.ok_or(Fault::NoWeights).map_err(at(directory))?;
+    Ok(Model::new(vehicle, vehicle_file.version, domain, weights, isa))
+}
+
+/// Reads everything.
+pub fn read(directory: &Path) -> Result<Bundle, BundleError> {
+    let (files, vehicle_file) = Files::read(directory)?;
+    let spec = files.files.get(SPEC_FILE).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    Ok(Bundle {
+        vehicle: files.vehicle(&vehicle_file)?,
+        version: vehicle_file.version,
+        trained: files.trained(&vehicle_file)?,
+        distance: files.parse(SDF_FILE, tensors::read_distance)?,
+        spec,
+    })
+}
+
+/// Writes a bundle beside its place and then puts it there, so that a reader sees the one before or this one.
+pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
+    let mut files = BTreeMap::from([
+        (VEHICLE_FILE, VehicleFile::new(bundle).to_toml().into_bytes()),
+        (HULL_FILE, write_stl(&bundle.vehicle.hull.mesh)),
+        (PATCHES_FILE, tensors::write_patches(&bundle.vehicle.hull.face_surface)),
+        (SDF_FILE, tensors::write_distance(&bundle.distance)),
+        (SUBMERGENCE_FILE, tensors::write_samples(&bundle.vehicle.samples)),
+    ]);
+    if let Some((weights, _)) = &bundle.trained {
+        files.insert(NETWORK_FILE, tensors::write_weights(weights));
+    }
+    if let Some(spec) = &bundle.spec {
+        files.insert(SPEC_FILE, spec.clone().into_bytes());
+    }
+    files.insert(SUMS_FILE, checksums::render(&files).into_bytes());
+    let staged = directory.with_extension("new");
+    let stage = || {
+        let _ = fs::remove_dir_all(&staged);
+        fs::create_dir_all(&staged)?;
+        files.iter().try_for_each(|(name, bytes)| fs::write(staged.join(name), bytes))
+    };
+    stage().map_err(|error| at(&staged)(error.into()))?;
+    place(&staged, directory).map_err(|error| at(directory)(error.into()))
+}
+
+/// Exchanges the staged folder with the one in place in a single step of the file system.
+fn place(staged: &Path, directory: &Path) -> std::io::Result<()> {
+    use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
+    if !directory.exists() {
+        return fs::rename(staged, directory);
+    }
+    renameat2(AT_FDCWD, staged, AT_FDCWD, directory, RenameFlags::RENAME_EXCHANGE)?;
+    fs::remove_dir_all(staged)
+}
+
+fn read_bounded(path: &Path) -> Result<Vec<u8>, BundleError> {
+    let read = || {
+        let bytes = fs::metadata(path)?.len();
+        if bytes > MAX_FILE_BYTES {
+            return Err(Fault::TooLarge { bytes });
+        }
+        Ok(fs::read(path)?)
+    };
+    read().map_err(at(path))
+}

@@ -1,0 +1,297 @@
+//! The safetensors files. All metadata of a file is one JSON text under the key `wade`, so that the same content is
+//! always the same bytes.
+
+use std::collections::HashMap;
+
+use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::condition::GroundContact;
+use crate::features::{GLOBAL, GLOBAL_NAMES, INPUTS, SURFACE_NAMES};
+use crate::frame::Vec3;
+use crate::geometry::distance::{GridError, SignedDistanceGrid};
+use crate::geometry::submergence::Samples;
+use crate::model::Weights;
+use crate::model::network::{Network, OUTPUTS, Scaling, WIDTH};
+
+/// What is wrong with a tensor file.
+#[derive(Debug, thiserror::Error)]
+pub enum TensorError {
+    /// Not safetensors, or a tensor is missing.
+    #[error("not sound safetensors: {0}")]
+    File(#[from] SafeTensorError),
+    /// The metadata is missing.
+    #[error("no metadata under the key \"wade\"")]
+    NoMetadata,
+    /// The metadata is not what it should be.
+    #[error("metadata: {0}")]
+    Metadata(#[from] serde_json::Error),
+    /// Another type or shape.
+    #[error("tensor {name} is {found}, expected {expected}")]
+    Shape {
+        /// The tensor.
+        name: &'static str,
+        /// What it is.
+        found: String,
+        /// What it should be.
+        expected: String,
+    },
+    /// A NaN or an infinity.
+    #[error("tensor {name} holds a number that is not finite, the first at {index}")]
+    NotFinite {
+        /// The tensor.
+        name: &'static str,
+        /// Index of the number.
+        index: usize,
+    },
+    /// A standard deviation of zero or below.
+    #[error("tensor {name} holds a standard deviation that is not positive at {index}")]
+    NotPositive {
+        /// The tensor.
+        name: &'static str,
+        /// Index of the number.
+        index: usize,
+    },
+    /// Weights for other inputs.
+    #[error("the weights were trained on other features: {found}")]
+    Features {
+        /// The names in the file.
+        found: String,
+    },
+    /// A grid that is none.
+    #[error("{0}")]
+    Grid(#[from] GridError),
+}
+
+/// What the weights' file says of itself.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WeightsMetadata {
+    kind: Kind,
+    global_features: Vec<String>,
+    surface_features: Vec<String>,
+    provenance: String,
+    ground_contact: GroundContact,
+}
+
+/// Kinds of model.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    /// The paper's network as published.
+    Paper,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GridMetadata {
+    origin_m: [f64; 3],
+    spacing_m: f64,
+    /// Metres per step of the stored integers.
+    step_m: f64,
+}
+
+struct File<'a> {
+    tensors: SafeTensors<'a>,
+}
+
+impl<'a> File<'a> {
+    fn new(bytes: &'a [u8]) -> Result<Self, TensorError> {
+        Ok(Self { tensors: SafeTensors::deserialize(bytes)? })
+    }
+
+    fn view(
+        &self,
+        name: &'static str,
+        dtype: Dtype,
+        shape: &[Option<usize>],
+    ) -> Result<TensorView<'a>, TensorError> {
+        let view = self.tensors.tensor(name)?;
+        let fits = view.shape().len() == shape.len()
+            && view.shape().iter().zip(shape).all(|(have, want)| want.is_none_or(|want| want == *have));
+        if view.dtype() == dtype && fits {
+            return Ok(view);
+        }
+        let found = format!("{:?} {:?}", view.dtype(), view.shape());
+        let sizes: Vec<String> =
+            shape.iter().map(|n| n.map_or_else(|| "any".into(), |n| n.to_string())).collect();
+        Err(TensorError::Shape { name, found, expected: format!("{dtype:?} [{}]", sizes.join(", ")) })
+    }
+
+    fn floats(&self, name: &'static str, shape: &[Option<usize>]) -> Result<Vec<f32>, TensorError> {
+        let view = self.view(name, Dtype::F32, shape)?;
+        let values: Vec<f32> = numbers(view.data(), f32::from_le_bytes);
+        match values.iter().position(|value| !value.is_finite()) {
+            Some(index) => Err(TensorError::NotFinite { name, index }),
+            None => Ok(values),
+        }
+    }
+
+    fn array<const N: usize>(&self, name: &'static str) -> Result<[f32; N], TensorError> {
+        let values = self.floats(name, &[Some(N)])?;
+        Ok(std::array::from_fn(|i| values[i]))
+    }
+
+    fn deviations<const N: usize>(&self, name: &'static str) -> Result<[f32; N], TensorError> {
+        let values = self.array::<N>(name)?;
+        match values.iter().position(|&value| value <= 0.0) {
+            Some(index) => Err(TensorError::NotPositive { name, index }),
+            None => Ok(values),
+        }
+    }
+}
+
+fn metadata<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, TensorError> {
+    let (_, header) = SafeTensors::read_metadata(bytes)?;
+    let text = header.metadata().as_ref().and_then(|map| map.get("wade")).ok_or(TensorError::NoMetadata)?;
+    Ok(serde_json::from_str(text)?)
+}
+
+fn numbers<T, const SIZE: usize>(bytes: &[u8], from: fn([u8; SIZE]) -> T) -> Vec<T> {
+    bytes.as_chunks::<SIZE>().0.iter().map(|chunk| from(*chunk)).collect()
+}
+
+fn write(
+    tensors: &[(&'static str, Dtype, Vec<usize>, Vec<u8>)],
+    metadata: Option<&impl Serialize>,
+) -> Vec<u8> {
+    let views = tensors.iter().map(|(name, dtype, shape, bytes)| {
+        let view = TensorView::new(*dtype, shape.clone(), bytes).expect("the shape is that of the data");
+        (*name, view)
+    });
+    let metadata = metadata.map(|metadata| {
+        let text = serde_json::to_string(metadata).expect("plain structs are always JSON");
+        HashMap::from([("wade".to_owned(), text)])
+    });
+    safetensors::serialize(views, metadata).expect("names are unique and views are sound")
+}
+
+fn bytes_of<T: Copy, const SIZE: usize>(values: &[T], to: fn(T) -> [u8; SIZE]) -> Vec<u8> {
+    values.iter().flat_map(|&value| to(value)).collect()
+}
+
+fn floats(
+    name: &'static str,
+    shape: Vec<usize>,
+    values: &[f32],
+) -> (&'static str, Dtype, Vec<usize>, Vec<u8>) {
+    (name, Dtype::F32, shape, bytes_of(values, f32::to_le_bytes))
+}
+
+pub fn read_patches(bytes: &[u8]) -> Result<Vec<u16>, TensorError> {
+    let file = File::new(bytes)?;
+    Ok(numbers(file.view("face_surface", Dtype::U16, &[None])?.data(), u16::from_le_bytes))
+}
+
+pub fn write_patches(face_surface: &[u16]) -> Vec<u8> {
+    let bytes = bytes_of(face_surface, u16::to_le_bytes);
+    write(&[("face_surface", Dtype::U16, vec![face_surface.len()], bytes)], None::<&()>)
+}
+
+/// Samples as they are stored.
+pub struct SampleParts {
+    pub points: Vec<[f32; 3]>,
+    pub normals: Vec<[f32; 3]>,
+    pub offsets: Vec<usize>,
+}
+
+pub fn read_samples(bytes: &[u8]) -> Result<SampleParts, TensorError> {
+    let file = File::new(bytes)?;
+    let vectors =
+        |name| Ok::<_, TensorError>(file.floats(name, &[None, Some(3)])?.as_chunks::<3>().0.to_vec());
+    let offsets = numbers(file.view("offsets", Dtype::U32, &[None])?.data(), u32::from_le_bytes);
+    Ok(SampleParts {
+        points: vectors("points")?,
+        normals: vectors("normals")?,
+        offsets: offsets.into_iter().map(|offset| offset as usize).collect(),
+    })
+}
+
+pub fn write_samples(samples: &Samples) -> Vec<u8> {
+    let (points, normals) = (samples.points(), samples.normals());
+    let offsets: Vec<u32> = samples.offsets().into_iter().map(|offset| offset as u32).collect();
+    let tensors = [
+        floats("points", vec![points.len(), 3], points.as_flattened()),
+        floats("normals", vec![normals.len(), 3], normals.as_flattened()),
+        ("offsets", Dtype::U32, vec![offsets.len()], bytes_of(&offsets, u32::to_le_bytes)),
+    ];
+    write(&tensors, None::<&()>)
+}
+
+pub fn read_distance(bytes: &[u8]) -> Result<SignedDistanceGrid, TensorError> {
+    let file = File::new(bytes)?;
+    let meta: GridMetadata = metadata(bytes)?;
+    let view = file.view("distance", Dtype::I16, &[None, None, None])?;
+    let steps = numbers(view.data(), i16::from_le_bytes);
+    let values = steps.into_iter().map(|step| (f64::from(step) * meta.step_m) as f32).collect();
+    let shape = std::array::from_fn(|i| view.shape()[i]);
+    Ok(SignedDistanceGrid::from_parts(Vec3::from(meta.origin_m), meta.spacing_m, shape, values)?)
+}
+
+/// Sixteen bits a point: the rounding, at most half a step, is far below what the grid itself resolves.
+pub fn write_distance(grid: &SignedDistanceGrid) -> Vec<u8> {
+    let largest = grid.values.iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
+    let step_m = f64::from(largest.max(f32::MIN_POSITIVE)) / f64::from(i16::MAX);
+    let steps: Vec<i16> =
+        grid.values.iter().map(|value| (f64::from(*value) / step_m).round() as i16).collect();
+    let meta = GridMetadata { origin_m: grid.origin.into(), spacing_m: grid.spacing, step_m };
+    let tensor = ("distance", Dtype::I16, grid.shape.to_vec(), bytes_of(&steps, i16::to_le_bytes));
+    write(&[tensor], Some(&meta))
+}
+
+pub fn read_weights(bytes: &[u8]) -> Result<Weights, TensorError> {
+    let file = File::new(bytes)?;
+    let meta: WeightsMetadata = metadata(bytes)?;
+    let Kind::Paper = meta.kind;
+    if meta.global_features != GLOBAL_NAMES || meta.surface_features != SURFACE_NAMES {
+        let found = [meta.surface_features, meta.global_features].concat().join(" ");
+        return Err(TensorError::Features { found });
+    }
+    let matrix = |name, rows, columns| file.floats(name, &[Some(rows), Some(columns)]);
+    let bias = |name, rows| file.floats(name, &[Some(rows)]);
+    Ok(Weights {
+        network: Network {
+            w1: matrix("w1", WIDTH, INPUTS)?,
+            b1: bias("b1", WIDTH)?,
+            w2: matrix("w2", WIDTH, WIDTH)?,
+            b2: bias("b2", WIDTH)?,
+            w3: matrix("w3", OUTPUTS, WIDTH)?,
+            b3: bias("b3", OUTPUTS)?,
+        },
+        scaling: Scaling {
+            global_mean: file.array("global_mean")?,
+            global_std: file.deviations("global_std")?,
+            target_mean: file.array("target_mean")?,
+            target_std: file.deviations("target_std")?,
+        },
+        provenance: meta.provenance,
+        ground_contact: meta.ground_contact,
+        held_out_rms: file.array::<OUTPUTS>("held_out_rms")?.map(f64::from),
+    })
+}
+
+pub fn write_weights(weights: &Weights) -> Vec<u8> {
+    let scaling = &weights.scaling;
+    let mut tensors: Vec<_> = weights
+        .network
+        .tensors()
+        .into_iter()
+        .map(|(name, shape, values)| floats(name, shape, values))
+        .collect();
+    tensors.extend([
+        floats("global_mean", vec![GLOBAL], &scaling.global_mean),
+        floats("global_std", vec![GLOBAL], &scaling.global_std),
+        floats("target_mean", vec![OUTPUTS], &scaling.target_mean),
+        floats("target_std", vec![OUTPUTS], &scaling.target_std),
+        floats("held_out_rms", vec![OUTPUTS], &weights.held_out_rms.map(|rms| rms as f32)),
+    ]);
+    let meta = WeightsMetadata {
+        kind: Kind::Paper,
+        global_features: GLOBAL_NAMES.map(str::to_owned).to_vec(),
+        surface_features: SURFACE_NAMES.map(str::to_owned).to_vec(),
+        provenance: weights.provenance.clone(),
+        ground_contact: weights.ground_contact,
+    };
+    write(&tensors, Some(&meta))
+}

@@ -1,0 +1,178 @@
+//! Clients of the library's own: in process, gRPC, shared memory; one call and one reply for all.
+
+mod grpc;
+mod shm;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+pub use grpc::{GrpcClient, Method};
+pub use shm::ShmClient;
+
+use crate::domain::Outside;
+use crate::forces::Forces;
+use crate::model::Model;
+use crate::service::Evaluator;
+use crate::service::grpc::single;
+use crate::service::wire::{InvalidState, State};
+
+/// Why a call got no forces.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ClientError {
+    /// No answer came in time. The next call connects anew.
+    #[error("no answer within {} ms", .0.as_millis())]
+    Timeout(Duration),
+    /// Nobody serves there.
+    #[error("no server at {at}: {reason}")]
+    NoServer {
+        /// Address or service.
+        at: String,
+        /// What happened.
+        reason: String,
+    },
+    /// The server refused the request.
+    #[error("{code}: {message}")]
+    Refused {
+        /// The gRPC code in words.
+        code: String,
+        /// What the server said.
+        message: String,
+    },
+    /// The state is wrong.
+    #[error(transparent)]
+    Invalid(#[from] InvalidState),
+    /// A batch longer than the transport carries.
+    #[error("a batch of {len}, the limit of this transport is {limit}")]
+    BatchTooLong {
+        /// States in the batch.
+        len: usize,
+        /// The limit.
+        limit: usize,
+    },
+}
+
+/// The load on one surface as it travels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceReply {
+    /// Force, body frame [N].
+    pub force: [f32; 3],
+    /// Point of application, body frame [m].
+    pub point: [f32; 3],
+    /// Share under water.
+    pub wetted_fraction: f32,
+}
+
+/// An answer as it travels: the same bits whatever the transport.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reply {
+    /// Version of the bundle that answered.
+    pub version: u32,
+    /// Source of its training data.
+    pub provenance: String,
+    /// The surfaces in the vehicle's order.
+    pub surfaces: Vec<SurfaceReply>,
+    /// Net force, body frame [N].
+    pub force: [f32; 3],
+    /// Net moment [N m] about `about`.
+    pub moment: [f32; 3],
+    /// Centre of mass, body frame [m].
+    pub about: [f32; 3],
+    /// One standard deviation of the net force [N].
+    pub uncertainty: [f32; 3],
+    /// How far each quantity lies outside the training domain.
+    pub outside: Outside,
+    /// The server's own time [ns].
+    pub compute_ns: u64,
+}
+
+impl Reply {
+    fn new(model: &Model, forces: &Forces, compute_ns: u64) -> Self {
+        let surface = |load: &crate::forces::SurfaceForce| SurfaceReply {
+            force: single(&load.force),
+            point: single(&load.point),
+            wetted_fraction: load.wetted_fraction as f32,
+        };
+        Self {
+            version: model.version(),
+            provenance: model.weights().provenance.clone(),
+            surfaces: forces.surfaces.iter().map(surface).collect(),
+            force: single(&forces.wrench.force),
+            moment: single(&forces.wrench.moment),
+            about: single(&model.vehicle().center_of_mass),
+            uncertainty: single(&forces.uncertainty),
+            outside: Outside { excess: forces.outside.excess.map(|excess| f64::from(excess as f32)) },
+            compute_ns,
+        }
+    }
+}
+
+/// A model in this process.
+#[derive(Debug)]
+pub struct InProcess {
+    model: Arc<Model>,
+    evaluator: Evaluator,
+}
+
+impl InProcess {
+    /// Asks this model.
+    pub fn new(model: Arc<Model>) -> Self {
+        Self { model, evaluator: Evaluator::default() }
+    }
+
+    /// The forces in one state.
+    pub fn evaluate(&mut self, state: &State) -> Result<Reply, ClientError> {
+        let evaluated = self.evaluator.evaluate(&self.model, state)?;
+        Ok(Reply::new(&self.model, evaluated.forces, evaluated.compute_ns))
+    }
+
+    fn compute(&mut self, states: &[State]) -> Result<u64, ClientError> {
+        states
+            .iter()
+            .try_fold(0, |ns, state| Ok(ns + self.evaluator.evaluate(&self.model, state)?.compute_ns))
+    }
+}
+
+/// Any of them.
+#[derive(Debug)]
+pub enum Client {
+    /// No transport at all.
+    InProcess(Box<InProcess>),
+    /// gRPC over TCP or a Unix socket, one call a query or one stream.
+    Grpc(Box<GrpcClient>),
+    /// Shared memory.
+    Shm(Box<ShmClient>),
+}
+
+impl Client {
+    /// The forces in one state.
+    pub fn evaluate(&mut self, state: &State) -> Result<Reply, ClientError> {
+        match self {
+            Self::InProcess(client) => client.evaluate(state),
+            Self::Grpc(client) => client.evaluate(state).map(Reply::from),
+            Self::Shm(client) => client.evaluate(state).map(|answer| Reply::from(&answer)),
+        }
+    }
+
+    /// The forces in each state of a batch.
+    pub fn evaluate_batch(&mut self, states: &[State]) -> Result<Vec<Reply>, ClientError> {
+        match self {
+            Self::InProcess(client) => states.iter().map(|state| client.evaluate(state)).collect(),
+            Self::Grpc(client) => client.evaluate_batch(states).map(grpc::replies),
+            Self::Shm(client) => {
+                client.evaluate_batch(states).map(|answers| answers.iter().map(Reply::from).collect())
+            }
+        }
+    }
+
+    /// Asks for one state, or for a batch where there are more, and keeps of the answer only the server's own time
+    /// [ns]: what a measurement of the transport calls.
+    pub fn compute(&mut self, states: &[State]) -> Result<u64, ClientError> {
+        match (self, states) {
+            (Self::InProcess(client), _) => client.compute(states),
+            (Self::Grpc(client), [state]) => client.evaluate(state).map(|response| response.compute_ns),
+            (Self::Grpc(client), _) => client.evaluate_batch(states).map(|response| response.compute_ns),
+            (Self::Shm(client), [state]) => client.evaluate(state).map(|answer| answer.compute_ns),
+            (Self::Shm(client), _) => client.compute_batch(states),
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Gathers each module's settings; read and checked once, before any port is bound.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::service::{grpc, http, run, shm};
+
+/// Settings of `wade serve`: the file deploy/wade.toml shows every key with its default.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Folder of the vehicle bundles.
+    pub vehicles: PathBuf,
+    /// CPUs that the server may use; empty: all.
+    pub cpus: Vec<usize>,
+    /// Longest time between SIGTERM and the end [s].
+    pub drain_s: f64,
+    /// Length of the window of `GetLatency` [s].
+    pub latency_window_s: f64,
+    /// gRPC.
+    pub grpc: grpc::Config,
+    /// Shared memory.
+    pub shm: shm::Config,
+    /// Metrics and probes.
+    pub http: http::Config,
+    /// Logs.
+    pub log: Log,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            vehicles: "vehicles".into(),
+            cpus: Vec::new(),
+            drain_s: 5.0,
+            latency_window_s: 10.0,
+            grpc: grpc::Config::default(),
+            shm: shm::Config::default(),
+            http: http::Config::default(),
+            log: Log::default(),
+        }
+    }
+}
+
+/// Settings of the logs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Log {
+    /// Filter in the syntax of `tracing_subscriber::EnvFilter`; `wade::request=debug` logs every request.
+    pub filter: String,
+    /// One JSON object a line instead of text.
+    pub json: bool,
+}
+
+impl Default for Log {
+    fn default() -> Self {
+        Self { filter: "info,iceoryx2=warn".into(), json: false }
+    }
+}
+
+/// Why a configuration was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{}: {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// Not TOML, or a key that does not exist or has the wrong type.
+    #[error("{}: {source}", .path.display())]
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// Where and what.
+        source: Box<toml::de::Error>,
+    },
+    /// A value out of its range.
+    #[error("{key} = {value}: must be {expected}")]
+    Range {
+        /// The key.
+        key: &'static str,
+        /// The value.
+        value: String,
+        /// What is allowed.
+        expected: &'static str,
+    },
+}
+
+impl Config {
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        toml::from_str(&text)
+            .map_err(|source| ConfigError::Toml { path: path.to_owned(), source: Box::new(source) })
+    }
+
+    /// Checks every value that could not work.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let range = |ok: bool, key, value: &dyn ToString, expected| {
+            if ok { Ok(()) } else { Err(ConfigError::Range { key, value: value.to_string(), expected }) }
+        };
+        let (grpc, day) = (&self.grpc, 86_400.0);
+        range((0.0..=day).contains(&self.drain_s), "drain_s", &self.drain_s, "0 to 86400")?;
+        let window = self.latency_window_s;
+        range((0.1..=day).contains(&window), "latency_window_s", &window, "0.1 to 86400")?;
+        range((1..=256).contains(&grpc.threads), "grpc.threads", &grpc.threads, "1 to 256")?;
+        range(
+            grpc.max_message_bytes >= 1024,
+            "grpc.max_message_bytes",
+            &grpc.max_message_bytes,
+            "1024 or more",
+        )?;
+        range(grpc.max_batch >= 1, "grpc.max_batch", &grpc.max_batch, "1 or more")?;
+        range(grpc.max_requests >= 1, "grpc.max_requests", &grpc.max_requests, "1 or more")?;
+        range(grpc.max_streams >= 1, "grpc.max_streams", &grpc.max_streams, "1 or more")?;
+        let streams = grpc.max_streams_per_connection;
+        range(streams >= 1, "grpc.max_streams_per_connection", &streams, "1 or more")?;
+        range(grpc.keepalive_s >= 1, "grpc.keepalive_s", &grpc.keepalive_s, "1 or more")?;
+        let clients = self.shm.max_clients;
+        range((1..=256).contains(&clients), "shm.max_clients", &clients, "1 to 256")?;
+        let silent = grpc.listen.is_empty() && grpc.unix_socket.as_os_str().is_empty() && !self.shm.enabled;
+        range(!silent, "shm.enabled", &false, "true where grpc.listen and grpc.unix_socket are both empty")
+    }
+
+    /// The folder of bundles, found where the default is not in the working directory.
+    pub fn vehicles_directory(&self) -> PathBuf {
+        run::find_vehicles(&self.vehicles)
+    }
+}

@@ -1,0 +1,113 @@
+//! The models that are being served, by vehicle: atomic swap and admission. No async, no IO, no clock.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use arc_swap::ArcSwap;
+
+use crate::model::Model;
+
+/// The models by vehicle name.
+pub type Models = BTreeMap<String, Arc<Model>>;
+
+/// Shared by every transport. Serves nothing until something is swapped in.
+#[derive(Debug, Default)]
+pub struct Engine {
+    models: ArcSwap<Models>,
+}
+
+/// No vehicle of this name is served.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("no vehicle named \"{name}\" is served; served: {served}")]
+pub struct UnknownVehicle {
+    /// The name asked for.
+    pub name: String,
+    /// The names served.
+    pub served: String,
+}
+
+impl Engine {
+    /// The version of a vehicle that is served now. A request keeps the version it got, whatever is swapped meanwhile.
+    pub fn model(&self, vehicle: &str) -> Result<Arc<Model>, UnknownVehicle> {
+        let models = self.models.load();
+        models.get(vehicle).cloned().ok_or_else(|| UnknownVehicle {
+            name: vehicle.to_owned(),
+            served: models.keys().map(String::as_str).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// Everything that is served now.
+    pub fn models(&self) -> Arc<Models> {
+        self.models.load_full()
+    }
+
+    /// Serves a model from now on in place of the version before it.
+    pub fn swap(&self, model: Model) {
+        let model = Arc::new(model);
+        self.models.rcu(|models| {
+            let mut models = Models::clone(models);
+            models.insert(model.vehicle().name.clone(), Arc::clone(&model));
+            models
+        });
+    }
+}
+
+/// Counts what is in flight and refuses what is over the limit.
+#[derive(Debug)]
+pub struct Admission {
+    in_flight: AtomicUsize,
+    limit: usize,
+}
+
+/// Too much is in flight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{limit} are already in flight, the limit")]
+pub struct Overloaded {
+    /// The limit.
+    pub limit: usize,
+}
+
+impl Admission {
+    /// Admits at most `limit` at a time.
+    pub fn new(limit: usize) -> Arc<Self> {
+        Arc::new(Self { in_flight: AtomicUsize::new(0), limit })
+    }
+
+    /// A place, given back when the permit is dropped.
+    pub fn admit(self: &Arc<Self>) -> Result<Permit, Overloaded> {
+        let before = self.in_flight.fetch_add(1, Ordering::Relaxed);
+        let permit = Permit(Arc::clone(self));
+        if before < self.limit { Ok(permit) } else { Err(Overloaded { limit: self.limit }) }
+    }
+
+    /// How many are in flight.
+    pub fn in_flight(&self) -> usize {
+        self.in_flight.load(Ordering::Relaxed)
+    }
+}
+
+/// A place among those in flight.
+#[derive(Debug)]
+pub struct Permit(Arc<Admission>);
+
+impl Drop for Permit {
+    fn drop(&mut self) {
+        self.0.in_flight.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_takes_no_place_and_a_dropped_permit_gives_its_place_back() {
+        let admission = Admission::new(1);
+        let first = admission.admit().expect("the first fits");
+        assert_eq!(admission.admit().err(), Some(Overloaded { limit: 1 }));
+        assert_eq!(admission.in_flight(), 1);
+        drop(first);
+        assert!(admission.admit().is_ok());
+    }
+}

@@ -1,0 +1,117 @@
+//! Hydrostatic pressure integrated exactly over the wet part of a hull (effect E1).
+
+use super::immersion::{WetTriangle, wet_triangles};
+use super::mesh::Mesh;
+use super::surfaces::Hull;
+use crate::frame::{GRAVITY, Vec3, WaterPlane};
+use crate::wrench::Wrench;
+
+/// Buoyancy of a closed hull; frame of the mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Hydrostatics {
+    /// Force and moment of the pressure about the point asked for [N, N m].
+    pub wrench: Wrench,
+    /// Volume under the water plane [m3].
+    pub displaced_volume: f64,
+    /// Centroid of the displaced volume [m]; `None` when dry.
+    pub center_of_buoyancy: Option<Vec3>,
+    /// Area of the hull under water [m2].
+    pub wetted_area: f64,
+    /// Area that the hull cuts out of the water surface [m2].
+    pub waterplane_area: f64,
+}
+
+/// Pressure load and displaced volume of a closed hull for any attitude of the water plane.
+///
+/// `dF = -rho g delta n dA` with depth `delta` (Archimedes; Newman, Marine Hydrodynamics, section 2.17). Depth is
+/// linear and its moment quadratic over a triangle, for which the three edge midpoints are exact. The cut at the
+/// surface needs no lid: pressure is zero there. Density and gravity multiply last, so loads are linear in density.
+pub fn hydrostatics(mesh: &Mesh, plane: &WaterPlane, density: f64, about: &Vec3) -> Hydrostatics {
+    let mut sums = Sums::default();
+    for face in 0..mesh.faces.len() {
+        wet_triangles(mesh, face, plane).iter().for_each(|t| sums.add(t, about));
+    }
+    sums.finish(plane, density, about)
+}
+
+/// The pressure load on each surface about `about` [N, N m], in the order of the surfaces.
+pub fn surface_hydrostatics(
+    hull: &Hull,
+    count: usize,
+    plane: &WaterPlane,
+    density: f64,
+    about: &Vec3,
+) -> Vec<Wrench> {
+    let mut wrenches = vec![Wrench::default(); count];
+    surface_hydrostatics_into(hull, plane, density, about, &mut wrenches);
+    wrenches
+}
+
+/// As `surface_hydrostatics`, into a slice with one entry a surface and without allocation.
+pub fn surface_hydrostatics_into(
+    hull: &Hull,
+    plane: &WaterPlane,
+    density: f64,
+    about: &Vec3,
+    out: &mut [Wrench],
+) {
+    out.fill(Wrench::default());
+    for (face, &surface) in hull.face_surface.iter().enumerate() {
+        for triangle in wet_triangles(&hull.mesh, face, plane).iter() {
+            out[surface as usize] += unit_load(triangle, about);
+        }
+    }
+    out.iter_mut().for_each(|w| *w = scaled(*w, density * GRAVITY));
+}
+
+/// Load of a fluid with `rho g = 1` on one triangle: `-int delta n dA` [m3] and its moment [m4].
+pub(super) fn unit_load(triangle: &WetTriangle, about: &Vec3) -> Wrench {
+    let (area, [a, b, c], [da, db, dc]) = (triangle.area_vector(), triangle.vertices, triangle.depths);
+    // the three edge midpoints, collected by corner: int delta x dA = A / 12 sum of x_i (sum of depths + delta_i)
+    let sum = da + db + dc;
+    let first_moment = (a * (sum + da) + b * (sum + db) + c * (sum + dc)) / 12.0 - about * (sum / 3.0);
+    Wrench { force: -area * (sum / 3.0), moment: -first_moment.cross(&area) }
+}
+
+fn scaled(unit: Wrench, factor: f64) -> Wrench {
+    Wrench { force: unit.force * factor, moment: unit.moment * factor }
+}
+
+#[derive(Default)]
+struct Sums {
+    load: Wrench,
+    area: f64,
+    area_vector: Vec3,
+    /// `int delta^2 / 2 n dA`: its component along the plane normal is the first moment of depth over the volume.
+    depth_moment: Vec3,
+}
+
+impl Sums {
+    fn add(&mut self, triangle: &WetTriangle, about: &Vec3) {
+        let area = triangle.area_vector();
+        self.load += unit_load(triangle, about);
+        self.area += area.norm();
+        self.area_vector += area;
+        self.depth_moment += area * (triangle.edge_midpoints().iter().map(|(_, d)| d * d).sum::<f64>() / 6.0);
+    }
+
+    fn finish(self, plane: &WaterPlane, density: f64, about: &Vec3) -> Hydrostatics {
+        let up = plane.normal.into_inner();
+        let volume = self.load.force.dot(&up);
+        Hydrostatics {
+            wrench: scaled(self.load, density * GRAVITY),
+            displaced_volume: volume,
+            center_of_buoyancy: (volume > 0.0).then(|| self.centroid(plane, volume, about)),
+            wetted_area: self.area,
+            waterplane_area: -self.area_vector.dot(&up),
+        }
+    }
+
+    /// Across the plane normal from the moment `r x V up`, along it from `int delta dV = -int delta^2 / 2 up.n dA`.
+    fn centroid(&self, plane: &WaterPlane, volume: f64, about: &Vec3) -> Vec3 {
+        let up = plane.normal.into_inner();
+        let across = about + up.cross(&self.load.moment) / volume;
+        let mean_depth = -self.depth_moment.dot(&up) / volume;
+        across + up * (plane.offset - mean_depth - up.dot(&across))
+    }
+}

@@ -1,0 +1,22 @@
+//! Geometry of a hull: from an STL file to the quantities that the forces are computed from.
+//!
+//! Everything here is in SI units; after `vehicle::build` it is in the body frame as well.
+//! Reading order: `mesh` and `stl` (triangles in and out), `parts`, `watertight` and `seal` (refuse or repair), `surfaces`
+//! (named patches), `immersion` and `hydrostatics` (clipping at the water plane, pressure), `pressure` (the same, prepared for queries),
+//! `submergence` (samples),
+//! `distance` (signed distance grid), `parametric` (closed parts by formula).
+
+pub mod distance;
+pub mod hydrostatics;
+pub mod immersion;
+pub mod mesh;
+pub mod parametric;
+mod parry;
+pub mod parts;
+pub mod pressure;
+pub mod sampling;
+pub mod seal;
+pub mod stl;
+pub mod submergence;
+pub mod surfaces;
+pub mod watertight;

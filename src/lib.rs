@@ -1,0 +1,32 @@
+//! Hydrodynamic forces on ground vehicles that drive into water: a vehicle's geometry and weights in, forces on each
+//! surface and the net wrench out.
+//!
+//! Body frame: right-handed FLU (x forward, y left, z up), origin at the centre of the hull's bounding box. SI units,
+//! radians, forces in N, moments in N m about the centre of mass. Depth is the height of the undisturbed water surface
+//! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
+//!
+//! Modules in reading order; each uses only those above it:
+//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`]), the body ([`geometry`], [`vehicle`]), its
+//! inputs to the network ([`features`]), the network ([`model`]), its files ([`bundle`]), what serves it ([`engine`],
+//! [`metrics`]), the doors ([`service`], [`client`], [`config`]).
+
+pub mod condition;
+pub mod domain;
+pub mod forces;
+pub mod frame;
+pub mod wrench;
+
+pub mod geometry;
+pub mod vehicle;
+
+pub mod features;
+
+pub mod bundle;
+pub mod model;
+
+pub mod engine;
+pub mod metrics;
+
+pub mod client;
+pub mod config;
+pub mod service;

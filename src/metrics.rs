@@ -1,0 +1,324 @@
+//! Every metric's name, unit and buckets, and the one function that records a request.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::time::Duration;
+
+use hdrhistogram::Histogram;
+use prometheus_client::encoding::{EncodeLabelSet, EncodeLabelValue, text};
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::histogram::Histogram as Buckets;
+use prometheus_client::registry::{Registry, Unit};
+
+/// Latencies are recorded from 1 ns up to this [ns] with three significant digits.
+const HIGHEST_NS: u64 = 60_000_000_000;
+
+/// Upper bounds of the Prometheus buckets [s]: 1 us to 100 ms.
+const BUCKETS_S: [f64; 22] = [
+    1e-6, 2e-6, 5e-6, 7.5e-6, 10e-6, 15e-6, 20e-6, 30e-6, 50e-6, 75e-6, 100e-6, 150e-6, 200e-6, 300e-6,
+    500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3,
+];
+
+/// The way a request came in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EncodeLabelValue)]
+#[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
+pub enum Transport {
+    grpc_unary,
+    grpc_batch,
+    grpc_stream,
+    shm,
+    shm_batch,
+}
+
+impl Transport {
+    const ALL: [Self; 5] =
+        [Self::grpc_unary, Self::grpc_batch, Self::grpc_stream, Self::shm, Self::shm_batch];
+
+    /// The value of the label.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::grpc_unary => "grpc_unary",
+            Self::grpc_batch => "grpc_batch",
+            Self::grpc_stream => "grpc_stream",
+            Self::shm => "shm",
+            Self::shm_batch => "shm_batch",
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct RequestLabels {
+    transport: Transport,
+    vehicle: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct RefusalLabels {
+    transport: Transport,
+    reason: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct VehicleLabels {
+    vehicle: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct ReloadLabels {
+    outcome: &'static str,
+}
+
+/// Latencies of one transport and vehicle.
+#[derive(Debug)]
+pub struct Recorder {
+    histograms: Mutex<Histograms>,
+    buckets: Buckets,
+    out_of_domain: Counter,
+}
+
+#[derive(Debug)]
+struct Histograms {
+    since_start: Histogram<u64>,
+    current: Histogram<u64>,
+    last: Histogram<u64>,
+}
+
+impl Recorder {
+    fn new(buckets: Buckets, out_of_domain: Counter) -> Self {
+        let histogram =
+            || Histogram::new_with_max(HIGHEST_NS, 3).expect("the constants are valid for a histogram");
+        let histograms = Histograms { since_start: histogram(), current: histogram(), last: histogram() };
+        Self { histograms: Mutex::new(histograms), buckets, out_of_domain }
+    }
+
+    /// Records one answered request: the time from its arrival to its answer, and how many of its states were outside
+    /// the training domain.
+    pub fn record(&self, elapsed: Duration, out_of_domain: u64) {
+        let ns = u64::try_from(elapsed.as_nanos()).unwrap_or(u64::MAX);
+        let mut histograms = lock(&self.histograms);
+        histograms.since_start.saturating_record(ns);
+        histograms.current.saturating_record(ns);
+        drop(histograms);
+        self.buckets.observe(elapsed.as_secs_f64());
+        if out_of_domain > 0 {
+            self.out_of_domain.inc_by(out_of_domain);
+        }
+    }
+
+    fn rotate(&self) {
+        let mut histograms = lock(&self.histograms);
+        let histograms = &mut *histograms;
+        std::mem::swap(&mut histograms.current, &mut histograms.last);
+        histograms.current.reset();
+    }
+}
+
+/// The percentiles that are reported, of latencies in nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Percentiles {
+    /// Number of requests.
+    pub count: u64,
+    /// Median [us].
+    pub p50_us: f64,
+    /// [us]
+    pub p95_us: f64,
+    /// [us]
+    pub p99_us: f64,
+    /// [us]
+    pub p99_9_us: f64,
+    /// [us]
+    pub max_us: f64,
+}
+
+impl Percentiles {
+    /// Reads them off a histogram of nanoseconds.
+    pub fn of(histogram: &Histogram<u64>) -> Self {
+        let at = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
+        Self {
+            count: histogram.len(),
+            p50_us: at(0.5),
+            p95_us: at(0.95),
+            p99_us: at(0.99),
+            p99_9_us: at(0.999),
+            max_us: histogram.max() as f64 * 1e-3,
+        }
+    }
+}
+
+/// One row of [`Metrics::latencies`].
+#[derive(Debug, Clone)]
+pub struct Latency {
+    /// The transport.
+    pub transport: Transport,
+    /// The vehicle.
+    pub vehicle: String,
+    /// Since the server started.
+    pub since_start: Percentiles,
+    /// Over the last full window.
+    pub window: Percentiles,
+}
+
+/// Everything that is counted.
+#[derive(Debug)]
+pub struct Metrics {
+    registry: Registry,
+    recorders: [RwLock<BTreeMap<String, Arc<Recorder>>>; Transport::ALL.len()],
+    latency: Family<RequestLabels, Buckets, fn() -> Buckets>,
+    out_of_domain: Family<RequestLabels, Counter>,
+    refusals: Family<RefusalLabels, Counter>,
+    bundle_version: Family<VehicleLabels, Gauge>,
+    reloads: Family<ReloadLabels, Counter>,
+}
+
+impl Default for Metrics {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Metrics {
+    /// Registers every metric.
+    pub fn new() -> Self {
+        let latency: Family<_, _, fn() -> Buckets> = Family::new_with_constructor(|| Buckets::new(BUCKETS_S));
+        let (out_of_domain, refusals) = (Family::default(), Family::default());
+        let (bundle_version, reloads) = (Family::default(), Family::default());
+        let mut registry = Registry::with_prefix("wade");
+        registry.register_with_unit(
+            "request_duration",
+            "Time from a request's arrival to its answer",
+            Unit::Seconds,
+            latency.clone(),
+        );
+        registry.register(
+            "out_of_domain",
+            "States answered outside the training domain",
+            Family::clone(&out_of_domain),
+        );
+        registry.register("refusals", "Requests that were not answered", Family::clone(&refusals));
+        registry.register(
+            "bundle_version",
+            "Version of the bundle being served",
+            Family::clone(&bundle_version),
+        );
+        registry.register("reloads", "Bundles read from disk while serving", Family::clone(&reloads));
+        Self {
+            registry,
+            recorders: Default::default(),
+            latency,
+            out_of_domain,
+            refusals,
+            bundle_version,
+            reloads,
+        }
+    }
+
+    /// Where to record a transport's requests for a vehicle.
+    pub fn recorder(&self, transport: Transport, vehicle: &str) -> Arc<Recorder> {
+        let recorders = &self.recorders[transport as usize];
+        let known = recorders.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(recorder) = known.get(vehicle) {
+            return Arc::clone(recorder);
+        }
+        drop(known);
+        let labels = RequestLabels { transport, vehicle: vehicle.to_owned() };
+        let buckets = self.latency.get_or_create(&labels).clone();
+        let out_of_domain = self.out_of_domain.get_or_create(&labels).clone();
+        let mut recorders = recorders.write().unwrap_or_else(PoisonError::into_inner);
+        let recorder = recorders
+            .entry(labels.vehicle)
+            .or_insert_with(|| Arc::new(Recorder::new(buckets, out_of_domain)));
+        Arc::clone(recorder)
+    }
+
+    /// Counts a request that was not answered.
+    pub fn refuse(&self, transport: Transport, reason: &'static str) {
+        self.refusals.get_or_create(&RefusalLabels { transport, reason }).inc();
+    }
+
+    /// States which version of a vehicle is served.
+    pub fn set_bundle_version(&self, vehicle: &str, version: u32) {
+        let labels = VehicleLabels { vehicle: vehicle.to_owned() };
+        self.bundle_version.get_or_create(&labels).set(i64::from(version));
+    }
+
+    /// Counts a bundle that was read while serving.
+    pub fn count_reload(&self, accepted: bool) {
+        let outcome = if accepted { "accepted" } else { "refused" };
+        self.reloads.get_or_create(&ReloadLabels { outcome }).inc();
+    }
+
+    /// Begins a new window; to be called at a steady period by somebody who owns a clock.
+    pub fn rotate(&self) {
+        for recorders in &self.recorders {
+            for recorder in recorders.read().unwrap_or_else(PoisonError::into_inner).values() {
+                recorder.rotate();
+            }
+        }
+    }
+
+    /// Percentiles of every transport and vehicle that was asked.
+    pub fn latencies(&self) -> Vec<Latency> {
+        let rows = Transport::ALL.into_iter().zip(&self.recorders).flat_map(|(transport, recorders)| {
+            let recorders = recorders.read().unwrap_or_else(PoisonError::into_inner);
+            let row = |(vehicle, recorder): (&String, &Arc<Recorder>)| {
+                let histograms = lock(&recorder.histograms);
+                Latency {
+                    transport,
+                    vehicle: vehicle.clone(),
+                    since_start: Percentiles::of(&histograms.since_start),
+                    window: Percentiles::of(&histograms.last),
+                }
+            };
+            recorders.iter().map(row).collect::<Vec<_>>()
+        });
+        rows.collect()
+    }
+
+    /// The text that Prometheus scrapes (OpenMetrics 1.0).
+    pub fn render(&self) -> String {
+        let mut text = String::new();
+        // writing to a String cannot fail
+        let _ = text::encode(&mut text, &self.registry);
+        text
+    }
+}
+
+/// A histogram is sound even if a thread panicked while it held the lock: the worst is one lost value.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_shows_what_came_before_the_last_rotation_and_the_start_shows_everything() {
+        let metrics = Metrics::new();
+        let recorder = metrics.recorder(Transport::shm, "husky");
+        recorder.record(Duration::from_micros(10), 0);
+        metrics.rotate();
+        recorder.record(Duration::from_micros(20), 1);
+        recorder.record(Duration::from_micros(20), 0);
+        let latencies = metrics.latencies();
+        assert_eq!(latencies.len(), 1);
+        assert_eq!((latencies[0].since_start.count, latencies[0].window.count), (3, 1));
+        assert!((latencies[0].window.max_us - 10.0).abs() < 0.02);
+        metrics.rotate();
+        assert_eq!(metrics.latencies()[0].window.count, 2);
+    }
+
+    #[test]
+    fn the_scrape_names_units_and_labels() {
+        let metrics = Metrics::new();
+        metrics.recorder(Transport::grpc_unary, "husky").record(Duration::from_micros(9), 1);
+        metrics.refuse(Transport::grpc_unary, "invalid_argument");
+        let text = metrics.render();
+        let bucket =
+            r#"wade_request_duration_seconds_bucket{le="1e-5",transport="grpc_unary",vehicle="husky"} 1"#;
+        assert!(text.contains(bucket), "{text}");
+        assert!(text.contains(r#"wade_refusals_total{transport="grpc_unary",reason="invalid_argument"} 1"#));
+    }
+}

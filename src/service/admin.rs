@@ -1,0 +1,141 @@
+//! Reading bundles from disk: at the start, and again when an administrator asks.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::bundle::{self, BundleError};
+use crate::engine::{Engine, UnknownVehicle};
+use crate::metrics::Metrics;
+use crate::model::Model;
+use crate::model::kernel::Isa;
+
+/// No bundle to serve.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The folder of bundles cannot be read.
+    #[error("cannot read the vehicles in {}: {source}", .directory.display())]
+    Directory {
+        /// The folder.
+        directory: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The folder holds none.
+    #[error("no vehicle bundle (a folder with a vehicle.toml) in {}", .directory.display())]
+    Empty {
+        /// The folder.
+        directory: PathBuf,
+    },
+    /// One of them is not sound.
+    #[error(transparent)]
+    Bundle(#[from] BundleError),
+}
+
+/// What became of one vehicle when its bundle was read again.
+#[derive(Debug)]
+pub struct Reload {
+    /// The vehicle.
+    pub vehicle: String,
+    /// The version served from now on; 0 where a new vehicle was refused.
+    pub served_version: u32,
+    /// Why the bundle on disk is not the one served.
+    pub refusal: Option<BundleError>,
+}
+
+/// Knows where the bundles are.
+#[derive(Debug)]
+pub struct Reloader {
+    directory: PathBuf,
+    isa: Isa,
+    engine: Arc<Engine>,
+    metrics: Arc<Metrics>,
+    /// Two reloads at once could put the older bundle last.
+    one_at_a_time: Mutex<()>,
+}
+
+impl Reloader {
+    /// Reads bundles of this folder into this engine.
+    pub fn new(directory: PathBuf, isa: Isa, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Self {
+        Self { directory, isa, engine, metrics, one_at_a_time: Mutex::new(()) }
+    }
+
+    /// Reads every bundle of the folder; one that is not sound stops the start.
+    pub fn load_all(&self) -> Result<(), LoadError> {
+        let directory = self.directory.clone();
+        let names = names_in(&directory)
+            .map_err(|source| LoadError::Directory { directory: directory.clone(), source })?;
+        if names.is_empty() {
+            return Err(LoadError::Empty { directory });
+        }
+        let models: Result<Vec<Model>, _> =
+            names.iter().map(|name| bundle::load(&directory.join(name), self.isa)).collect();
+        for model in models? {
+            announce(&model, &self.metrics);
+            self.engine.swap(model);
+        }
+        Ok(())
+    }
+
+    /// The engine that serves what was read.
+    pub fn engine(&self) -> &Arc<Engine> {
+        &self.engine
+    }
+
+    /// Reads one vehicle's bundle again, or all where the name is empty, and swaps in what is sound. What is not
+    /// leaves the version before it in service.
+    pub fn reload(&self, vehicle: &str) -> Result<Vec<Reload>, UnknownVehicle> {
+        let _guard = self.one_at_a_time.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut names: Vec<String> = self.engine.models().keys().cloned().collect();
+        // a folder that cannot be listed refuses each vehicle below, by name
+        names.extend(names_in(&self.directory).unwrap_or_default());
+        names.sort();
+        names.dedup();
+        if !vehicle.is_empty() {
+            names.retain(|name| name == vehicle);
+            if names.is_empty() {
+                self.engine.model(vehicle)?;
+            }
+        }
+        Ok(names.into_iter().map(|name| self.reload_one(name)).collect())
+    }
+
+    fn reload_one(&self, vehicle: String) -> Reload {
+        let loaded = bundle::load(&self.directory.join(&vehicle), self.isa);
+        self.metrics.count_reload(loaded.is_ok());
+        match loaded {
+            Ok(model) => {
+                announce(&model, &self.metrics);
+                let served_version = model.version();
+                self.engine.swap(model);
+                Reload { vehicle, served_version, refusal: None }
+            }
+            Err(refusal) => {
+                tracing::warn!(vehicle, %refusal, "bundle refused; the version before it stays");
+                let served_version = self.engine.model(&vehicle).map_or(0, |model| model.version());
+                Reload { vehicle, served_version, refusal: Some(refusal) }
+            }
+        }
+    }
+}
+
+fn announce(model: &Model, metrics: &Metrics) {
+    let vehicle = &model.vehicle().name;
+    metrics.set_bundle_version(vehicle, model.version());
+    let (version, provenance) = (model.version(), &model.weights().provenance);
+    tracing::info!(vehicle, version, provenance, kernel = model.isa().name(), "bundle loaded");
+}
+
+/// Names of the folders that hold a vehicle.toml.
+fn names_in(directory: &std::path::Path) -> std::io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(directory)? {
+        let entry = entry?;
+        if entry.path().join(bundle::VEHICLE_FILE).is_file()
+            && let Ok(name) = entry.file_name().into_string()
+        {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
+}

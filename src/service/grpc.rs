@@ -1,0 +1,277 @@
+//! gRPC: the listeners, the limits, and handlers that only convert.
+
+mod convert;
+mod handlers;
+mod stream;
+
+pub use convert::single;
+
+use std::net::{SocketAddr, TcpListener};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixListener;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use tokio::sync::watch;
+use tokio_stream::wrappers::UnixListenerStream;
+use tonic::transport::server::{Router, TcpIncoming};
+use tonic_health::pb::health_server::HealthServer;
+use tonic_health::server::{HealthReporter, HealthService};
+
+use super::admin::Reloader;
+use super::proto;
+use super::proto::admin_server::AdminServer;
+use super::proto::hydrodynamics_server::HydrodynamicsServer;
+use crate::engine::{Admission, Engine};
+use crate::metrics::Metrics;
+
+/// Settings of the gRPC server.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// TCP address; an empty string turns TCP off.
+    pub listen: String,
+    /// Path of the Unix socket; an empty string turns it off.
+    pub unix_socket: PathBuf,
+    /// Threads, each with a runtime of its own that computes where it reads.
+    pub threads: usize,
+    /// Largest request [bytes].
+    pub max_message_bytes: usize,
+    /// Most states in a batch.
+    pub max_batch: usize,
+    /// Most requests being answered at a time.
+    pub max_requests: usize,
+    /// Most `Stream` calls open at a time.
+    pub max_streams: usize,
+    /// Most HTTP/2 streams on one connection.
+    pub max_streams_per_connection: u32,
+    /// A connection that does not answer a ping sent after this much silence is closed [s].
+    pub keepalive_s: u64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            listen: "127.0.0.1:50051".into(),
+            unix_socket: "/tmp/wade.sock".into(),
+            threads: 1,
+            max_message_bytes: 4 << 20,
+            max_batch: 4096,
+            max_requests: 64,
+            max_streams: 64,
+            max_streams_per_connection: 256,
+            keepalive_s: 30,
+        }
+    }
+}
+
+/// Why the gRPC server could not start or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum GrpcError {
+    /// The address is none.
+    #[error("grpc.listen: \"{listen}\" is not an address such as 127.0.0.1:50051")]
+    Address {
+        /// What was configured.
+        listen: String,
+    },
+    /// The port or the socket could not be had.
+    #[error("cannot listen on {at}: {source}")]
+    Bind {
+        /// Address or path.
+        at: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// Somebody answers on the Unix socket.
+    #[error("another server is listening on {}; stop it or set grpc.unix_socket", .path.display())]
+    InUse {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The transport broke down.
+    #[error("gRPC transport: {0}")]
+    Transport(#[from] tonic::transport::Error),
+    /// A reflection descriptor is broken.
+    #[error("gRPC reflection: {0}")]
+    Reflection(#[from] tonic_reflection::server::Error),
+}
+
+/// Bound sockets, not yet served. The Unix socket's file goes when this is dropped.
+#[derive(Debug)]
+pub struct Listeners {
+    tcp: Option<TcpListener>,
+    unix: Option<(UnixListener, PathBuf)>,
+}
+
+impl Listeners {
+    /// Binds what the configuration names.
+    pub fn bind(config: &Config) -> Result<Self, GrpcError> {
+        let tcp = (!config.listen.is_empty()).then(|| bind_tcp(&config.listen)).transpose()?;
+        let path = &config.unix_socket;
+        let unix = (!path.as_os_str().is_empty()).then(|| bind_unix(path)).transpose()?;
+        Ok(Self { tcp, unix: unix.map(|listener| (listener, path.clone())) })
+    }
+
+    /// The TCP address in use, with the port that the system chose where 0 was asked for.
+    pub fn tcp_address(&self) -> Option<SocketAddr> {
+        self.tcp.as_ref().and_then(|listener| listener.local_addr().ok())
+    }
+
+    /// The path of the Unix socket.
+    pub fn unix_path(&self) -> Option<&Path> {
+        self.unix.as_ref().map(|(_, path)| path.as_path())
+    }
+}
+
+impl Drop for Listeners {
+    fn drop(&mut self) {
+        if let Some((_, path)) = &self.unix {
+            // a file that is gone already is as good as removed
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
+
+fn bind_tcp(listen: &str) -> Result<TcpListener, GrpcError> {
+    let address: SocketAddr = listen.parse().map_err(|_| GrpcError::Address { listen: listen.to_owned() })?;
+    let bind = || {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        Ok(listener)
+    };
+    bind().map_err(|source| GrpcError::Bind { at: address.to_string(), source })
+}
+
+/// Takes over the file that a killed server left behind, but not the socket of one that lives.
+fn bind_unix(path: &Path) -> Result<UnixListener, GrpcError> {
+    if std::os::unix::net::UnixStream::connect(path).is_ok() {
+        return Err(GrpcError::InUse { path: path.to_owned() });
+    }
+    let bind = || {
+        match std::fs::remove_file(path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        let listener = UnixListener::bind(path)?;
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
+        listener.set_nonblocking(true)?;
+        Ok(listener)
+    };
+    bind().map_err(|source| GrpcError::Bind { at: path.display().to_string(), source })
+}
+
+/// What the handlers share.
+#[derive(Debug, Clone)]
+pub struct Shared {
+    /// The models.
+    pub engine: Arc<Engine>,
+    /// Where requests are counted.
+    pub metrics: Arc<Metrics>,
+    /// Reads bundles again when an administrator asks.
+    pub reloader: Arc<Reloader>,
+    /// Length of the latency window [s].
+    pub window_s: f64,
+}
+
+/// A server that is bound and whose limits are set: health says NOT_SERVING until [`Server::set_serving`].
+#[derive(Debug)]
+pub struct Server {
+    config: Config,
+    shared: Shared,
+    requests: Arc<Admission>,
+    streams: Arc<Admission>,
+    health: HealthReporter,
+}
+
+impl Server {
+    /// A server that is not ready yet.
+    pub async fn new(config: Config, shared: Shared) -> Self {
+        let server = Self {
+            requests: Admission::new(config.max_requests),
+            streams: Admission::new(config.max_streams),
+            config,
+            shared,
+            health: HealthReporter::new(),
+        };
+        // the crate registers the empty name as SERVING
+        server.set_health(tonic_health::ServingStatus::NotServing).await;
+        server
+    }
+
+    /// Says SERVING to those who ask for our health.
+    pub async fn set_serving(&self) {
+        self.set_health(tonic_health::ServingStatus::Serving).await;
+    }
+
+    /// Says NOT_SERVING to those who ask for our health.
+    pub async fn set_not_serving(&self) {
+        self.set_health(tonic_health::ServingStatus::NotServing).await;
+    }
+
+    async fn set_health(&self, status: tonic_health::ServingStatus) {
+        for service in ["", "wade.v1.Hydrodynamics"] {
+            self.health.set_service_status(service, status).await;
+        }
+    }
+
+    fn router(&self, stop: &watch::Receiver<bool>) -> Result<Router, GrpcError> {
+        let handlers = handlers::Handlers {
+            shared: self.shared.clone(),
+            max_batch: self.config.max_batch,
+            requests: Arc::clone(&self.requests),
+            streams: Arc::clone(&self.streams),
+            stop: stop.clone(),
+        };
+        let admin = AdminServer::new(handlers::AdminHandlers { reloader: Arc::clone(&self.shared.reloader) });
+        let reflection = || {
+            tonic_reflection::server::Builder::configure()
+                .register_encoded_file_descriptor_set(proto::DESCRIPTORS)
+                .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        };
+        Ok(tonic::transport::Server::builder()
+            .max_concurrent_streams(self.config.max_streams_per_connection)
+            .http2_keepalive_interval(Some(Duration::from_secs(self.config.keepalive_s)))
+            .add_service(
+                HydrodynamicsServer::new(handlers).max_decoding_message_size(self.config.max_message_bytes),
+            )
+            .add_service(admin)
+            .add_service(HealthServer::new(HealthService::from_health_reporter(self.health.clone())))
+            .add_service(reflection().build_v1()?)
+            .add_service(reflection().build_v1alpha()?))
+    }
+
+    /// Serves the listeners on the current runtime until `stop` turns true and what is in flight is answered.
+    pub async fn run(&self, listeners: &Listeners, stop: watch::Receiver<bool>) -> Result<(), GrpcError> {
+        let at = |at: String| move |source| GrpcError::Bind { at, source };
+        let tcp = async {
+            let Some(listener) = &listeners.tcp else { return Ok(()) };
+            let listener = listener.try_clone().and_then(tokio::net::TcpListener::from_std);
+            let listener = listener.map_err(at(self.config.listen.clone()))?;
+            let serving =
+                self.router(&stop)?.serve_with_incoming_shutdown(incoming(listener), stopped(stop.clone()));
+            serving.await.map_err(GrpcError::from)
+        };
+        let unix = async {
+            let Some((listener, path)) = &listeners.unix else { return Ok(()) };
+            let listener = listener.try_clone().and_then(tokio::net::UnixListener::from_std);
+            let listener = UnixListenerStream::new(listener.map_err(at(path.display().to_string()))?);
+            let serving = self.router(&stop)?.serve_with_incoming_shutdown(listener, stopped(stop.clone()));
+            serving.await.map_err(GrpcError::from)
+        };
+        tokio::try_join!(tcp, unix).map(|_| ())
+    }
+}
+
+/// Accepted connections with TCP_NODELAY, which the builder's own setting does not reach when it is handed a listener:
+/// without it, answers wait up to 41 ms for a delayed acknowledgement.
+pub fn incoming(listener: tokio::net::TcpListener) -> TcpIncoming {
+    TcpIncoming::from(listener).with_nodelay(Some(true))
+}
+
+/// Resolves when `stop` turns true.
+pub(crate) async fn stopped(mut stop: watch::Receiver<bool>) {
+    // an error means that the sender is gone, and with it the server
+    let _ = stop.wait_for(|&stop| stop).await;
+}

@@ -1,0 +1,315 @@
+//! The generated types to and from ours, by hand.
+
+use std::time::Duration;
+
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use crate::domain::{Domain, Outside, Quantity};
+use crate::forces::Forces;
+use crate::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
+use crate::metrics;
+use crate::model::Model;
+use crate::service::proto;
+use crate::service::wire::{Field, InvalidState, Problem, Refusal, State, UNIT_TOLERANCE};
+use crate::vehicle::{Surface, SurfaceKind};
+
+use proto::state::Attitude;
+
+/// The state of a single request.
+pub fn state(message: &proto::State) -> Result<State, InvalidState> {
+    let default = State::default();
+    let vector = |v: &Option<proto::Vector3>| v.as_ref().map_or([0.0; 3], |v| [v.x, v.y, v.z]);
+    Ok(State {
+        velocity: vector(&message.velocity_mps),
+        current: vector(&message.current_mps),
+        angular_velocity: vector(&message.angular_velocity_radps),
+        acceleration: vector(&message.acceleration_mps2),
+        angular_acceleration: vector(&message.angular_acceleration_radps2),
+        gravity: message.attitude.as_ref().map_or(Ok(default.gravity), gravity)?,
+        depth: message.depth_m,
+        density: message.density_kgpm3.unwrap_or(default.density),
+        dry_contact: message.ground_contact() == proto::GroundContact::Dry,
+    })
+}
+
+fn gravity(attitude: &Attitude) -> Result<[f32; 3], InvalidState> {
+    let finite = |field, values: &[f32]| {
+        let ok = values.iter().all(|x| x.is_finite());
+        ok.then_some(()).ok_or(InvalidState { field, problem: Problem::NotFinite })
+    };
+    let up = match attitude {
+        Attitude::GravityDirection(g) => return Ok([g.x, g.y, g.z]),
+        Attitude::WorldFromBody(q) => {
+            finite(Field::Quaternion, &[q.w, q.x, q.y, q.z])?;
+            let q = Quaternion::new(q.w, q.x, q.y, q.z).cast::<f64>();
+            if (q.norm() - 1.0).abs() > UNIT_TOLERANCE {
+                return Err(InvalidState { field: Field::Quaternion, problem: Problem::NotUnit });
+            }
+            up_from_quaternion(&UnitQuaternion::from_quaternion(q))
+        }
+        Attitude::RollPitch(attitude) => {
+            finite(Field::RollPitch, &[attitude.roll_rad, attitude.pitch_rad])?;
+            up_from_roll_pitch(attitude.roll_rad.into(), attitude.pitch_rad.into())
+        }
+    };
+    Ok(single(&-up.into_inner()))
+}
+
+/// The states of a batch; every array is checked against the length of `depth_m`.
+pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<State>, Refusal> {
+    let len = message.depth_m.len();
+    if len == 0 {
+        return Err(Refusal::EmptyBatch);
+    }
+    if len > max {
+        return Err(Refusal::BatchTooLong { len, limit: max });
+    }
+    let default = State::default();
+    let velocity = rows(Field::Velocity, &message.velocity_mps, len, default.velocity)?;
+    let current = rows(Field::Current, &message.current_mps, len, default.current)?;
+    let (rates, accelerations) = (&message.angular_velocity_radps, &message.angular_acceleration_radps2);
+    let angular_velocity = rows(Field::AngularVelocity, rates, len, default.angular_velocity)?;
+    let acceleration = rows(Field::Acceleration, &message.acceleration_mps2, len, default.acceleration)?;
+    let angular_acceleration =
+        rows(Field::AngularAcceleration, accelerations, len, default.angular_acceleration)?;
+    let gravity = rows(Field::Gravity, &message.gravity_direction, len, default.gravity)?;
+    let density = rows(Field::Density, &message.density_kgpm3, len, [default.density])?;
+    let dry_contact = message.ground_contact() == proto::GroundContact::Dry;
+    let state = |i: usize| State {
+        velocity: velocity(i),
+        current: current(i),
+        angular_velocity: angular_velocity(i),
+        acceleration: acceleration(i),
+        angular_acceleration: angular_acceleration(i),
+        gravity: gravity(i),
+        depth: message.depth_m[i],
+        density: density(i)[0],
+        dry_contact,
+    };
+    Ok((0..len).map(state).collect())
+}
+
+/// Row `i` of an array, or the default where the array is empty.
+fn rows<const WIDTH: usize>(
+    field: Field,
+    values: &[f32],
+    len: usize,
+    default: [f32; WIDTH],
+) -> Result<impl Fn(usize) -> [f32; WIDTH], Refusal> {
+    let (rows, rest) = values.as_chunks::<WIDTH>();
+    if !values.is_empty() && (rows.len() != len || !rest.is_empty()) {
+        return Err(Refusal::UnequalLength {
+            name: field.name(),
+            len: values.len(),
+            expected: len * WIDTH,
+            width: WIDTH,
+        });
+    }
+    Ok(move |i| rows.get(i).copied().unwrap_or(default))
+}
+
+/// A vector in the wire's precision.
+pub fn single(vector: &Vec3) -> [f32; 3] {
+    [vector.x as f32, vector.y as f32, vector.z as f32]
+}
+
+fn vector3(vector: &Vec3) -> proto::Vector3 {
+    let [x, y, z] = single(vector);
+    proto::Vector3 { x, y, z }
+}
+
+/// The answer to a single request.
+pub fn response(model: &Model, forces: &Forces, compute_ns: u64) -> proto::EvaluateResponse {
+    let mut response = proto::EvaluateResponse {
+        wrench: Some(proto::Wrench {
+            force_n: Some(vector3(&forces.wrench.force)),
+            moment_nm: Some(vector3(&forces.wrench.moment)),
+            about_m: Some(vector3(&model.vehicle().center_of_mass)),
+        }),
+        uncertainty_n: Some(vector3(&forces.uncertainty)),
+        in_domain: forces.outside.is_inside(),
+        outside: outside(&forces.outside, 0).collect(),
+        bundle_version: model.version(),
+        provenance: model.weights().provenance.clone(),
+        compute_ns,
+        ..Default::default()
+    };
+    reserve_surfaces(&mut response, model.vehicle().surfaces.len());
+    let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
+    push_surfaces(forces, force, point, &mut response.wetted_fraction);
+    response
+}
+
+fn reserve_surfaces(response: &mut proto::EvaluateResponse, surfaces: usize) {
+    response.surface_force_n.reserve_exact(3 * surfaces);
+    response.surface_point_m.reserve_exact(3 * surfaces);
+    response.wetted_fraction.reserve_exact(surfaces);
+}
+
+fn push_surfaces(forces: &Forces, force: &mut Vec<f32>, point: &mut Vec<f32>, wetted: &mut Vec<f32>) {
+    for load in &forces.surfaces {
+        force.extend(single(&load.force));
+        point.extend(single(&load.point));
+        wetted.push(load.wetted_fraction as f32);
+    }
+}
+
+/// An empty answer to a batch with room for its states.
+pub fn batch_response(model: &Model, len: usize, with_surfaces: bool) -> proto::EvaluateBatchResponse {
+    let rows = if with_surfaces { len * model.vehicle().surfaces.len() } else { 0 };
+    proto::EvaluateBatchResponse {
+        surface_force_n: Vec::with_capacity(3 * rows),
+        surface_point_m: Vec::with_capacity(3 * rows),
+        wetted_fraction: Vec::with_capacity(rows),
+        force_n: Vec::with_capacity(3 * len),
+        moment_nm: Vec::with_capacity(3 * len),
+        about_m: Some(vector3(&model.vehicle().center_of_mass)),
+        uncertainty_n: Vec::with_capacity(3 * len),
+        outside: Vec::new(),
+        bundle_version: model.version(),
+        provenance: model.weights().provenance.clone(),
+        compute_ns: 0,
+    }
+}
+
+/// Adds the forces of state `index` to the answer to a batch.
+pub fn push(response: &mut proto::EvaluateBatchResponse, forces: &Forces, index: u32, with_surfaces: bool) {
+    response.force_n.extend(single(&forces.wrench.force));
+    response.moment_nm.extend(single(&forces.wrench.moment));
+    response.uncertainty_n.extend(single(&forces.uncertainty));
+    response.outside.extend(outside(&forces.outside, index));
+    if with_surfaces {
+        let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
+        push_surfaces(forces, force, point, &mut response.wetted_fraction);
+    }
+}
+
+fn outside(outside: &Outside, index: u32) -> impl Iterator<Item = proto::Outside> + '_ {
+    outside.iter().map(move |(quantity, excess)| proto::Outside {
+        quantity: quantity as i32,
+        excess: excess as f32,
+        index,
+    })
+}
+
+/// What a list says of a vehicle.
+pub fn summary(model: &Model) -> proto::VehicleSummary {
+    proto::VehicleSummary {
+        name: model.vehicle().name.clone(),
+        bundle_version: model.version(),
+        surface_count: model.vehicle().surfaces.len() as u32,
+        provenance: model.weights().provenance.clone(),
+    }
+}
+
+/// Everything about a vehicle.
+pub fn vehicle(model: &Model, include_mesh: bool) -> proto::GetVehicleResponse {
+    let vehicle = model.vehicle();
+    let mut response = proto::GetVehicleResponse {
+        summary: Some(summary(model)),
+        length_m: vehicle.dimensions.length,
+        width_m: vehicle.dimensions.width,
+        height_m: vehicle.dimensions.height,
+        z0_m: vehicle.z0,
+        mass_kg: vehicle.mass,
+        center_of_mass_m: Some(vector3(&vehicle.center_of_mass)),
+        inertia_kgm2: vehicle.inertia.transpose().iter().copied().collect(),
+        surfaces: vehicle.surfaces.iter().map(surface).collect(),
+        domain: ranges(model.domain()),
+        ..Default::default()
+    };
+    if include_mesh {
+        response.mesh_stl = crate::geometry::mesh::write_stl(&vehicle.hull.mesh);
+        response.face_surface = vehicle.hull.face_surface.iter().map(|&s| s.into()).collect();
+    }
+    response
+}
+
+fn surface(surface: &Surface) -> proto::Surface {
+    let kind = match surface.kind {
+        SurfaceKind::Bottom => "bottom",
+        SurfaceKind::Front => "front",
+        SurfaceKind::Rear => "rear",
+        SurfaceKind::Side => "side",
+        SurfaceKind::Wheel => "wheel",
+    };
+    proto::Surface {
+        name: surface.name.clone(),
+        kind: kind.into(),
+        centroid_m: Some(vector3(&surface.centroid)),
+        normal: Some(vector3(&surface.normal)),
+        area_m2: surface.area,
+    }
+}
+
+fn ranges(domain: &Domain) -> Vec<proto::Range> {
+    let range = |quantity: Quantity| {
+        let range = domain.range(quantity);
+        proto::Range { quantity: quantity as i32, minimum: range.min, maximum: range.max }
+    };
+    Quantity::ALL.into_iter().map(range).collect()
+}
+
+/// A row of the latency table.
+pub fn latency(row: metrics::Latency) -> proto::Latency {
+    let percentiles = |p: metrics::Percentiles| {
+        Some(proto::Percentiles {
+            count: p.count,
+            p50_us: p.p50_us,
+            p95_us: p.p95_us,
+            p99_us: p.p99_us,
+            p99_9_us: p.p99_9_us,
+            max_us: p.max_us,
+        })
+    };
+    proto::Latency {
+        transport: row.transport.name().into(),
+        vehicle: row.vehicle,
+        since_start: percentiles(row.since_start),
+        window: percentiles(row.window),
+    }
+}
+
+/// The time that a `grpc-timeout` header leaves: up to eight digits and a unit.
+pub fn timeout(header: &str) -> Option<Duration> {
+    let (digits, unit) = header.split_at_checked(header.len().checked_sub(1)?)?;
+    if digits.len() > 8 || !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let value: u64 = digits.parse().ok()?;
+    Some(match unit {
+        "H" => Duration::from_secs(value * 3600),
+        "M" => Duration::from_secs(value * 60),
+        "S" => Duration::from_secs(value),
+        "m" => Duration::from_millis(value),
+        "u" => Duration::from_micros(value),
+        "n" => Duration::from_nanos(value),
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn timeouts_have_a_value_and_a_unit() {
+        assert_eq!(timeout("250m"), Some(Duration::from_millis(250)));
+        assert_eq!(timeout("1n"), Some(Duration::from_nanos(1)));
+        for bad in ["", "5", "m", "-1m", "123456789S", "5x", "µ"] {
+            assert_eq!(timeout(bad), None, "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn an_array_of_another_length_is_named() {
+        let message = proto::EvaluateBatchRequest {
+            depth_m: vec![0.1, 0.2],
+            velocity_mps: vec![0.0; 5],
+            ..Default::default()
+        };
+        let refusal = batch(&message, 10).expect_err("five values for two states");
+        let expected = Refusal::UnequalLength { name: "velocity_mps", len: 5, expected: 6, width: 3 };
+        assert_eq!(refusal, expected);
+    }
+}

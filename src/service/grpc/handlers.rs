@@ -1,0 +1,244 @@
+//! The calls.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+use std::time::Instant;
+
+use tokio::sync::watch;
+use tonic::{Request, Response, Status, Streaming};
+
+use super::Shared;
+use super::convert;
+use super::stream::Answers;
+use crate::engine::Admission;
+use crate::metrics::Transport;
+use crate::model::Model;
+use crate::service::admin::Reloader;
+use crate::service::proto::admin_server::Admin;
+use crate::service::proto::hydrodynamics_server::Hydrodynamics;
+use crate::service::wire::Refusal;
+use crate::service::{Evaluator, nanoseconds_since, proto};
+
+/// States of a batch that are computed before others get their turn: about a millisecond.
+const STATES_PER_TURN: usize = 64;
+
+thread_local! {
+    static EVALUATOR: RefCell<Evaluator> = RefCell::default();
+}
+
+/// The handlers of `wade.v1.Hydrodynamics`.
+#[derive(Debug)]
+pub struct Handlers {
+    pub(super) shared: Shared,
+    pub(super) max_batch: usize,
+    pub(super) requests: Arc<Admission>,
+    pub(super) streams: Arc<Admission>,
+    pub(super) stop: watch::Receiver<bool>,
+}
+
+#[tonic::async_trait]
+impl Hydrodynamics for Handlers {
+    type StreamStream = Answers;
+
+    async fn evaluate(
+        &self,
+        request: Request<proto::EvaluateRequest>,
+    ) -> Result<Response<proto::EvaluateResponse>, Status> {
+        let call = Call::begin(&self.shared, Transport::grpc_unary, &request);
+        let answer = call.admit(&self.requests).and_then(|_permit| {
+            let request = request.get_ref();
+            let model = self.shared.engine.model(&request.vehicle)?;
+            call.check_deadline(None)?;
+            answer(&model, request.state.as_ref())
+        });
+        call.end(answer)
+    }
+
+    async fn evaluate_batch(
+        &self,
+        request: Request<proto::EvaluateBatchRequest>,
+    ) -> Result<Response<proto::EvaluateBatchResponse>, Status> {
+        let call = Call::begin(&self.shared, Transport::grpc_batch, &request);
+        let answer = match call.admit(&self.requests) {
+            Ok(_permit) => self.batch(&call, request.get_ref()).await,
+            Err(refusal) => Err(refusal),
+        };
+        call.end(answer)
+    }
+
+    async fn stream(
+        &self,
+        request: Request<Streaming<proto::EvaluateRequest>>,
+    ) -> Result<Response<Self::StreamStream>, Status> {
+        let call = Call::begin(&self.shared, Transport::grpc_stream, &request);
+        let admitted = self.streams.admit();
+        match admitted.map_err(|overloaded| Refusal::Overloaded { what: "streams", overloaded }) {
+            Ok(permit) => {
+                let answers =
+                    Answers::new(request.into_inner(), self.shared.clone(), permit, self.stop.clone());
+                Ok(Response::new(answers))
+            }
+            Err(refusal) => Err(call.refuse(refusal)),
+        }
+    }
+
+    async fn list_vehicles(
+        &self,
+        _: Request<proto::ListVehiclesRequest>,
+    ) -> Result<Response<proto::ListVehiclesResponse>, Status> {
+        let vehicles = self.shared.engine.models().values().map(|model| convert::summary(model)).collect();
+        Ok(Response::new(proto::ListVehiclesResponse { vehicles }))
+    }
+
+    async fn get_vehicle(
+        &self,
+        request: Request<proto::GetVehicleRequest>,
+    ) -> Result<Response<proto::GetVehicleResponse>, Status> {
+        let request = request.get_ref();
+        let model = self.shared.engine.model(&request.vehicle).map_err(Refusal::from)?;
+        Ok(Response::new(convert::vehicle(&model, request.include_mesh)))
+    }
+
+    async fn get_latency(
+        &self,
+        _: Request<proto::GetLatencyRequest>,
+    ) -> Result<Response<proto::GetLatencyResponse>, Status> {
+        let latencies = self.shared.metrics.latencies().into_iter().map(convert::latency).collect();
+        Ok(Response::new(proto::GetLatencyResponse { latencies, window_s: self.shared.window_s }))
+    }
+}
+
+impl Handlers {
+    async fn batch(
+        &self,
+        call: &Call<'_>,
+        request: &proto::EvaluateBatchRequest,
+    ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
+        let model = self.shared.engine.model(&request.vehicle)?;
+        let states = convert::batch(request, self.max_batch)?;
+        let with_surfaces = !request.omit_surfaces;
+        let mut response = convert::batch_response(&model, states.len(), with_surfaces);
+        for (turn, states) in states.chunks(STATES_PER_TURN).enumerate() {
+            if turn > 0 {
+                tokio::task::yield_now().await;
+            }
+            EVALUATOR.with_borrow_mut(|evaluator| {
+                for (i, state) in states.iter().enumerate() {
+                    let index = turn * STATES_PER_TURN + i;
+                    call.check_deadline(Some(index))?;
+                    let evaluated = evaluator
+                        .evaluate(&model, state)
+                        .map_err(|invalid| Refusal::Invalid { invalid, index: Some(index) })?;
+                    response.compute_ns += evaluated.compute_ns;
+                    convert::push(&mut response, evaluated.forces, index as u32, with_surfaces);
+                }
+                Ok::<(), Refusal>(())
+            })?;
+        }
+        let mut outside: Vec<u32> = response.outside.iter().map(|outside| outside.index).collect();
+        outside.dedup();
+        let out_of_domain = outside.len() as u64;
+        Ok((response, Answered { vehicle: model, out_of_domain }))
+    }
+}
+
+/// What the metrics need to know of an answer.
+#[derive(Debug)]
+pub(super) struct Answered {
+    vehicle: Arc<Model>,
+    out_of_domain: u64,
+}
+
+/// Answers one state on the thread that read it.
+pub(super) fn answer(
+    model: &Arc<Model>,
+    state: Option<&proto::State>,
+) -> Result<(proto::EvaluateResponse, Answered), Refusal> {
+    let state = convert::state(state.ok_or(Refusal::MissingState)?)?;
+    EVALUATOR.with_borrow_mut(|evaluator| {
+        let evaluated = evaluator.evaluate(model, &state)?;
+        let response = convert::response(model, evaluated.forces, evaluated.compute_ns);
+        let out_of_domain = u64::from(!response.in_domain);
+        Ok((response, Answered { vehicle: Arc::clone(model), out_of_domain }))
+    })
+}
+
+/// One request from its arrival to its answer: deadline, span and metrics.
+pub(super) struct Call<'s> {
+    shared: &'s Shared,
+    transport: Transport,
+    arrived: Instant,
+    deadline: Option<Instant>,
+}
+
+impl<'s> Call<'s> {
+    fn begin<T>(shared: &'s Shared, transport: Transport, request: &Request<T>) -> Self {
+        let arrived = Instant::now();
+        let timeout = request.metadata().get("grpc-timeout").and_then(|header| header.to_str().ok());
+        let deadline = timeout.and_then(convert::timeout).and_then(|timeout| arrived.checked_add(timeout));
+        Self { shared, transport, arrived, deadline }
+    }
+
+    /// A request within a stream, which has no deadline of its own.
+    pub(super) fn in_stream(shared: &'s Shared) -> Self {
+        Self { shared, transport: Transport::grpc_stream, arrived: Instant::now(), deadline: None }
+    }
+
+    fn admit(&self, requests: &Arc<Admission>) -> Result<crate::engine::Permit, Refusal> {
+        requests.admit().map_err(|overloaded| Refusal::Overloaded { what: "requests", overloaded })
+    }
+
+    fn check_deadline(&self, answered: Option<usize>) -> Result<(), Refusal> {
+        match self.deadline {
+            Some(deadline) if Instant::now() >= deadline => Err(Refusal::DeadlineExceeded { answered }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Records the outcome.
+    pub(super) fn end<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<Response<T>, Status> {
+        match outcome {
+            Ok((response, answered)) => {
+                let vehicle = &answered.vehicle.vehicle().name;
+                let elapsed = self.arrived.elapsed();
+                self.shared.metrics.recorder(self.transport, vehicle).record(elapsed, answered.out_of_domain);
+                tracing::debug!(target: "wade::request", transport = self.transport.name(), vehicle, ?elapsed);
+                Ok(Response::new(response))
+            }
+            Err(refusal) => Err(self.refuse(refusal)),
+        }
+    }
+
+    fn refuse(self, refusal: Refusal) -> Status {
+        self.shared.metrics.refuse(self.transport, refusal.reason());
+        let elapsed_ns = nanoseconds_since(self.arrived);
+        tracing::debug!(target: "wade::request", transport = self.transport.name(), %refusal, elapsed_ns);
+        refusal.into()
+    }
+}
+
+/// The handlers of `wade.v1.Admin`.
+#[derive(Debug)]
+pub struct AdminHandlers {
+    pub(super) reloader: Arc<Reloader>,
+}
+
+#[tonic::async_trait]
+impl Admin for AdminHandlers {
+    async fn reload(
+        &self,
+        request: Request<proto::ReloadRequest>,
+    ) -> Result<Response<proto::ReloadResponse>, Status> {
+        let vehicle = request.into_inner().vehicle;
+        let reloader = Arc::clone(&self.reloader);
+        // reading and checking a bundle takes milliseconds, which must not stand before a query
+        let reloaded = tokio::task::spawn_blocking(move || reloader.reload(&vehicle));
+        let reloaded = reloaded.await.map_err(|_| Status::internal("the reload was interrupted"))?;
+        let vehicles = reloaded.map_err(Refusal::from)?.into_iter().map(|reload| proto::Reloaded {
+            vehicle: reload.vehicle,
+            bundle_version: reload.served_version,
+            refusal: reload.refusal.map(|refusal| refusal.to_string()).unwrap_or_default(),
+        });
+        Ok(Response::new(proto::ReloadResponse { vehicles: vehicles.collect() }))
+    }
+}

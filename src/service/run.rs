@@ -1,0 +1,260 @@
+//! The server as a whole: started, ready, drained.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+
+use super::admin::{LoadError, Reloader};
+use super::grpc::{self, GrpcError, Listeners};
+use super::http::{self, HttpError};
+use super::shm::{ShmError, ShmServer};
+use crate::config::Config;
+use crate::engine::Engine;
+use crate::metrics::Metrics;
+use crate::model::kernel::Isa;
+
+/// Why the server did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// gRPC.
+    #[error(transparent)]
+    Grpc(#[from] GrpcError),
+    /// HTTP.
+    #[error(transparent)]
+    Http(#[from] HttpError),
+    /// Shared memory.
+    #[error(transparent)]
+    Shm(#[from] ShmError),
+    /// The bundles.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// A thread or a runtime.
+    #[error("cannot start a thread: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// A server that runs on threads of its own. Dropping it stops it.
+#[derive(Debug)]
+pub struct Running {
+    reloader: Arc<Reloader>,
+    metrics: Arc<Metrics>,
+    grpc: Arc<grpc::Server>,
+    listeners: Arc<Listeners>,
+    http_address: Option<SocketAddr>,
+    ready: Arc<AtomicBool>,
+    stop: watch::Sender<bool>,
+    stop_shm: Arc<AtomicBool>,
+    runtime: Runtime,
+    threads: Vec<JoinHandle<()>>,
+    drain: Duration,
+}
+
+/// Binds everything, reads the bundles while health says NOT_SERVING, then says SERVING.
+pub fn start(config: &Config) -> Result<Running, StartError> {
+    let metrics = Arc::new(Metrics::new());
+    let engine = Arc::new(Engine::default());
+    let isa = Isa::available()[0];
+    let reloader =
+        Arc::new(Reloader::new(config.vehicles_directory(), isa, Arc::clone(&engine), Arc::clone(&metrics)));
+    let listeners = Arc::new(Listeners::bind(&config.grpc)?);
+    let http_listener = http::bind(&config.http)?;
+    let shared = grpc::Shared {
+        engine: Arc::clone(&engine),
+        metrics: Arc::clone(&metrics),
+        reloader: Arc::clone(&reloader),
+        window_s: config.latency_window_s,
+    };
+    let runtime = runtime()?;
+    let (stop, stopped) = watch::channel(false);
+    let mut running = Running {
+        grpc: Arc::new(runtime.block_on(grpc::Server::new(config.grpc.clone(), shared))),
+        http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
+        ready: Arc::new(AtomicBool::new(false)),
+        stop_shm: Arc::new(AtomicBool::new(false)),
+        drain: Duration::from_secs_f64(config.drain_s),
+        threads: Vec::new(),
+        reloader,
+        metrics,
+        listeners,
+        stop,
+        runtime,
+    };
+    for _ in 0..config.grpc.threads {
+        running.spawn_grpc(stopped.clone())?;
+    }
+    running.spawn_housekeeping(http_listener, Duration::from_secs_f64(config.latency_window_s), stopped)?;
+    running.reloader.load_all()?;
+    if config.shm.enabled {
+        running.spawn_shm(config, engine)?;
+    }
+    running.runtime.block_on(running.grpc.set_serving());
+    running.ready.store(true, Ordering::Relaxed);
+    Ok(running)
+}
+
+fn runtime() -> std::io::Result<Runtime> {
+    tokio::runtime::Builder::new_current_thread().enable_all().build()
+}
+
+impl Running {
+    /// The TCP address of gRPC.
+    pub fn grpc_address(&self) -> Option<SocketAddr> {
+        self.listeners.tcp_address()
+    }
+
+    /// The Unix socket of gRPC.
+    pub fn unix_path(&self) -> Option<&Path> {
+        self.listeners.unix_path()
+    }
+
+    /// The TCP address of HTTP.
+    pub fn http_address(&self) -> Option<SocketAddr> {
+        self.http_address
+    }
+
+    /// Reads bundles again when asked.
+    pub fn reloader(&self) -> &Arc<Reloader> {
+        &self.reloader
+    }
+
+    /// What is counted.
+    pub fn metrics(&self) -> &Arc<Metrics> {
+        &self.metrics
+    }
+
+    /// Says NOT_SERVING, answers what is in flight, and returns when all is closed or the drain's bound has passed.
+    pub fn shutdown(mut self) {
+        self.stop_all();
+    }
+
+    fn stop_all(&mut self) {
+        let start = Instant::now();
+        self.ready.store(false, Ordering::Relaxed);
+        self.runtime.block_on(self.grpc.set_not_serving());
+        self.stop_shm.store(true, Ordering::Relaxed);
+        self.stop.send_replace(true);
+        for thread in self.threads.drain(..) {
+            if thread.join().is_err() {
+                tracing::error!("a server thread panicked");
+            }
+        }
+        tracing::info!(elapsed = ?start.elapsed(), "drained");
+    }
+
+    fn spawn_grpc(&mut self, stop: watch::Receiver<bool>) -> Result<(), StartError> {
+        let (server, listeners, drain) = (Arc::clone(&self.grpc), Arc::clone(&self.listeners), self.drain);
+        let runtime = runtime()?;
+        self.spawn("wade-grpc", move || {
+            let outcome = runtime.block_on(async {
+                let serving = std::pin::pin!(server.run(&listeners, stop.clone()));
+                bounded(serving, stop.clone(), drain).await
+            });
+            match outcome {
+                Some(Err(error)) => tracing::error!(%error, "gRPC ended"),
+                Some(Ok(())) => {}
+                None => tracing::warn!(?drain, "connections were still open at the drain's bound: closed"),
+            }
+            runtime.shutdown_background();
+        })
+    }
+
+    /// HTTP and the turning of the latency windows, away from the threads that answer queries.
+    fn spawn_housekeeping(
+        &mut self,
+        listener: Option<std::net::TcpListener>,
+        window: Duration,
+        stop: watch::Receiver<bool>,
+    ) -> Result<(), StartError> {
+        let (metrics, ready, drain) = (Arc::clone(&self.metrics), Arc::clone(&self.ready), self.drain);
+        let runtime = runtime()?;
+        self.spawn("wade-http", move || {
+            let rotating = async {
+                let mut ticks = tokio::time::interval(window);
+                ticks.tick().await;
+                loop {
+                    ticks.tick().await;
+                    metrics.rotate();
+                }
+            };
+            let serving = async {
+                let Some(listener) = listener else { return };
+                if let Err(error) = http::run(listener, Arc::clone(&metrics), ready, stop.clone()).await {
+                    tracing::error!(%error, "HTTP ended");
+                }
+            };
+            runtime.block_on(async {
+                let work = std::pin::pin!(async { tokio::join!(rotating, serving) });
+                tokio::select! {
+                    _ = work => {}
+                    () = grpc::stopped(stop.clone()) => tokio::time::sleep(drain.min(CLOSING)).await,
+                }
+            });
+            runtime.shutdown_background();
+        })
+    }
+
+    fn spawn_shm(&mut self, config: &Config, engine: Arc<Engine>) -> Result<(), StartError> {
+        let (settings, metrics) = (config.shm.clone(), Arc::clone(&self.metrics));
+        let stop = Arc::clone(&self.stop_shm);
+        // ports stay with the thread that made them, so it says whether it could
+        let (report, opened) = std::sync::mpsc::channel();
+        self.spawn("wade-shm", move || match ShmServer::new(settings, engine, metrics) {
+            Ok(server) => {
+                let _ = report.send(Ok(()));
+                server.run(&stop);
+            }
+            Err(error) => {
+                let _ = report.send(Err(error));
+            }
+        })?;
+        opened
+            .recv()
+            .unwrap_or_else(|_| Err(ShmError::new("the thread")(&"it ended")))
+            .map_err(StartError::from)
+    }
+
+    fn spawn(&mut self, name: &str, body: impl FnOnce() + Send + 'static) -> Result<(), StartError> {
+        self.threads.push(std::thread::Builder::new().name(name.into()).spawn(body)?);
+        Ok(())
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if !self.threads.is_empty() {
+            self.stop_all();
+        }
+    }
+}
+
+/// How long HTTP goes on after the stop, so that a probe sees that we are not ready.
+const CLOSING: Duration = Duration::from_millis(20);
+
+/// Runs to the end, or until the bound has passed since the stop.
+async fn bounded<F: Future + Unpin>(
+    mut work: F,
+    stop: watch::Receiver<bool>,
+    bound: Duration,
+) -> Option<F::Output> {
+    tokio::select! {
+        output = &mut work => return Some(output),
+        () = grpc::stopped(stop) => {}
+    }
+    tokio::time::timeout(bound, work).await.ok()
+}
+
+/// The folder of bundles: as configured, or where an installation or the source tree has it.
+pub fn find_vehicles(configured: &Path) -> PathBuf {
+    let installed =
+        std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join("../share/wade/vehicles")));
+    let source = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles");
+    let fallback = configured == Path::new("vehicles") && !configured.exists();
+    let found = installed.into_iter().chain([source]).find(|path| fallback && path.exists());
+    found.unwrap_or_else(|| configured.to_owned())
+}

@@ -1,0 +1,406 @@
+//! Checks on what comes from outside, the same for every transport, and the map from errors to gRPC status.
+
+use nalgebra::UnitVector3;
+use tonic::Code;
+use tonic_types::{ErrorDetails, StatusExt};
+
+use crate::condition::{Condition, FRESH_WATER, GroundContact};
+use crate::engine::{Overloaded, UnknownVehicle};
+use crate::frame::Vec3;
+
+/// A state as it travels: single precision, body frame, not yet checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// Velocity over ground [m/s].
+    pub velocity: [f32; 3],
+    /// Velocity of the water over ground [m/s].
+    pub current: [f32; 3],
+    /// Angular velocity [rad/s].
+    pub angular_velocity: [f32; 3],
+    /// Acceleration [m/s2].
+    pub acceleration: [f32; 3],
+    /// Angular acceleration [rad/s2].
+    pub angular_acceleration: [f32; 3],
+    /// Unit vector along gravity (down).
+    pub gravity: [f32; 3],
+    /// Water depth [m].
+    pub depth: f32,
+    /// Density [kg/m3].
+    pub density: f32,
+    /// No water pressure under the contact patches.
+    pub dry_contact: bool,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            velocity: [0.0; 3],
+            current: [0.0; 3],
+            angular_velocity: [0.0; 3],
+            acceleration: [0.0; 3],
+            angular_acceleration: [0.0; 3],
+            gravity: [0.0, 0.0, -1.0],
+            depth: 0.0,
+            density: FRESH_WATER as f32,
+            dry_contact: false,
+        }
+    }
+}
+
+/// A field of a state. The discriminants are the codes of the shared-memory layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Field {
+    /// `velocity_mps`
+    Velocity = 1,
+    /// `current_mps`
+    Current = 2,
+    /// `angular_velocity_radps`
+    AngularVelocity = 3,
+    /// `acceleration_mps2`
+    Acceleration = 4,
+    /// `angular_acceleration_radps2`
+    AngularAcceleration = 5,
+    /// `gravity_direction`
+    Gravity = 6,
+    /// `depth_m`
+    Depth = 7,
+    /// `density_kgpm3`
+    Density = 8,
+    /// `world_from_body`
+    Quaternion = 9,
+    /// `roll_pitch`
+    RollPitch = 10,
+}
+
+impl Field {
+    const ALL: [Self; 10] = [
+        Self::Velocity,
+        Self::Current,
+        Self::AngularVelocity,
+        Self::Acceleration,
+        Self::AngularAcceleration,
+        Self::Gravity,
+        Self::Depth,
+        Self::Density,
+        Self::Quaternion,
+        Self::RollPitch,
+    ];
+
+    /// The name that the wire gives it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity_mps",
+            Self::Current => "current_mps",
+            Self::AngularVelocity => "angular_velocity_radps",
+            Self::Acceleration => "acceleration_mps2",
+            Self::AngularAcceleration => "angular_acceleration_radps2",
+            Self::Gravity => "gravity_direction",
+            Self::Depth => "depth_m",
+            Self::Density => "density_kgpm3",
+            Self::Quaternion => "world_from_body",
+            Self::RollPitch => "roll_pitch",
+        }
+    }
+
+    /// The field of a code of the shared-memory layout.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|&field| field as u32 == code)
+    }
+}
+
+/// What is wrong with a field. The discriminants are the codes of the shared-memory layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Problem {
+    /// A NaN or an infinity.
+    NotFinite = 1,
+    /// Beyond anything physical, see [`limit`].
+    TooLarge = 2,
+    /// Below zero.
+    Negative = 3,
+    /// Zero or below.
+    NotPositive = 4,
+    /// Length differs from 1 by more than [`UNIT_TOLERANCE`].
+    NotUnit = 5,
+}
+
+impl Problem {
+    const ALL: [Self; 5] =
+        [Self::NotFinite, Self::TooLarge, Self::Negative, Self::NotPositive, Self::NotUnit];
+
+    /// The problem of a code of the shared-memory layout.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|&problem| problem as u32 == code)
+    }
+}
+
+/// A field that no answer can be given for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InvalidState {
+    /// The field.
+    pub field: Field,
+    /// What is wrong with it.
+    pub problem: Problem,
+}
+
+impl std::error::Error for InvalidState {}
+
+impl std::fmt::Display for InvalidState {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = self.field.name();
+        match self.problem {
+            Problem::NotFinite => write!(f, "{name} must be finite"),
+            Problem::TooLarge => write!(f, "{name} must not exceed {} in magnitude", limit(self.field)),
+            Problem::Negative => write!(f, "{name} must not be negative"),
+            Problem::NotPositive => write!(f, "{name} must be greater than zero"),
+            Problem::NotUnit => write!(f, "{name} must have length 1 (within {UNIT_TOLERANCE})"),
+        }
+    }
+}
+
+/// How far the length of a direction or a quaternion may be from 1.
+pub const UNIT_TOLERANCE: f64 = 1e-3;
+
+/// Bounds far outside the physics, which keep every product in an evaluation finite.
+pub fn limit(field: Field) -> f64 {
+    match field {
+        Field::Velocity | Field::Current | Field::AngularVelocity | Field::Depth => 1e3,
+        Field::Acceleration | Field::AngularAcceleration | Field::Density => 1e5,
+        Field::Gravity | Field::Quaternion => 1.0 + UNIT_TOLERANCE,
+        Field::RollPitch => 1e3,
+    }
+}
+
+impl State {
+    /// The condition that this state describes, or the first field that is wrong.
+    pub fn check(&self) -> Result<Condition, InvalidState> {
+        let velocity = vector(Field::Velocity, &self.velocity)?;
+        let current = vector(Field::Current, &self.current)?;
+        let density = scalar(Field::Density, self.density)?;
+        if density <= 0.0 {
+            return Err(InvalidState { field: Field::Density, problem: Problem::NotPositive });
+        }
+        let depth = scalar(Field::Depth, self.depth)?;
+        if depth < 0.0 {
+            return Err(InvalidState { field: Field::Depth, problem: Problem::Negative });
+        }
+        Ok(Condition {
+            velocity: velocity - current,
+            ground_velocity: velocity,
+            angular_velocity: vector(Field::AngularVelocity, &self.angular_velocity)?,
+            acceleration: vector(Field::Acceleration, &self.acceleration)?,
+            angular_acceleration: vector(Field::AngularAcceleration, &self.angular_acceleration)?,
+            depth,
+            density,
+            up: -direction(&self.gravity)?,
+            ground_contact: if self.dry_contact { GroundContact::Dry } else { GroundContact::Wetted },
+        })
+    }
+}
+
+fn vector(field: Field, values: &[f32; 3]) -> Result<Vec3, InvalidState> {
+    let [x, y, z] = values.map(|value| scalar(field, value));
+    Ok(Vec3::new(x?, y?, z?))
+}
+
+fn scalar(field: Field, value: f32) -> Result<f64, InvalidState> {
+    let value = f64::from(value);
+    if !value.is_finite() {
+        Err(InvalidState { field, problem: Problem::NotFinite })
+    } else if value.abs() > limit(field) {
+        Err(InvalidState { field, problem: Problem::TooLarge })
+    } else {
+        Ok(value)
+    }
+}
+
+fn direction(gravity: &[f32; 3]) -> Result<UnitVector3<f64>, InvalidState> {
+    let gravity = Vec3::from(gravity.map(f64::from));
+    if !gravity.iter().all(|x| x.is_finite()) {
+        return Err(InvalidState { field: Field::Gravity, problem: Problem::NotFinite });
+    }
+    if (gravity.norm() - 1.0).abs() > UNIT_TOLERANCE {
+        return Err(InvalidState { field: Field::Gravity, problem: Problem::NotUnit });
+    }
+    Ok(UnitVector3::new_normalize(gravity))
+}
+
+/// Why a request was not answered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// No such vehicle.
+    #[error(transparent)]
+    UnknownVehicle(UnknownVehicle),
+    /// The bundles are still being read.
+    #[error("the vehicles are still being loaded")]
+    NotReady,
+    /// A field of the state is wrong; in a batch, of the state with this index.
+    #[error("{invalid}{}", .index.map(|i| format!(" (state {i} of the batch)")).unwrap_or_default())]
+    Invalid {
+        /// What is wrong.
+        invalid: InvalidState,
+        /// Which state of a batch.
+        index: Option<usize>,
+    },
+    /// The request names no state.
+    #[error("state is missing")]
+    MissingState,
+    /// A batch without a state.
+    #[error("the batch is empty: depth_m must have one value a state")]
+    EmptyBatch,
+    /// A batch over the limit.
+    #[error("the batch has {len} states, the limit is {limit}")]
+    BatchTooLong {
+        /// States in the batch.
+        len: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// An array of a batch with another length than depth_m implies.
+    #[error("{name} has {len} values, expected {expected} ({width} a state) or none")]
+    UnequalLength {
+        /// Name of the array.
+        name: &'static str,
+        /// Its length.
+        len: usize,
+        /// The length it should have.
+        expected: usize,
+        /// Values a state.
+        width: usize,
+    },
+    /// Too many requests or streams.
+    #[error("{what}: {overloaded}")]
+    Overloaded {
+        /// What there is too much of.
+        what: &'static str,
+        /// The limit.
+        overloaded: Overloaded,
+    },
+    /// The caller's deadline passed before the answer was complete.
+    #[error("the deadline passed {}", .answered.map_or_else(|| "before the computation".into(), |n| format!("after {n} states")))]
+    DeadlineExceeded {
+        /// States of a batch that had been computed.
+        answered: Option<usize>,
+    },
+}
+
+impl From<UnknownVehicle> for Refusal {
+    fn from(unknown: UnknownVehicle) -> Self {
+        if unknown.served.is_empty() { Self::NotReady } else { Self::UnknownVehicle(unknown) }
+    }
+}
+
+impl From<InvalidState> for Refusal {
+    fn from(invalid: InvalidState) -> Self {
+        Self::Invalid { invalid, index: None }
+    }
+}
+
+/// When a client that was refused for load may try again.
+const RETRY_AFTER: std::time::Duration = std::time::Duration::from_millis(10);
+
+impl Refusal {
+    /// The gRPC code.
+    pub fn code(&self) -> Code {
+        match self {
+            Self::UnknownVehicle(_) => Code::NotFound,
+            Self::NotReady => Code::Unavailable,
+            Self::Overloaded { .. } => Code::ResourceExhausted,
+            Self::DeadlineExceeded { .. } => Code::DeadlineExceeded,
+            Self::Invalid { .. }
+            | Self::MissingState
+            | Self::EmptyBatch
+            | Self::BatchTooLong { .. }
+            | Self::UnequalLength { .. } => Code::InvalidArgument,
+        }
+    }
+
+    /// The gRPC code in words, for the metrics.
+    pub fn reason(&self) -> &'static str {
+        match self.code() {
+            Code::NotFound => "not_found",
+            Code::Unavailable => "unavailable",
+            Code::ResourceExhausted => "resource_exhausted",
+            Code::DeadlineExceeded => "deadline_exceeded",
+            _ => "invalid_argument",
+        }
+    }
+
+    fn details(&self) -> ErrorDetails {
+        let message = self.to_string();
+        match self {
+            Self::UnknownVehicle(unknown) => {
+                ErrorDetails::with_resource_info("wade.v1.Vehicle", unknown.name.as_str(), "", message)
+            }
+            Self::Overloaded { .. } | Self::NotReady => ErrorDetails::with_retry_info(Some(RETRY_AFTER)),
+            Self::DeadlineExceeded { .. } => ErrorDetails::new(),
+            Self::Invalid { invalid, index } => {
+                let name = invalid.field.name();
+                let field = index.map_or_else(|| format!("state.{name}"), |i| format!("{name}[{i}]"));
+                ErrorDetails::with_bad_request_violation(field, message)
+            }
+            Self::MissingState => ErrorDetails::with_bad_request_violation("state", message),
+            Self::EmptyBatch | Self::BatchTooLong { .. } => {
+                ErrorDetails::with_bad_request_violation("depth_m", message)
+            }
+            Self::UnequalLength { name, .. } => ErrorDetails::with_bad_request_violation(*name, message),
+        }
+    }
+}
+
+impl From<Refusal> for tonic::Status {
+    fn from(refusal: Refusal) -> Self {
+        Self::with_error_details(refusal.code(), refusal.to_string(), refusal.details())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(state: State) -> (Field, Problem) {
+        let invalid = state.check().expect_err("the state is invalid");
+        (invalid.field, invalid.problem)
+    }
+
+    #[test]
+    fn each_bad_field_is_named() {
+        let good = State { depth: 0.1, ..State::default() };
+        assert!(good.check().is_ok());
+        let cases = [
+            (State { velocity: [f32::NAN, 0.0, 0.0], ..good }, Field::Velocity, Problem::NotFinite),
+            (State { current: [0.0, f32::INFINITY, 0.0], ..good }, Field::Current, Problem::NotFinite),
+            (State { angular_velocity: [0.0, 0.0, 1e9], ..good }, Field::AngularVelocity, Problem::TooLarge),
+            (State { acceleration: [f32::NAN; 3], ..good }, Field::Acceleration, Problem::NotFinite),
+            (State { depth: -0.01, ..good }, Field::Depth, Problem::Negative),
+            (State { density: 0.0, ..good }, Field::Density, Problem::NotPositive),
+            (State { density: f32::NAN, ..good }, Field::Density, Problem::NotFinite),
+            (State { gravity: [0.0, 0.0, -0.9], ..good }, Field::Gravity, Problem::NotUnit),
+            (State { gravity: [0.0; 3], ..good }, Field::Gravity, Problem::NotUnit),
+            (State { gravity: [f32::NAN; 3], ..good }, Field::Gravity, Problem::NotFinite),
+        ];
+        for (state, field, expected) in cases {
+            assert_eq!(problem(state), (field, expected));
+        }
+    }
+
+    #[test]
+    fn a_current_is_subtracted() {
+        let state = State { velocity: [1.0, 0.0, 0.0], current: [0.25, 0.5, 0.0], ..State::default() };
+        let condition = state.check().expect("valid");
+        assert_eq!(condition.velocity, Vec3::new(0.75, -0.5, 0.0));
+        assert_eq!(condition.ground_velocity, Vec3::new(1.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn codes_name_the_same_field_and_problem_on_both_sides() {
+        for field in Field::ALL {
+            assert_eq!(Field::from_code(field as u32), Some(field));
+        }
+        for problem in Problem::ALL {
+            assert_eq!(Problem::from_code(problem as u32), Some(problem));
+        }
+        assert_eq!(Field::from_code(0), None);
+    }
+}
