@@ -31,7 +31,7 @@ use tensors::TensorError;
 use vehicle_file::VehicleFile;
 
 /// The file that makes a folder a bundle.
-pub const VEHICLE_FILE: &str = "vehicle.toml";
+const VEHICLE_FILE: &str = "vehicle.toml";
 const HULL_FILE: &str = "hull.stl";
 const PATCHES_FILE: &str = "patches.safetensors";
 const SDF_FILE: &str = "sdf.safetensors";
@@ -229,6 +229,21 @@ impl Files {
             Ok(Some((weights, domain)))
         })
     }
+}
+
+/// Names of the folders that hold a bundle, sorted.
+pub fn names_in(directory: &Path) -> std::io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(directory)? {
+        let entry = entry?;
+        if entry.path().join(VEHICLE_FILE).is_file()
+            && let Ok(name) = entry.file_name().into_string()
+        {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
 }
 
 /// Reads what serving needs; the signed distance grid is verified but not unpacked.

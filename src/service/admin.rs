@@ -62,7 +62,7 @@ impl Reloader {
     /// Reads every bundle of the folder; one that is not sound stops the start.
     pub fn load_all(&self) -> Result<(), LoadError> {
         let directory = self.directory.clone();
-        let names = names_in(&directory)
+        let names = bundle::names_in(&directory)
             .map_err(|source| LoadError::Directory { directory: directory.clone(), source })?;
         if names.is_empty() {
             return Err(LoadError::Empty { directory });
@@ -87,7 +87,7 @@ impl Reloader {
         let _guard = self.one_at_a_time.lock().unwrap_or_else(PoisonError::into_inner);
         let mut names: Vec<String> = self.engine.models().keys().cloned().collect();
         // a folder that cannot be listed refuses each vehicle below, by name
-        names.extend(names_in(&self.directory).unwrap_or_default());
+        names.extend(bundle::names_in(&self.directory).unwrap_or_default());
         names.sort();
         names.dedup();
         if !vehicle.is_empty() {
@@ -123,19 +123,4 @@ fn announce(model: &Model, metrics: &Metrics) {
     metrics.set_bundle_version(vehicle, model.version());
     let (version, provenance) = (model.version(), &model.weights().provenance);
     tracing::info!(vehicle, version, provenance, kernel = model.isa().name(), "bundle loaded");
-}
-
-/// Names of the folders that hold a vehicle.toml.
-fn names_in(directory: &std::path::Path) -> std::io::Result<Vec<String>> {
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(directory)? {
-        let entry = entry?;
-        if entry.path().join(bundle::VEHICLE_FILE).is_file()
-            && let Ok(name) = entry.file_name().into_string()
-        {
-            names.push(name);
-        }
-    }
-    names.sort();
-    Ok(names)
 }

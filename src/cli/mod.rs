@@ -1,0 +1,81 @@
+//! Arguments in, one function a subcommand, exit codes out: 0 success, 1 what was asked for does not hold, 2 usage.
+
+mod predict;
+mod query;
+mod serve;
+mod state;
+mod vehicle;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Args, Parser, Subcommand};
+use wade::config::Config;
+use wade::model::Model;
+use wade::model::kernel::Isa;
+
+/// Hydrodynamic forces on wading ground vehicles.
+#[derive(Debug, Parser)]
+#[command(version = concat!(env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")"), propagate_version = true)]
+#[command(after_help = "Examples:
+  wade serve                                             serve the shipped vehicles on loopback
+  wade query --vehicle husky --speed 0.8 --depth 0.18    one query, no server needed
+  wade soak --vehicle husky --transport shm-spin --rate 1000 --duration 300s --out soak/")]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve vehicles over gRPC, a Unix socket and shared memory
+    Serve(serve::Serve),
+    /// Ask for the forces in one state
+    Query(query::Query),
+    /// Forces for every row of a table of states
+    Predict(predict::Predict),
+    /// Build, check and show vehicle bundles
+    Vehicle(vehicle::Vehicle),
+}
+
+impl Cli {
+    /// Runs the subcommand.
+    pub fn run(self) -> Result<ExitCode> {
+        match self.command {
+            Command::Serve(command) => command.run(),
+            Command::Query(command) => command.run(),
+            Command::Predict(command) => command.run(),
+            Command::Vehicle(command) => command.run(),
+        }
+    }
+}
+
+/// Where the bundles are, for commands that read them themselves.
+#[derive(Debug, Args)]
+struct Vehicles {
+    /// Folder of the vehicle bundles [default: ./vehicles, or those that were installed with wade]
+    #[arg(long, value_name = "DIR", env = "WADE_VEHICLES")]
+    vehicles: Option<PathBuf>,
+}
+
+impl Vehicles {
+    fn directory(&self) -> PathBuf {
+        let vehicles = self.vehicles.clone().unwrap_or_else(|| Config::default().vehicles);
+        Config { vehicles, ..Config::default() }.vehicles_directory()
+    }
+
+    fn bundle(&self, name: &str) -> PathBuf {
+        self.directory().join(name)
+    }
+
+    fn model(&self, name: &str) -> Result<Model> {
+        Ok(wade::bundle::load(&self.bundle(name), Isa::available()[0])?)
+    }
+}
+
+/// Names of the bundles in a folder, sorted.
+fn bundle_names(directory: &Path) -> Result<Vec<String>> {
+    use anyhow::Context;
+    wade::bundle::names_in(directory).with_context(|| format!("cannot read {}", directory.display()))
+}

@@ -1,0 +1,211 @@
+//! `wade vehicle`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use wade::bundle::{self, Bundle};
+use wade::condition::FRESH_WATER;
+use wade::domain::Quantity;
+use wade::frame::WaterPlane;
+use wade::geometry::distance::SignedDistanceGrid;
+use wade::geometry::hydrostatics::hydrostatics;
+use wade::vehicle::build::build_reporting;
+use wade::vehicle::shipped;
+use wade::vehicle::spec::VehicleSpec;
+
+use super::{Vehicles, bundle_names};
+
+/// Build, check and show vehicle bundles
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover
+  wade vehicle check vehicles/husky
+  wade vehicle show husky")]
+pub struct Vehicle {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make a bundle from an STL and a vehicle file
+    Build {
+        /// The hull, any axes and unit
+        #[arg(long, value_name = "FILE")]
+        stl: PathBuf,
+        /// The vehicle file: axes, mass, patches (vehicles/husky/spec.toml is one)
+        #[arg(long, value_name = "FILE")]
+        spec: PathBuf,
+        /// Folder of the bundle, named as the vehicle is; one that is there is replaced, with the next version
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Replace leaky and double-skinned parts by their convex hulls
+        #[arg(long)]
+        seal: bool,
+    },
+    /// Make the bundle of a vehicle that comes with wade, from its dimensions
+    Generate {
+        /// Which
+        vehicle: Shipped,
+        /// Folder of the bundle, named as the vehicle is
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// Read everything in a bundle; exit status 1 where something is wrong
+    Check {
+        /// Folder of the bundle
+        bundle: PathBuf,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Names of the bundles
+    List {
+        #[command(flatten)]
+        vehicles: Vehicles,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Dimensions, surfaces, training domain and hydrostatics of a vehicle
+    Show {
+        /// Name of the vehicle
+        name: String,
+        #[command(flatten)]
+        vehicles: Vehicles,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Shipped {
+    /// Clearpath Husky A200, K = 13
+    Husky,
+    /// Clearpath Warthog, K = 10
+    Warthog,
+}
+
+impl Vehicle {
+    /// Runs the subcommand.
+    pub fn run(self) -> Result<ExitCode> {
+        match self.command {
+            Command::Build { stl, spec, out, seal } => {
+                let text = std::fs::read_to_string(&spec).with_context(|| spec.display().to_string())?;
+                let bytes = std::fs::read(&stl).with_context(|| stl.display().to_string())?;
+                build(&text, &spec, &bytes, &out, seal)?;
+            }
+            Command::Generate { vehicle, out } => {
+                let (shipped, text) = match vehicle {
+                    Shipped::Husky => (shipped::husky()?, shipped::HUSKY_SPEC),
+                    Shipped::Warthog => (shipped::warthog()?, shipped::WARTHOG_SPEC),
+                };
+                build(text, Path::new("the shipped vehicle file"), &shipped.stl(), &out, false)?;
+            }
+            Command::Check { bundle, json } => return Ok(check(&bundle, json)),
+            Command::List { vehicles, json } => {
+                let names = bundle_names(&vehicles.directory())?;
+                if json {
+                    println!("{}", json!(names));
+                } else {
+                    names.iter().for_each(|name| println!("{name}"));
+                }
+            }
+            Command::Show { name, vehicles, json } => show(&bundle::read(&vehicles.bundle(&name))?, json),
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn build(spec_text: &str, spec_path: &Path, stl: &[u8], out: &Path, seal: bool) -> Result<()> {
+    let spec: VehicleSpec = toml::from_str(spec_text).with_context(|| spec_path.display().to_string())?;
+    let (vehicle, sealing) = build_reporting(&spec, stl, seal)?;
+    if let Some(sealing) = sealing {
+        eprintln!("sealed: {sealing:?}");
+    }
+    let bar = ProgressBar::new(0)
+        .with_message("signed distance")
+        .with_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} slices, {eta} left")?);
+    let distance = SignedDistanceGrid::build(&vehicle.hull.mesh, &|done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    let version = bundle::read(out).map_or(1, |before| before.version + 1);
+    let bundle = Bundle { vehicle, version, trained: None, distance, spec: Some(spec_text.to_owned()) };
+    bundle::write(out, &bundle)?;
+    println!("{}: version {version}, no weights yet", out.display());
+    Ok(())
+}
+
+fn check(directory: &Path, as_json: bool) -> ExitCode {
+    let outcome = bundle::read(directory);
+    if as_json {
+        let error = outcome.as_ref().err().map(ToString::to_string);
+        println!("{}", json!({"bundle": directory, "ok": outcome.is_ok(), "error": error}));
+    } else {
+        match &outcome {
+            Ok(bundle) => println!("{}: sound, version {}", directory.display(), bundle.version),
+            Err(error) => eprintln!("error: {error}"),
+        }
+    }
+    ExitCode::from(u8::from(outcome.is_err()))
+}
+
+/// Depths at which hydrostatics are shown, as shares of the height.
+const SHOWN_DEPTHS: [f64; 4] = [0.15, 0.30, 0.45, 0.60];
+
+fn show(bundle: &Bundle, as_json: bool) {
+    let vehicle = &bundle.vehicle;
+    let lift = SHOWN_DEPTHS.map(|share| {
+        let depth = share * vehicle.dimensions.height;
+        let plane = WaterPlane::level(vehicle.z0, depth);
+        let force =
+            hydrostatics(&vehicle.hull.mesh, &plane, FRESH_WATER, &vehicle.center_of_mass).wrench.force.z;
+        (depth, force)
+    });
+    let domain = bundle.trained.as_ref().map(|&(_, domain)| domain);
+    let provenance = bundle.trained.as_ref().map(|(weights, _)| weights.provenance.as_str());
+    let ranges =
+        || Quantity::ALL.into_iter().filter_map(|q| domain.map(|domain| (q.name(), domain.range(q))));
+    let d = &vehicle.dimensions;
+    if as_json {
+        let surfaces = vehicle.surfaces.iter().map(|s| {
+            json!({"name": s.name, "kind": s.kind, "centroid_m": s.centroid.as_slice(),
+                   "normal": s.normal.as_slice(), "area_m2": s.area})
+        });
+        let document = json!({
+            "name": vehicle.name, "version": bundle.version, "provenance": provenance,
+            "length_m": d.length, "width_m": d.width, "height_m": d.height, "z0_m": vehicle.z0,
+            "mass_kg": vehicle.mass, "center_of_mass_m": vehicle.center_of_mass.as_slice(),
+            "faces": vehicle.hull.mesh.faces.len(), "surfaces": surfaces.collect::<Vec<_>>(),
+            "domain": ranges().map(|(name, range)| (name.to_owned(), json!([range.min, range.max])))
+                .collect::<serde_json::Map<_, _>>(),
+            "hydrostatics": lift.map(|(depth, force)| json!({"depth_m": depth, "fz_n": force})),
+        });
+        println!("{document:#}");
+        return;
+    }
+    println!("{}, version {}, weights: {}", vehicle.name, bundle.version, provenance.unwrap_or("none yet"));
+    println!(
+        "L W H {:.3} x {:.3} x {:.3} m, ground at z {:.4} m, {:.1} kg",
+        d.length, d.width, d.height, vehicle.z0, vehicle.mass
+    );
+    println!("{:<18} {:<7} {:>8}  centroid [m]            normal", "surface", "kind", "area m2");
+    for s in &vehicle.surfaces {
+        let vector = |v: &wade::frame::Vec3| format!("{:7.3} {:7.3} {:7.3}", v.x, v.y, v.z);
+        let kind = format!("{:?}", s.kind).to_lowercase();
+        println!("{:<18} {kind:<7} {:>8.4}  {} {}", s.name, s.area, vector(&s.centroid), vector(&s.normal));
+    }
+    for (name, range) in ranges() {
+        println!("trained for {name:<20} {:.4} to {:.4}", range.min, range.max);
+    }
+    for (depth, force) in lift {
+        println!("lift at rest in fresh water, {depth:.3} m deep: {force:.1} N");
+    }
+}

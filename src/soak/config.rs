@@ -1,0 +1,45 @@
+//! What a soak is asked to do.
+
+use std::{num::NonZeroUsize, time::Duration};
+
+use super::{schedule::Rate, slo::Slo};
+
+/// One soak.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// Name of the vehicle, for the report.
+    pub vehicle: String,
+    /// Name of the transport, for the report.
+    pub transport: String,
+    /// How often a request is due.
+    pub rate: Rate,
+    /// Length of the measured part.
+    pub duration: Duration,
+    /// Load before the measured part, recorded apart.
+    pub warm_up: Duration,
+    /// States in a request.
+    pub batch: NonZeroUsize,
+    /// What the response time must hold.
+    pub slo: Vec<Slo>,
+    /// The core on which the machine's control sleeps; by default where the system puts it. Best is the core of
+    /// the thread that calls `run`: that one idles between requests, when the control wakes.
+    pub control_core: Option<usize>,
+    /// Commit of the build, for the report.
+    pub commit: String,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            vehicle: String::new(),
+            transport: String::new(),
+            rate: Rate::Hz(1000.0),
+            duration: Duration::from_secs(300),
+            warm_up: Duration::from_secs(5),
+            batch: NonZeroUsize::MIN,
+            slo: Vec::new(),
+            control_core: None,
+            commit: String::new(),
+        }
+    }
+}
