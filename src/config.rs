@@ -55,7 +55,7 @@ pub struct Log {
 
 impl Default for Log {
     fn default() -> Self {
-        Self { filter: "info,iceoryx2=warn".into(), json: false }
+        Self { filter: "info,iceoryx2_bb_loggers=error".into(), json: false }
     }
 }
 
@@ -123,6 +123,10 @@ impl Config {
         range(grpc.keepalive_s >= 1, "grpc.keepalive_s", &grpc.keepalive_s, "1 or more")?;
         let clients = self.shm.max_clients;
         range((1..=256).contains(&clients), "shm.max_clients", &clients, "1 to 256")?;
+        let namespace = &self.shm.namespace;
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
+        let named = (1..=64).contains(&namespace.len()) && namespace.bytes().all(plain);
+        range(named, "shm.namespace", namespace, "1 to 64 letters, digits, - or _")?;
         let silent = grpc.listen.is_empty() && grpc.unix_socket.as_os_str().is_empty() && !self.shm.enabled;
         range(!silent, "shm.enabled", &false, "true where grpc.listen and grpc.unix_socket are both empty")
     }

@@ -7,8 +7,9 @@
 //!
 //! Modules in reading order; each uses only those above it:
 //! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`]), the body ([`geometry`], [`vehicle`]), its
-//! inputs to the network ([`features`]), the network ([`model`]), its files ([`bundle`]), what serves it ([`engine`],
-//! [`metrics`]), the doors ([`service`], [`client`], [`config`]).
+//! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
+//! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), the doors ([`service`], [`client`], [`soak`]), what
+//! learns it ([`train`]), and the settings ([`config`]).
 
 pub mod condition;
 pub mod domain;
@@ -19,6 +20,8 @@ pub mod wrench;
 pub mod geometry;
 pub mod vehicle;
 
+pub mod analytic;
+pub mod effects;
 pub mod features;
 
 pub mod bundle;
@@ -28,5 +31,9 @@ pub mod engine;
 pub mod metrics;
 
 pub mod client;
+pub mod soak;
+
+pub mod train;
+
 pub mod config;
 pub mod service;

@@ -1,9 +1,12 @@
 //! Arguments in, one function a subcommand, exit codes out: 0 success, 1 what was asked for does not hold, 2 usage.
 
 mod predict;
+mod progress;
 mod query;
 mod serve;
+mod soak;
 mod state;
+mod train;
 mod vehicle;
 
 use std::path::{Path, PathBuf};
@@ -35,6 +38,10 @@ enum Command {
     Query(query::Query),
     /// Forces for every row of a table of states
     Predict(predict::Predict),
+    /// Load a server at a steady rate for a stated time and report its latency
+    Soak(soak::Soak),
+    /// Train a network for the vehicles of a folder
+    Train(train::Train),
     /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
@@ -46,6 +53,8 @@ impl Cli {
             Command::Serve(command) => command.run(),
             Command::Query(command) => command.run(),
             Command::Predict(command) => command.run(),
+            Command::Soak(command) => command.run(),
+            Command::Train(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
     }

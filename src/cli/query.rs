@@ -9,8 +9,8 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use wade::client::{Client, GrpcClient, InProcess, Method, Reply, ShmClient};
-use wade::service::grpc;
 use wade::service::shm::Wait;
+use wade::service::{grpc, shm};
 
 use super::Vehicles;
 use super::state::StateArgs;
@@ -33,6 +33,9 @@ pub struct Query {
     /// Compute here, or ask the server on this machine
     #[arg(long, value_enum, default_value_t = Transport::Inproc)]
     transport: Transport,
+    /// Namespace of the server's shared memory
+    #[arg(long, default_value = shm::NAMESPACE)]
+    namespace: String,
     #[command(flatten)]
     vehicles: Vehicles,
     /// Longest wait for an answer [s]
@@ -83,7 +86,7 @@ impl Query {
             }
             (None, Transport::Uds) => GrpcClient::unix(defaults.unix_socket, vehicle, unary, timeout)?,
             (None, Transport::Shm) => {
-                let client = ShmClient::new(vehicle, Wait::Block, timeout);
+                let client = ShmClient::new(vehicle, Wait::Block, timeout).in_namespace(&self.namespace);
                 // shared memory carries no names: those of our own bundle, where there is one
                 let names = self.vehicles.model(vehicle).map(|model| surface_names(&model));
                 return Ok((Client::Shm(Box::new(client)), names.unwrap_or_default()));

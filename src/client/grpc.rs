@@ -10,7 +10,7 @@ use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Request, Status, Streaming};
 
 use super::{ClientError, Reply, SurfaceReply};
-use crate::domain::{Outside, Quantity};
+use crate::domain::{Domain, Outside, Quantity, Range};
 use crate::service::proto;
 use crate::service::proto::hydrodynamics_client::HydrodynamicsClient;
 use crate::service::wire::State;
@@ -142,6 +142,27 @@ impl GrpcClient {
             .block_on(self.client.get_vehicle(request))
             .map(tonic::Response::into_inner)
             .map_err(|status| self.error(&status))
+    }
+
+    /// The training domain of the vehicle, as the server states it.
+    pub fn domain(&mut self) -> Result<Domain, ClientError> {
+        let ranges = self.vehicle()?.domain;
+        let range = |quantity: Quantity| {
+            let range = ranges.iter().find(|range| range.quantity == quantity as i32);
+            range.map_or(Range { min: 0.0, max: 0.0 }, |range| Range {
+                min: range.minimum,
+                max: range.maximum,
+            })
+        };
+        Ok(Domain {
+            speed_mps: range(Quantity::Speed),
+            angle_rad: range(Quantity::Angle),
+            density_kgpm3: range(Quantity::Density),
+            depth_m: range(Quantity::Depth),
+            tilt_rad: range(Quantity::Tilt),
+            vertical_speed_mps: range(Quantity::VerticalSpeed),
+            angular_speed_radps: range(Quantity::AngularSpeed),
+        })
     }
 
     fn request<T>(&self, message: T) -> Request<T> {

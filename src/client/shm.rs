@@ -14,8 +14,7 @@ use iceoryx2::prelude::{ZeroCopySend, ipc};
 use super::{ClientError, Reply, SurfaceReply};
 use crate::service::shm::{self, ShmError, Wait};
 use crate::service::shm_layout::{
-    Answer, BatchAnswer, BatchHeader, BatchQuery, DONE_SERVICE, MAX_BATCH, Query, SERVER_POLLS, Status,
-    WAKE_SERVICE, batch_service, evaluate_service, wake_name,
+    Answer, BatchAnswer, BatchHeader, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, Status, wake_name,
 };
 use crate::service::wire::State;
 
@@ -25,6 +24,7 @@ const SPINS_PER_LOOK: u32 = 64;
 /// A client of one vehicle, owned by one thread.
 #[derive(Debug)]
 pub struct ShmClient {
+    names: Names,
     vehicle: String,
     wait: Wait,
     timeout: Duration,
@@ -46,7 +46,13 @@ struct Link {
 impl ShmClient {
     /// A client that connects with its first call. `timeout` bounds each call [s].
     pub fn new(vehicle: &str, wait: Wait, timeout: Duration) -> Self {
-        Self { vehicle: vehicle.to_owned(), wait, timeout, sequence: 0, link: None }
+        let names = Names::new(shm::NAMESPACE);
+        Self { names, vehicle: vehicle.to_owned(), wait, timeout, sequence: 0, link: None }
+    }
+
+    /// Asks the server of another namespace than the default.
+    pub fn in_namespace(self, namespace: &str) -> Self {
+        Self { names: Names::new(namespace), ..self }
     }
 
     /// The forces in one state.
@@ -121,7 +127,7 @@ impl ShmClient {
         self.sequence += 1;
         let link = match &mut self.link {
             Some(link) => link,
-            None => self.link.insert(Link::open(&self.vehicle, self.wait)?),
+            None => self.link.insert(Link::open(&self.names, &self.vehicle, self.wait)?),
         };
         let result = call(link, self.sequence, deadline);
         match &result {
@@ -138,11 +144,11 @@ impl ShmClient {
 }
 
 impl Link {
-    fn open(vehicle: &str, wait: Wait) -> Result<Self, ClientError> {
-        let name = evaluate_service(vehicle);
+    fn open(names: &Names, vehicle: &str, wait: Wait) -> Result<Self, ClientError> {
+        let name = names.evaluate(vehicle);
         let no_server =
             |error: ShmError| ClientError::NoServer { at: name.clone(), reason: error.to_string() };
-        Self::try_open(vehicle, wait).map_err(no_server)?.ok_or_else(|| ClientError::NoServer {
+        Self::try_open(names, vehicle, wait).map_err(no_server)?.ok_or_else(|| ClientError::NoServer {
             at: name,
             reason:
                 "no server has opened this service; is wade serve running with shm.enabled and this vehicle?"
@@ -150,19 +156,19 @@ impl Link {
         })
     }
 
-    fn try_open(vehicle: &str, wait: Wait) -> Result<Option<Self>, ShmError> {
+    fn try_open(names: &Names, vehicle: &str, wait: Wait) -> Result<Option<Self>, ShmError> {
         let node = shm::node()?;
-        let Some(single) = shm::open::<Query, Answer>(&node, &evaluate_service(vehicle))? else {
+        let Some(single) = shm::open::<Query, Answer>(&node, &names.evaluate(vehicle))? else {
             return Ok(None);
         };
-        let Some(batch) = shm::open::<BatchQuery, BatchAnswer>(&node, &batch_service(vehicle))? else {
+        let Some(batch) = shm::open::<BatchQuery, BatchAnswer>(&node, &names.evaluate_batch(vehicle))? else {
             return Ok(None);
         };
         let single = single.client_builder().create().map_err(|error| ShmError::new("a client")(&error))?;
         let batch = batch.client_builder().create().map_err(|error| ShmError::new("a client")(&error))?;
-        let wake = shm::events(&node, WAKE_SERVICE)?.notifier_builder().create();
+        let wake = shm::events(&node, &names.wake())?.notifier_builder().create();
         let wake = wake.map_err(|error| ShmError::new("a notifier")(&error))?;
-        let sleep = (wait == Wait::Block).then(|| listener(&node)).transpose()?;
+        let sleep = (wait == Wait::Block).then(|| listener(&node, names)).transpose()?;
         Ok(Some(Self { single, batch, wake, sleep, server_polls: false, _node: node }))
     }
 
@@ -224,12 +230,12 @@ impl Link {
 }
 
 /// A listener under a name that no other client has.
-fn listener(node: &Node<ipc::Service>) -> Result<(Listener<ipc::Service>, u64), ShmError> {
+fn listener(node: &Node<ipc::Service>, names: &Names) -> Result<(Listener<ipc::Service>, u64), ShmError> {
     // the standard library's hasher is seeded at random in each process, and anew for each instance
     let key = RandomState::new().hash_one(std::process::id()).max(1);
     let error = |error: &dyn std::fmt::Display| ShmError::new("a listener")(error);
     let name = PortName::new(&wake_name(key)).map_err(|e| error(&format!("{e:?}")))?;
-    let listener = shm::events(node, DONE_SERVICE)?.listener_builder().name(&name).create();
+    let listener = shm::events(node, &names.done())?.listener_builder().name(&name).create();
     Ok((listener.map_err(|e| error(&e))?, key))
 }
 

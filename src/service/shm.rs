@@ -17,8 +17,7 @@ use iceoryx2::service::port_factory::{event, request_response};
 use serde::{Deserialize, Serialize};
 
 use super::shm_layout::{
-    Answer, BatchAnswer, BatchQuery, DONE_SERVICE, MAX_BATCH, Query, SERVER_POLLS, Status, WAKE_SERVICE,
-    batch_service, evaluate_service, wake_name,
+    Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, Status, wake_name,
 };
 use super::wire::{Refusal, State};
 use super::{Evaluator, nanoseconds_since};
@@ -46,13 +45,18 @@ pub struct Config {
     pub wait: Wait,
     /// Most clients of one vehicle at a time.
     pub max_clients: usize,
+    /// First part of the services' names; servers beside each other need one each.
+    pub namespace: String,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { enabled: true, wait: Wait::Block, max_clients: 16 }
+        Self { enabled: true, wait: Wait::Block, max_clients: 16, namespace: NAMESPACE.into() }
     }
 }
+
+/// The namespace unless configured otherwise.
+pub const NAMESPACE: &str = "wade";
 
 /// Most sleeping clients that are remembered, and that can be at a time.
 const MAX_SLEEPERS: usize = 64;
@@ -100,7 +104,7 @@ where
     node.service_builder(&service)
         .request_response::<Q, A>()
         .max_clients(max_clients)
-        .max_servers(2)
+        .max_servers(1)
         .max_nodes(max_clients + 4)
         .max_active_requests_per_client(2)
         .max_loaned_requests(1)
@@ -155,6 +159,7 @@ struct Door {
 /// The server of every vehicle, owned by one thread.
 pub struct ShmServer {
     config: Config,
+    names: Names,
     engine: Arc<Engine>,
     metrics: Arc<Metrics>,
     node: Node<ipc::Service>,
@@ -170,16 +175,18 @@ impl ShmServer {
     /// Opens the services of every vehicle that is served.
     pub fn new(config: Config, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Result<Self, ShmError> {
         let node = node()?;
-        let wake = events(&node, WAKE_SERVICE)?
+        let names = Names::new(&config.namespace);
+        let wake = events(&node, &names.wake())?
             .listener_builder()
             .create()
             .map_err(|error| ShmError::new("the listener")(&error))?;
-        let done = events(&node, DONE_SERVICE)?
+        let done = events(&node, &names.done())?
             .notifier_builder()
             .create()
             .map_err(|error| ShmError::new("the notifier")(&error))?;
         let (doors, sleepers, evaluator) = (Vec::new(), HashMap::new(), Evaluator::default());
-        let mut server = Self { config, engine, metrics, node, doors, wake, done, sleepers, evaluator };
+        let mut server =
+            Self { config, names, engine, metrics, node, doors, wake, done, sleepers, evaluator };
         server.open_new_doors()?;
         Ok(server)
     }
@@ -191,8 +198,12 @@ impl ShmServer {
                 continue;
             }
             let clients = self.config.max_clients;
-            let single = exchange::<Query, Answer>(&self.node, &evaluate_service(vehicle), clients)?;
-            let batch = exchange::<BatchQuery, BatchAnswer>(&self.node, &batch_service(vehicle), clients)?;
+            let single = exchange::<Query, Answer>(&self.node, &self.names.evaluate(vehicle), clients)?;
+            let batch = exchange::<BatchQuery, BatchAnswer>(
+                &self.node,
+                &self.names.evaluate_batch(vehicle),
+                clients,
+            )?;
             // an answer that a client does not take is dropped: no client can hold up the others
             let discard = BackpressureStrategy::DiscardData;
             let port =

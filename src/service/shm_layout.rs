@@ -2,10 +2,12 @@
 //!
 //! | service | pattern | request | response |
 //! | --- | --- | --- | --- |
-//! | `wade/v1/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
-//! | `wade/v1/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
-//! | `wade/v1/wake` | event | a client wakes the server | |
-//! | `wade/v1/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
+//! | `<namespace>/v1/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
+//! | `<namespace>/v1/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
+//! | `<namespace>/v1/wake` | event | a client wakes the server | |
+//! | `<namespace>/v1/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
+//!
+//! The namespace is `wade` unless the server's configuration says otherwise.
 //!
 //! A field is never reused with another meaning: a change of layout is a new version in the names.
 
@@ -24,19 +26,37 @@ pub const MAX_BATCH: usize = 256;
 /// Length of the provenance, which is cut to fit.
 pub const PROVENANCE_LEN: usize = 32;
 
-/// Event service on which clients wake the server.
-pub const WAKE_SERVICE: &str = "wade/v1/wake";
-/// Event service on which the server wakes clients.
-pub const DONE_SERVICE: &str = "wade/v1/done";
-
-/// Name of a vehicle's service for single queries.
-pub fn evaluate_service(vehicle: &str) -> String {
-    format!("wade/v1/evaluate/{vehicle}")
+/// Names of the services of one server.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Names {
+    namespace: String,
 }
 
-/// Name of a vehicle's service for batches.
-pub fn batch_service(vehicle: &str) -> String {
-    format!("wade/v1/evaluate_batch/{vehicle}")
+impl Names {
+    /// The names that begin with a namespace.
+    pub fn new(namespace: &str) -> Self {
+        Self { namespace: namespace.to_owned() }
+    }
+
+    /// A vehicle's service for single queries.
+    pub fn evaluate(&self, vehicle: &str) -> String {
+        format!("{}/v1/evaluate/{vehicle}", self.namespace)
+    }
+
+    /// A vehicle's service for batches.
+    pub fn evaluate_batch(&self, vehicle: &str) -> String {
+        format!("{}/v1/evaluate_batch/{vehicle}", self.namespace)
+    }
+
+    /// Event service on which clients wake the server.
+    pub fn wake(&self) -> String {
+        format!("{}/v1/wake", self.namespace)
+    }
+
+    /// Event service on which the server wakes clients.
+    pub fn done(&self) -> String {
+        format!("{}/v1/done", self.namespace)
+    }
 }
 
 /// Name of the listener of a client with this wake key.
@@ -56,7 +76,7 @@ pub const SERVER_POLLS: u32 = 1;
 pub struct Query {
     /// The client's own number, given back in the answer.
     pub sequence: u64,
-    /// Name, as a number, of the client's listener on [`DONE_SERVICE`]; 0 where the client polls.
+    /// Name, as a number, of the client's listener on [`Names::done`]; 0 where the client polls.
     pub wake_key: u64,
     /// [`DRY_CONTACT`]
     pub flags: u32,

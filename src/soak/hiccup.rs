@@ -18,7 +18,7 @@ const SELDOM_NS: f64 = 100e6;
 
 /// Requests are far apart from here on [ns]. Waking on a core that is polled takes it away for some 20 to 50 us;
 /// half of this interval hides that, and below it a waking delays a request, or in a load near the limit the
-/// twenty that queue behind it. A hundred of those a second would be seen in the p99.
+/// twenty that queue behind it. A hundred of those a second can reach the p99.
 const FAR_APART_NS: f64 = 200e3;
 
 /// Deadlines of the control, in step with the schedule.

@@ -8,7 +8,6 @@
 //! (its memory), `lateness` (whose fault a late send was), `hiccup` (the machine's own control), `slo` (the
 //! verdict), `report` with `hlog`, `page` and `plot` (the files).
 
-mod bar;
 mod clock;
 mod config;
 mod duration;
@@ -27,7 +26,6 @@ mod schedule;
 mod slo;
 mod trace;
 
-pub use bar::bar;
 pub use config::Config;
 pub use duration::{DurationError, parse_duration};
 pub use input::{Domain, Input};

@@ -1,13 +1,12 @@
-//! The progress of a soak on a terminal.
+//! Progress bars, drawn on standard error where that is a terminal.
 
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use wade::soak::Progress;
 
-use super::load::Progress;
-
-/// A bar on standard error, drawn only where that is a terminal; pass the result to `run`.
-pub fn bar() -> impl Fn(&Progress) {
+/// A bar on standard error, drawn only where that is a terminal.
+pub fn soak_bar() -> impl Fn(&Progress) {
     let bar = ProgressBar::new(0);
     if let Ok(style) = ProgressStyle::with_template("{bar:30} {msg}") {
         bar.set_style(style);

@@ -1,0 +1,173 @@
+//! The network as the trainer holds it: three dense layers with ReLU, forward and backward over a batch of columns.
+//!
+//! All parameters lie in one vector, so that the optimizer and the gradient check walk over one slice. A weight matrix
+//! is stored as `[outputs, inputs]` by rows, as `Network` stores it, which is `[inputs, outputs]` by columns.
+//!
+//! Transposed factors are copied: the product that takes one as it lies does without blocking and is slower.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, RealField};
+
+use super::random::Random;
+use crate::features::INPUTS;
+use crate::model::network::{Network, OUTPUTS, WIDTH};
+
+/// f32 to train, f64 to check the gradient.
+pub trait Real: RealField + Copy {}
+impl<T: RealField + Copy> Real for T {}
+
+/// Weights and biases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layers<T> {
+    width: usize,
+    /// w1, b1, w2, b2, w3, b3, one after another.
+    pub parameters: Vec<T>,
+}
+
+/// What a forward pass leaves for the backward pass; a column a row of input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Activations<T> {
+    hidden1: DMatrix<T>,
+    hidden2: DMatrix<T>,
+    /// Standardised force over density, `[OUTPUTS, columns]`.
+    pub output: DMatrix<T>,
+}
+
+/// Rows and columns of the six tensors in storage (a bias has one column).
+fn shapes(width: usize) -> [(usize, usize); 6] {
+    [(INPUTS, width), (width, 1), (width, width), (width, 1), (width, OUTPUTS), (OUTPUTS, 1)]
+}
+
+/// Where each tensor lies in the vector.
+pub fn ranges(width: usize) -> [Range<usize>; 6] {
+    let mut end = 0;
+    shapes(width).map(|(rows, columns)| {
+        end += rows * columns;
+        end - rows * columns..end
+    })
+}
+
+impl<T: Real> Layers<T> {
+    /// Uniform in `+-1 / sqrt(inputs)`, weights and biases, as PyTorch starts its linear layers.
+    pub fn random(width: usize, random: &mut Random) -> Self {
+        let fan_in = [INPUTS, INPUTS, width, width, width, width];
+        let mut parameters = Vec::new();
+        for (range, inputs) in ranges(width).into_iter().zip(fan_in) {
+            let bound = (inputs as f64).sqrt().recip();
+            parameters
+                .extend(range.map(|_| nalgebra::convert::<f64, T>(bound * (2.0 * random.unit() - 1.0))));
+        }
+        Self { width, parameters }
+    }
+
+    /// Takes away all say of an input. For one that never varies in training: its weights would keep their random
+    /// start, and speak up when the input varies in service.
+    pub fn silence(&mut self, input: usize) {
+        for weights in self.parameters[ranges(self.width)[0].clone()].chunks_exact_mut(INPUTS) {
+            weights[input] = T::zero();
+        }
+    }
+
+    fn matrix(&self, tensor: usize) -> DMatrixView<'_, T> {
+        let (rows, columns) = shapes(self.width)[tensor];
+        DMatrixView::from_slice(&self.parameters[ranges(self.width)[tensor].clone()], rows, columns)
+    }
+
+    /// The bias of a layer in each of `columns` columns, to which the product is then added.
+    fn bias(&self, tensor: usize, columns: usize) -> DMatrix<T> {
+        let values = &self.parameters[ranges(self.width)[tensor].clone()];
+        DMatrix::from_iterator(values.len(), columns, (0..columns).flat_map(|_| values.iter().copied()))
+    }
+
+    /// Outputs for `[INPUTS, columns]`.
+    pub fn forward(&self, inputs: &DMatrix<T>) -> Activations<T> {
+        let one = T::one();
+        let mut hidden1 = self.bias(1, inputs.ncols());
+        hidden1.gemm(one, &self.matrix(0).transpose(), inputs, one);
+        relu(&mut hidden1);
+        let mut hidden2 = self.bias(3, inputs.ncols());
+        hidden2.gemm(one, &self.matrix(2).transpose(), &hidden1, one);
+        relu(&mut hidden2);
+        let mut output = self.bias(5, inputs.ncols());
+        // three rows: dot products along columns beat the blocked product
+        output.gemm_tr(one, &self.matrix(4), &hidden2, one);
+        Activations { hidden1, hidden2, output }
+    }
+
+    /// The gradient of a loss by every parameter, from its gradient by the outputs.
+    ///
+    /// With `D3` the latter: `dW3 = D3 H2^T`, `D2 = W3^T D3` where `H2 > 0`, `dW2 = D2 H1^T`, `D1 = W2^T D2` where
+    /// `H1 > 0`, `dW1 = D1 X^T`; a bias takes the sum over the columns. All of `gradient` is overwritten.
+    pub fn backward(
+        &self,
+        inputs: &DMatrix<T>,
+        at: &Activations<T>,
+        by_output: &DMatrix<T>,
+        gradient: &mut [T],
+    ) {
+        self.layer_gradient(4, &at.hidden2, by_output, gradient);
+        let by_hidden2 = masked(self.matrix(4) * by_output, &at.hidden2);
+        self.layer_gradient(2, &at.hidden1, &by_hidden2, gradient);
+        let by_hidden1 = masked(self.matrix(2) * &by_hidden2, &at.hidden1);
+        self.layer_gradient(0, inputs, &by_hidden1, gradient);
+    }
+
+    /// Weights `tensor` and the bias after them, from what went into the layer and the gradient by what came out.
+    fn layer_gradient(&self, tensor: usize, inputs: &DMatrix<T>, by_output: &DMatrix<T>, gradient: &mut [T]) {
+        let (rows, columns) = shapes(self.width)[tensor];
+        let ranges = ranges(self.width);
+        let mut weights = DMatrixViewMut::from_slice(&mut gradient[ranges[tensor].clone()], rows, columns);
+        weights.gemm(T::one(), inputs, &by_output.transpose(), T::zero());
+        gradient[ranges[tensor + 1].clone()].copy_from_slice(by_output.column_sum().as_slice());
+    }
+}
+
+impl Layers<f32> {
+    /// The network as it is served.
+    ///
+    /// # Panics
+    /// When the layers are not as wide as a `Network`.
+    pub fn network(&self) -> Network {
+        assert_eq!(self.width, WIDTH, "only layers of the served width make a network");
+        let [w1, b1, w2, b2, w3, b3] = ranges(WIDTH).map(|range| self.parameters[range].to_vec());
+        Network { w1, b1, w2, b2, w3, b3 }
+    }
+}
+
+fn relu<T: Real>(values: &mut DMatrix<T>) {
+    values.apply(|v| *v = if *v > T::zero() { *v } else { T::zero() });
+}
+
+/// The gradient before the ReLU, from the gradient after it and what came out of it.
+fn masked<T: Real>(mut gradient: DMatrix<T>, activation: &DMatrix<T>) -> DMatrix<T> {
+    gradient.zip_apply(activation, |g, a| *g = if a > T::zero() { *g } else { T::zero() });
+    gradient
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forward_agrees_with_the_served_network() {
+        let mut random = Random::new(5);
+        let layers = Layers::<f32>::random(WIDTH, &mut random);
+        let inputs = DMatrix::from_fn(INPUTS, 9, |_, _| random.unit() as f32 - 0.5);
+        let output = layers.forward(&inputs).output;
+        for (column, input) in output.column_iter().zip(inputs.column_iter()) {
+            let expected = layers.network().forward(&std::array::from_fn(|i| input[i]));
+            assert!(column.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5));
+        }
+    }
+
+    #[test]
+    fn a_silenced_input_has_no_say() {
+        let mut layers = Layers::<f32>::random(8, &mut Random::new(5));
+        layers.silence(20);
+        let quiet = DMatrix::from_element(INPUTS, 1, 0.3);
+        let mut loud = quiet.clone();
+        loud[20] = 100.0;
+        assert_eq!(layers.forward(&quiet).output, layers.forward(&loud).output);
+    }
+}

@@ -1,0 +1,55 @@
+//! Errors of the net force on held-out cases.
+
+use super::samples::Sample;
+use crate::model::network::OUTPUTS;
+
+/// Errors of the net force, component by component, body frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Score {
+    /// Number of states, mirror images included.
+    pub samples: usize,
+    /// Mean absolute error [N].
+    pub mae: [f64; OUTPUTS],
+    /// Root mean square error [N].
+    pub rms: [f64; OUTPUTS],
+    /// Root mean square error of force over density [m4/s2].
+    pub rms_over_density: [f64; OUTPUTS],
+    /// Standard deviation of the true force, for scale [N].
+    pub spread: [f64; OUTPUTS],
+}
+
+impl Score {
+    /// Compares predictions of the net force over density [m4/s2] with the truth. All zero without samples.
+    pub fn of<'a>(
+        samples: impl Iterator<Item = &'a Sample>,
+        predict: impl Fn(&Sample) -> [f64; OUTPUTS],
+    ) -> Self {
+        let mut score = Self::default();
+        let mut mean = [0.0; OUTPUTS];
+        for sample in samples {
+            score.samples += 1;
+            let (truth, guess) = (sample.net_force_over_density(), predict(sample));
+            for c in 0..OUTPUTS {
+                let error = guess[c] - truth[c];
+                let force = truth[c] * sample.density;
+                score.mae[c] += (error * sample.density).abs();
+                score.rms[c] += (error * sample.density).powi(2);
+                score.rms_over_density[c] += error.powi(2);
+                mean[c] += force;
+                score.spread[c] += force.powi(2);
+            }
+        }
+        score.finish(mean)
+    }
+
+    fn finish(mut self, mean: [f64; OUTPUTS]) -> Self {
+        let count = self.samples.max(1) as f64;
+        self.mae = self.mae.map(|sum| sum / count);
+        self.rms = self.rms.map(|sum| (sum / count).sqrt());
+        self.rms_over_density = self.rms_over_density.map(|sum| (sum / count).sqrt());
+        for (spread, mean) in self.spread.iter_mut().zip(mean) {
+            *spread = (*spread / count - (mean / count).powi(2)).max(0.0).sqrt();
+        }
+        self
+    }
+}

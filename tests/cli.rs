@@ -1,0 +1,179 @@
+//! Promise: the command line keeps its names, its JSON and its exit codes.
+
+mod common;
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn wade(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+    command.args(arguments).env("WADE_VEHICLES", common::vehicles()).output().expect("the program runs")
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = wade(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+#[test]
+fn every_subcommand_shows_an_example() {
+    for command in ["", "serve", "query", "predict", "soak", "vehicle", "train"] {
+        let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|a| !a.is_empty()).collect();
+        let output = wade(&arguments);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && text.contains("Example"), "{command}: {text}");
+    }
+}
+
+#[test]
+fn a_query_prints_the_names_that_scripts_rely_on() {
+    let answer = json(&["query", "--vehicle", "husky", "--speed", "0.8", "--depth", "0.18", "--json"]);
+    for key in [
+        "vehicle",
+        "version",
+        "provenance",
+        "surfaces",
+        "wrench",
+        "uncertainty",
+        "in_domain",
+        "outside",
+        "effects",
+        "compute_ns",
+    ] {
+        assert!(!answer[key].is_null(), "{key} is missing");
+    }
+    assert_eq!(answer["surfaces"].as_array().map(Vec::len), Some(13));
+    let surface = &answer["surfaces"][0];
+    assert_eq!(surface["force"].as_array().map(Vec::len), Some(3));
+    assert_eq!(surface["point"].as_array().map(Vec::len), Some(3));
+    assert!(surface["name"].is_string() && surface["wetted_fraction"].is_number());
+    for key in ["force", "moment", "about"] {
+        assert_eq!(answer["wrench"][key].as_array().map(Vec::len), Some(3), "{key}");
+    }
+    assert_eq!(answer["uncertainty"]["force"].as_array().map(Vec::len), Some(3));
+    assert_eq!(answer["in_domain"], Value::Bool(true));
+    let outside = json(&["query", "--vehicle", "husky", "--speed", "0.8", "--depth", "0.5", "--json"]);
+    assert_eq!(outside["outside"][0]["quantity"], "depth_m");
+}
+
+#[test]
+fn a_current_and_its_opposite_velocity_are_the_same_to_the_water() {
+    let parked = [
+        "query",
+        "--vehicle",
+        "husky",
+        "--velocity",
+        "0,0,0",
+        "--current",
+        "-0.5,0,0",
+        "--depth",
+        "0.1",
+        "--json",
+    ];
+    let driving = ["query", "--vehicle", "husky", "--velocity", "0.5,0,0", "--depth", "0.1", "--json"];
+    assert_eq!(json(&parked)["wrench"], json(&driving)["wrench"]);
+}
+
+#[test]
+fn exit_codes_tell_usage_from_failure() {
+    assert_eq!(wade(&["query", "--vehicle", "husky"]).status.code(), Some(2), "the depth is missing");
+    let bad = wade(&["query", "--vehicle", "husky", "--speed", "1", "--depth", "-1"]);
+    assert_eq!(bad.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&bad.stderr).contains("depth_m"));
+    let unknown = wade(&["query", "--vehicle", "nautilus", "--speed", "1", "--depth", "0.1"]);
+    assert_eq!(unknown.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("nautilus"));
+}
+
+#[test]
+fn a_bundle_is_checked() {
+    let good = common::vehicles().join("husky");
+    assert_eq!(wade(&["vehicle", "check", &good.to_string_lossy()]).status.code(), Some(0));
+    let copy = common::copy_of_vehicles();
+    let bad = copy.path().join("husky");
+    std::fs::write(bad.join("hull.stl"), b"nothing").expect("written");
+    let output = wade(&["vehicle", "check", &bad.to_string_lossy()]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("hull.stl"));
+}
+
+#[test]
+fn a_vehicle_is_built_from_an_stl_and_a_vehicle_file() {
+    let folder = TempDir::new().expect("a folder");
+    let (stl, out) = (common::vehicles().join("husky/hull.stl"), folder.path().join("rover"));
+    let spec = std::fs::read_to_string(common::vehicles().join("husky/spec.toml")).expect("readable");
+    let spec_path = folder.path().join("rover.toml");
+    std::fs::write(&spec_path, spec.replacen("name = \"husky\"", "name = \"rover\"", 1)).expect("written");
+    let build = |version: u32| {
+        let output = wade(&[
+            "vehicle",
+            "build",
+            "--stl",
+            &stl.to_string_lossy(),
+            "--spec",
+            &spec_path.to_string_lossy(),
+            "--out",
+            &out.to_string_lossy(),
+        ]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            text.contains(&format!("version {version}")),
+            "{text}{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+    };
+    build(1);
+    build(2);
+    let shown = json(&["vehicle", "show", "rover", "--vehicles", &folder.path().to_string_lossy(), "--json"]);
+    assert_eq!(shown["surfaces"].as_array().map(Vec::len), Some(13));
+    assert_eq!(shown["provenance"], Value::Null);
+}
+
+#[test]
+fn a_table_of_states_gets_its_forces() {
+    let folder = TempDir::new().expect("a folder");
+    let (states, out) = (folder.path().join("in.csv"), folder.path().join("out.csv"));
+    std::fs::write(&states, "t,vx,vy,vz,depth,note\n0,0.5,0,0,0.1,a\n1,0.8,0,0,0.18,b\n").expect("written");
+    let arguments = [
+        "predict",
+        "--vehicle",
+        "husky",
+        "--states",
+        &states.to_string_lossy(),
+        "--out",
+        &out.to_string_lossy(),
+        "--per-surface",
+    ];
+    assert!(wade(&arguments).status.success());
+    let mut reader = csv::Reader::from_path(&out).expect("a table");
+    let headers = reader.headers().expect("headers").clone();
+    let column =
+        |name: &str| headers.iter().position(|header| header == name).unwrap_or_else(|| panic!("no {name}"));
+    let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().expect("rows");
+    assert_eq!((rows.len(), &rows[1][column("note")]), (2, "b"));
+    let answer = json(&["query", "--vehicle", "husky", "--speed", "0.8", "--depth", "0.18", "--json"]);
+    for (name, expected) in [
+        ("fx", &answer["wrench"]["force"][0]),
+        ("my", &answer["wrench"]["moment"][1]),
+        ("wheel_fl_fz", &answer["surfaces"][9]["force"][2]),
+    ] {
+        let value: f64 = rows[1][column(name)].parse().expect("a number");
+        let expected = expected.as_f64().expect("a number");
+        assert!((value - expected).abs() <= 1e-6 * expected.abs(), "{name}: {value} and {expected}");
+    }
+    std::fs::write(&states, "t,vx,vy,vz,depth\n0,0.5,0,0,0.1\n1,oops,0,0,0.18\n").expect("written");
+    let output = wade(&arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.code() == Some(1) && message.contains("row 3") && message.contains("oops"),
+        "{message}"
+    );
+    assert_eq!(
+        csv::Reader::from_path(&out).expect("the table before").records().count(),
+        2,
+        "nothing is lost"
+    );
+}

@@ -1,0 +1,155 @@
+//! What several test files need. Each file uses a part of it.
+#![allow(dead_code, reason = "every test file is a crate of its own and uses a part")]
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use tempfile::TempDir;
+use wade::bundle;
+use wade::client::{Client, GrpcClient, Method, ShmClient};
+use wade::config::Config;
+use wade::model::Model;
+use wade::model::kernel::Isa;
+use wade::service::run::{self, Running};
+use wade::service::shm::Wait;
+use wade::service::wire::State;
+
+/// Long enough for a busy machine: no test is about this time.
+pub const PATIENCE: Duration = Duration::from_secs(20);
+
+pub const VEHICLES: [&str; 2] = ["husky", "warthog"];
+
+pub fn vehicles() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles")
+}
+
+pub fn model(vehicle: &str) -> Model {
+    model_on(vehicle, Isa::available()[0])
+}
+
+pub fn model_on(vehicle: &str, isa: Isa) -> Model {
+    bundle::load(&vehicles().join(vehicle), isa).expect("the shipped bundles are sound")
+}
+
+/// Copies the shipped bundles to where a test may change them.
+pub fn copy_of_vehicles() -> TempDir {
+    let copy = TempDir::new().expect("a temporary folder");
+    for vehicle in VEHICLES {
+        copy_folder(&vehicles().join(vehicle), &copy.path().join(vehicle));
+    }
+    copy
+}
+
+pub fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("a folder");
+    for entry in std::fs::read_dir(from).expect("readable") {
+        let entry = entry.expect("readable");
+        std::fs::copy(entry.path(), to.join(entry.file_name())).expect("copied");
+    }
+}
+
+/// A name that no other server of this test run has.
+pub fn namespace() -> String {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    format!("test-{}-{}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed))
+}
+
+/// Settings on ports that the system chooses and a socket in `folder`.
+pub fn config(folder: &Path) -> Config {
+    let mut config = Config { vehicles: vehicles(), ..Config::default() };
+    config.grpc.listen = "127.0.0.1:0".into();
+    config.grpc.unix_socket = folder.join("wade.sock");
+    config.http.listen = "127.0.0.1:0".into();
+    config.shm.namespace = namespace();
+    config
+}
+
+/// A server of its own for one test.
+pub struct Served {
+    pub running: Running,
+    pub config: Config,
+    _folder: TempDir,
+}
+
+impl Served {
+    pub fn start() -> Self {
+        Self::with(|_| {})
+    }
+
+    pub fn with(change: impl FnOnce(&mut Config)) -> Self {
+        let folder = TempDir::new().expect("a temporary folder");
+        let mut config = config(folder.path());
+        change(&mut config);
+        config.validate().expect("a valid configuration");
+        let running = run::start(&config).expect("the server starts");
+        Self { running, config, _folder: folder }
+    }
+
+    pub fn url(&self) -> String {
+        format!("http://{}", self.running.grpc_address().expect("TCP is on"))
+    }
+
+    pub fn tcp(&self, vehicle: &str, method: Method) -> GrpcClient {
+        GrpcClient::tcp(&self.url(), vehicle, method, PATIENCE).expect("the server is there")
+    }
+
+    pub fn unix(&self, vehicle: &str, method: Method) -> GrpcClient {
+        GrpcClient::unix(self.config.grpc.unix_socket.clone(), vehicle, method, PATIENCE)
+            .expect("the server is there")
+    }
+
+    pub fn shm(&self, vehicle: &str, wait: Wait) -> ShmClient {
+        ShmClient::new(vehicle, wait, PATIENCE).in_namespace(&self.config.shm.namespace)
+    }
+
+    /// Every way to ask this server.
+    pub fn clients(&self, vehicle: &str) -> Vec<(&'static str, Client)> {
+        vec![
+            ("tcp unary", Client::Grpc(Box::new(self.tcp(vehicle, Method::Unary)))),
+            ("tcp stream", Client::Grpc(Box::new(self.tcp(vehicle, Method::Stream)))),
+            ("unix unary", Client::Grpc(Box::new(self.unix(vehicle, Method::Unary)))),
+            ("unix stream", Client::Grpc(Box::new(self.unix(vehicle, Method::Stream)))),
+            ("shm blocking", Client::Shm(Box::new(self.shm(vehicle, Wait::Block)))),
+            ("shm polling", Client::Shm(Box::new(self.shm(vehicle, Wait::Spin)))),
+        ]
+    }
+}
+
+/// Numbers that are the same in every run: a linear congruential generator with Knuth's constants.
+pub struct Numbers(u64);
+
+impl Numbers {
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// Uniform between two values.
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * ((self.0 >> 40) as f32 / (1_u64 << 24) as f32)
+    }
+
+    pub fn vector(&mut self, size: f32) -> [f32; 3] {
+        [(); 3].map(|()| self.between(-size, size))
+    }
+
+    /// A state in and around the training domains: any heading, some tilt, some dry, some deep.
+    pub fn state(&mut self) -> State {
+        let tilted = self.between(0.0, 1.0) < 0.5;
+        let (roll, pitch) = (self.between(-0.3, 0.3), self.between(-0.3, 0.3));
+        let up = wade::frame::up_from_roll_pitch(roll.into(), pitch.into());
+        let gravity = if tilted { wade::service::grpc::single(&-up.into_inner()) } else { [0.0, 0.0, -1.0] };
+        State {
+            velocity: self.vector(4.0),
+            current: self.vector(0.5),
+            angular_velocity: self.vector(0.2),
+            acceleration: self.vector(1.0),
+            angular_acceleration: self.vector(1.0),
+            gravity,
+            depth: self.between(0.0, 0.5),
+            density: self.between(950.0, 1950.0),
+            dry_contact: self.between(0.0, 1.0) < 0.25,
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! Promise: a configuration that cannot work is refused before any port is bound, naming the key.
+
+use wade::config::Config;
+
+fn refusal(change: impl FnOnce(&mut Config)) -> String {
+    let mut config = Config::default();
+    change(&mut config);
+    config.validate().expect_err("refused").to_string()
+}
+
+#[test]
+fn the_defaults_are_valid() {
+    Config::default().validate().expect("valid");
+}
+
+#[test]
+fn a_value_out_of_range_is_named() {
+    assert!(refusal(|c| c.drain_s = f64::NAN).contains("drain_s"));
+    assert!(refusal(|c| c.latency_window_s = 0.0).contains("latency_window_s"));
+    assert!(refusal(|c| c.grpc.threads = 0).contains("grpc.threads"));
+    assert!(refusal(|c| c.grpc.max_batch = 0).contains("grpc.max_batch"));
+    assert!(refusal(|c| c.shm.namespace = "a/b".into()).contains("shm.namespace"));
+    assert!(refusal(|c| c.shm.max_clients = 0).contains("shm.max_clients"));
+    let nowhere = refusal(|c| {
+        c.grpc.listen.clear();
+        c.grpc.unix_socket = std::path::PathBuf::new();
+        c.shm.enabled = false;
+    });
+    assert!(nowhere.contains("shm.enabled"));
+}
+
+#[test]
+fn an_address_that_is_none_is_refused_and_never_binds_another() {
+    let mut config = Config::default();
+    config.grpc.listen = "localhost".into();
+    let error = wade::service::run::start(&config).expect_err("refused").to_string();
+    assert!(error.contains("grpc.listen"), "{error}");
+}

@@ -1,0 +1,77 @@
+//! Promise: library, gRPC and shared memory answer the same bits, one at a time and in batches.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{Numbers, Served, VEHICLES, model};
+use wade::client::{InProcess, Reply};
+use wade::service::wire::State;
+
+/// What a server computes does not depend on how long it took.
+fn timeless(reply: Reply) -> Reply {
+    Reply { compute_ns: 0, ..reply }
+}
+
+fn states(count: usize) -> Vec<State> {
+    let mut numbers = Numbers::new(42);
+    (0..count).map(|_| numbers.state()).collect()
+}
+
+#[test]
+fn every_transport_answers_the_same_bits() {
+    let served = Served::start();
+    for vehicle in VEHICLES {
+        let mut library = InProcess::new(Arc::new(model(vehicle)));
+        let mut clients = served.clients(vehicle);
+        for state in states(100) {
+            let expected = timeless(library.evaluate(&state).expect("valid"));
+            for (name, client) in &mut clients {
+                let reply = timeless(client.evaluate(&state).expect("answered"));
+                assert_eq!(reply, expected, "{vehicle} over {name}: {state:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_batch_answers_the_bits_of_its_states_alone() {
+    let served = Served::start();
+    for vehicle in VEHICLES {
+        let mut library = InProcess::new(Arc::new(model(vehicle)));
+        // a batch has one ground contact for all, so it is the same here for each
+        let states: Vec<State> =
+            states(150).into_iter().map(|state| State { dry_contact: false, ..state }).collect();
+        let expected: Vec<Reply> =
+            states.iter().map(|state| timeless(library.evaluate(state).expect("valid"))).collect();
+        for (name, mut client) in served.clients(vehicle) {
+            let replies = client.evaluate_batch(&states).expect("answered");
+            let replies: Vec<Reply> = replies.into_iter().map(timeless).collect();
+            assert_eq!(replies, expected, "{vehicle} over {name}");
+        }
+    }
+}
+
+#[test]
+fn every_transport_names_the_same_bad_field_and_serves_the_next_request() {
+    let served = Served::start();
+    let good = State { depth: 0.1, ..State::default() };
+    let bad = [
+        (State { depth: -1.0, ..good }, "depth_m"),
+        (State { velocity: [f32::NAN, 0.0, 0.0], ..good }, "velocity_mps"),
+        (State { density: 0.0, ..good }, "density_kgpm3"),
+        (State { gravity: [0.0, 0.0, -2.0], ..good }, "gravity_direction"),
+        (State { current: [f32::INFINITY, 0.0, 0.0], ..good }, "current_mps"),
+    ];
+    for (name, mut client) in served.clients("husky") {
+        for (state, field) in bad {
+            let error = client.evaluate(&state).expect_err("a bad state").to_string();
+            assert!(error.contains(field), "{name}: {error}");
+            let error = client.evaluate_batch(&[good, state]).expect_err("a bad batch").to_string();
+            assert!(error.contains(field), "{name}: {error}");
+            client.evaluate(&good).expect("the next request is served");
+        }
+        client.evaluate_batch(&[]).expect_err("an empty batch");
+        client.evaluate_batch(&[good]).expect("the next batch is served");
+    }
+}

@@ -1,0 +1,153 @@
+//! Promise: a bundle is replaced while it is served, without an error, and a bad one leaves the one before it.
+
+mod common;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use common::{PATIENCE, Served, copy_of_vehicles};
+use hdrhistogram::Histogram;
+use wade::bundle;
+use wade::client::{ClientError, Method};
+use wade::service::proto;
+use wade::service::shm::Wait;
+use wade::service::wire::State;
+
+fn state() -> State {
+    State { depth: 0.15, velocity: [0.5, 0.0, 0.0], ..State::default() }
+}
+
+/// Writes the next version of a bundle over the one in place.
+fn write_next_version(folder: &std::path::Path) -> u32 {
+    let mut next = bundle::read(folder).expect("a sound bundle");
+    next.version += 1;
+    bundle::write(folder, &next).expect("written");
+    next.version
+}
+
+#[test]
+fn a_new_version_is_served_after_a_reload_over_every_transport() {
+    let folder = copy_of_vehicles();
+    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let mut clients = served.clients("husky");
+    let before = clients[0].1.evaluate(&state()).expect("answered").version;
+    let version = write_next_version(&folder.path().join("husky"));
+    assert_eq!(version, before + 1);
+    for (name, client) in &mut clients {
+        assert_eq!(
+            client.evaluate(&state()).expect("answered").version,
+            before,
+            "{name}: not before it is asked for"
+        );
+    }
+    let reloaded = served.running.reloader().reload("husky").expect("served");
+    assert!(reloaded.iter().all(|reload| reload.refusal.is_none()), "{reloaded:?}");
+    for (name, client) in &mut clients {
+        assert_eq!(client.evaluate(&state()).expect("answered").version, version, "{name}");
+    }
+}
+
+#[test]
+fn a_bad_bundle_is_refused_over_grpc_and_the_old_version_stays() {
+    let folder = copy_of_vehicles();
+    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let before = served.tcp("husky", Method::Unary).evaluate(&state()).expect("answered");
+    std::fs::write(folder.path().join("husky/hull.stl"), b"not a hull").expect("written");
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    let response = runtime.block_on(async {
+        let endpoint = tonic::transport::Endpoint::from_shared(served.url()).expect("a URL");
+        let channel = endpoint.connect().await.expect("connected");
+        let mut admin = proto::admin_client::AdminClient::new(channel);
+        let unknown = proto::ReloadRequest { vehicle: "../husky".into() };
+        assert_eq!(admin.reload(unknown).await.expect_err("no such vehicle").code(), tonic::Code::NotFound);
+        admin.reload(proto::ReloadRequest::default()).await.expect("answered").into_inner()
+    });
+    let of = |name: &str| response.vehicles.iter().find(|reloaded| reloaded.vehicle == name).expect("listed");
+    assert!(of("husky").refusal.contains("hull.stl"), "{}", of("husky").refusal);
+    assert!(of("warthog").refusal.is_empty());
+    let after = served.tcp("husky", Method::Unary).evaluate(&state()).expect("still served");
+    assert_eq!(after.bundle_version, before.bundle_version);
+    assert_eq!(after.wrench, before.wrench);
+}
+
+#[test]
+fn a_vehicle_that_is_added_is_served_over_every_transport() {
+    let folder = copy_of_vehicles();
+    let warthog = folder.path().join("warthog");
+    let aside = tempfile::TempDir::new().expect("a folder");
+    std::fs::rename(&warthog, aside.path().join("warthog")).expect("moved");
+    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let mut shm = served.shm("warthog", Wait::Block);
+    assert!(matches!(shm.evaluate(&state()), Err(ClientError::NoServer { .. })));
+    std::fs::rename(aside.path().join("warthog"), &warthog).expect("moved back");
+    served.running.reloader().reload("").expect("reloaded");
+    served.tcp("warthog", Method::Unary).evaluate(&state()).expect("served over gRPC");
+    let start = Instant::now();
+    while let Err(error) = shm.evaluate(&state()) {
+        assert!(start.elapsed() < PATIENCE, "never served over shared memory: {error}");
+    }
+}
+
+/// Reloads in this test, one a second.
+const RELOADS: u32 = 4;
+
+#[test]
+fn reloads_every_second_under_load_cause_no_error_and_no_mixture() {
+    let folder = copy_of_vehicles();
+    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let stop = Arc::new(AtomicBool::new(false));
+    let loads: Vec<_> = served
+        .clients("husky")
+        .into_iter()
+        .filter(|(name, _)| ["tcp unary", "unix stream", "shm blocking"].contains(name))
+        .map(|(name, _)| name)
+        .collect();
+    std::thread::scope(|scope| {
+        let served = &served;
+        let workers: Vec<_> = loads
+            .iter()
+            .map(|&name| {
+                let stop = Arc::clone(&stop);
+                scope.spawn(move || {
+                    // a shared-memory client stays with its thread, so each thread makes its own
+                    let clients = served.clients("husky");
+                    let (_, mut client) = clients.into_iter().find(|(n, _)| *n == name).expect("known");
+                    let mut versions = vec![0];
+                    let mut quiet = Histogram::<u64>::new(3).expect("valid");
+                    let forces = client.evaluate(&state()).expect("answered").force;
+                    while !stop.load(Ordering::Relaxed) {
+                        let start = Instant::now();
+                        let reply = client.evaluate(&state()).expect("no error while bundles are swapped");
+                        quiet.saturating_record(start.elapsed().as_nanos() as u64);
+                        assert_eq!(reply.force, forces, "every version has these weights");
+                        if versions.last() != Some(&reply.version) {
+                            versions.push(reply.version);
+                        }
+                        std::thread::sleep(Duration::from_millis(1));
+                    }
+                    (versions, quiet)
+                })
+            })
+            .collect();
+        for _ in 0..RELOADS {
+            std::thread::sleep(Duration::from_secs(1));
+            write_next_version(&folder.path().join("husky"));
+            let reloaded = served.running.reloader().reload("husky").expect("served");
+            assert!(reloaded[0].refusal.is_none());
+        }
+        std::thread::sleep(Duration::from_millis(200));
+        stop.store(true, Ordering::Relaxed);
+        for (worker, name) in workers.into_iter().zip(&loads) {
+            let (versions, latency) = worker.join().expect("no panic");
+            assert!(versions.is_sorted(), "{name}: never back to an older version: {versions:?}");
+            assert_eq!(versions.len() as u32, RELOADS + 2, "{name}: every version was seen: {versions:?}");
+            // shown, not asserted: a time depends on the machine
+            println!(
+                "{name}: p50 {} us, p99 {} us",
+                latency.value_at_quantile(0.5) / 1000,
+                latency.value_at_quantile(0.99) / 1000
+            );
+        }
+    });
+}

@@ -1,0 +1,228 @@
+//! Promise: over shared memory, either side survives the death of the other, and a hostile client gets an error code.
+
+mod common;
+
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{PATIENCE, Served, namespace, vehicles};
+use iceoryx2::node::NodeBuilder;
+use iceoryx2::prelude::ipc;
+use tempfile::TempDir;
+use wade::client::{ClientError, ShmClient};
+use wade::service::shm::Wait;
+use wade::service::shm_layout::{Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, Status};
+use wade::service::wire::State;
+
+fn state() -> State {
+    State { depth: 0.15, velocity: [0.5, 0.0, 0.0], ..State::default() }
+}
+
+/// A server in a process of its own, which a test can kill.
+struct Process(Child);
+
+impl Process {
+    fn start(folder: &Path, namespace: &str, wait: &str) -> Self {
+        let file = folder.join("wade.toml");
+        let settings = format!(
+            "vehicles = \"{}\"\n[grpc]\nlisten = \"\"\nunix_socket = \"\"\n[http]\nlisten = \"\"\n\
+             [shm]\nnamespace = \"{namespace}\"\nwait = \"{wait}\"\n[log]\nfilter = \"error\"\n",
+            vehicles().display()
+        );
+        std::fs::write(&file, settings).expect("written");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+        command.arg("serve").arg("--config").arg(file).stdin(Stdio::null());
+        Self(command.spawn().expect("the server starts"))
+    }
+
+    /// Ends it as nothing can prepare for.
+    fn kill(mut self) {
+        self.0.kill().expect("killed");
+        let status = self.0.wait().expect("reaped");
+        assert_eq!(status.signal(), Some(9));
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Asks until somebody answers.
+fn until_answered(client: &mut ShmClient) -> Answer {
+    let start = Instant::now();
+    loop {
+        match client.evaluate(&state()) {
+            Ok(answer) => return answer,
+            Err(error) => assert!(start.elapsed() < PATIENCE, "never answered: {error}"),
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_living_client_finds_a_killed_and_restarted_server_again() {
+    for (wait, name) in [(Wait::Spin, "spin"), (Wait::Block, "block")] {
+        let (folder, namespace) = (TempDir::new().expect("a folder"), namespace());
+        let timeout = Duration::from_millis(100);
+        let mut client = ShmClient::new("husky", wait, timeout).in_namespace(&namespace);
+        let server = Process::start(folder.path(), &namespace, name);
+        let before = until_answered(&mut client);
+
+        server.kill();
+        let start = Instant::now();
+        let error = client.evaluate(&state()).expect_err("nobody answers");
+        assert!(matches!(error, ClientError::Timeout(_) | ClientError::NoServer { .. }), "{error:?}");
+        assert!(start.elapsed() < PATIENCE, "a call ends by itself: {:?}", start.elapsed());
+        let error = client.evaluate(&state()).expect_err("still nobody").to_string();
+        assert!(!error.is_empty());
+
+        let _server = Process::start(folder.path(), &namespace, name);
+        let after = until_answered(&mut client);
+        assert_eq!(after.force_n, before.force_n, "{name}: the same bits from the new server");
+    }
+}
+
+#[test]
+fn a_server_goes_on_when_clients_are_killed() {
+    let served = Served::start();
+    let mut survivor = served.shm("husky", Wait::Block);
+    survivor.evaluate(&state()).expect("answered");
+    for _ in 0..6 {
+        // a client that asks without end, until it is killed in the middle of it
+        let mut child = Command::new(env!("CARGO_BIN_EXE_wade"))
+            .args(["soak", "--vehicle", "husky", "--transport", "shm-block", "--rate", "max"])
+            .args(["--duration", "60s", "--warm-up", "0s", "--pin", "off"])
+            .arg("--addr")
+            .arg(&served.config.shm.namespace)
+            .arg("--vehicles")
+            .arg(vehicles())
+            .arg("--out")
+            .arg(TempDir::new().expect("a folder").path())
+            .stdin(Stdio::null())
+            .spawn()
+            .expect("the client starts");
+        let before = answered(&served);
+        let start = Instant::now();
+        while answered(&served) < before + 10 {
+            assert!(start.elapsed() < PATIENCE, "the client never asked");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        child.kill().expect("killed");
+        child.wait().expect("reaped");
+        survivor.evaluate(&state()).expect("the server goes on");
+    }
+    served.shm("husky", Wait::Spin).evaluate(&state()).expect("a new client is served");
+}
+
+fn answered(served: &Served) -> u64 {
+    served.running.metrics().latencies().iter().map(|row| row.since_start.count).sum()
+}
+
+#[test]
+fn a_client_without_a_server_gets_an_error_of_its_own() {
+    let mut client = ShmClient::new("husky", Wait::Spin, PATIENCE).in_namespace(&namespace());
+    let error = client.evaluate(&state()).expect_err("nobody");
+    assert!(matches!(error, ClientError::NoServer { .. }), "{error:?}");
+}
+
+#[test]
+fn a_vehicle_that_is_not_served_is_an_error() {
+    let served = Served::start();
+    let error = served.shm("nautilus", Wait::Block).evaluate(&state()).expect_err("not served");
+    assert!(matches!(error, ClientError::NoServer { .. }), "{error:?}");
+}
+
+/// A client that writes what it likes, by the layout alone.
+struct Raw {
+    single: iceoryx2::port::client::Client<ipc::Service, Query, (), Answer, ()>,
+    batch: iceoryx2::port::client::Client<ipc::Service, BatchQuery, (), BatchAnswer, ()>,
+    _node: iceoryx2::node::Node<ipc::Service>,
+}
+
+impl Raw {
+    fn new(served: &Served) -> Self {
+        let names = Names::new(&served.config.shm.namespace);
+        let node = NodeBuilder::new().create::<ipc::Service>().expect("a node");
+        macro_rules! port {
+            ($name:expr, $query:ty, $answer:ty) => {{
+                let name = $name.as_str().try_into().expect("a name");
+                let service = node.service_builder(&name).request_response::<$query, $answer>().open();
+                service.expect("served").client_builder().create().expect("a client")
+            }};
+        }
+        Self {
+            single: port!(names.evaluate("husky"), Query, Answer),
+            batch: port!(names.evaluate_batch("husky"), BatchQuery, BatchAnswer),
+            _node: node,
+        }
+    }
+}
+
+fn patiently<T>(mut ask: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        assert!(start.elapsed() < PATIENCE, "no answer");
+    }
+}
+
+#[test]
+fn a_hostile_request_gets_an_error_code_and_the_next_is_served() {
+    let served = Served::with(|config| config.shm.wait = Wait::Spin);
+    let raw = Raw::new(&served);
+    let good = Query::from(&state());
+    let bad = [
+        Query { depth_m: f32::NAN, ..good },
+        Query { velocity_mps: [f32::INFINITY; 3], ..good },
+        Query { gravity_direction: [0.0; 3], ..good },
+        Query { density_kgpm3: -1.0, flags: u32::MAX, reserved: u32::MAX, ..good },
+    ];
+    for (sequence, query) in (1..).zip(bad) {
+        // a wake key that no listener has must not hold anybody up
+        let query = Query { sequence, wake_key: u64::MAX - sequence, ..query };
+        let pending = raw.single.send_copy(query).expect("sent");
+        let answer = patiently(|| pending.receive().expect("received").map(|answer| *answer));
+        assert_eq!((answer.status, answer.sequence), (Status::InvalidState as u32, sequence));
+        assert!(answer.refusal().is_some() && answer.force_n == [0.0; 3]);
+        let pending = raw.single.send_copy(Query { sequence: 99, ..good }).expect("sent");
+        let answer = patiently(|| pending.receive().expect("received").map(|answer| *answer));
+        assert_eq!((answer.status, answer.sequence), (Status::Ok as u32, 99));
+    }
+}
+
+#[test]
+fn a_batch_that_lies_about_its_length_gets_an_error_code() {
+    let served = Served::with(|config| config.shm.wait = Wait::Spin);
+    let raw = Raw::new(&served);
+    let good = Query::from(&state());
+    for count in [0, MAX_BATCH as u32 + 1, u32::MAX] {
+        let mut request = raw
+            .batch
+            .loan_uninit()
+            .expect("a slot")
+            .write_payload(BatchQuery { header: Default::default(), queries: [good; MAX_BATCH] });
+        request.payload_mut().header.count = count;
+        let pending = request.send().expect("sent");
+        let (status, answered) =
+            patiently(|| pending.receive().expect("received").map(|answer| (answer.status, answer.count)));
+        assert_eq!((status, answered), (Status::InvalidBatch as u32, 0));
+    }
+}
+
+#[test]
+fn requests_that_nobody_waits_for_do_not_hold_up_the_others() {
+    let served = Served::with(|config| config.shm.wait = Wait::Spin);
+    let raw = Raw::new(&served);
+    let mut client = served.shm("husky", Wait::Spin);
+    for _ in 0..200 {
+        drop(raw.single.send_copy(Query::from(&state())).expect("sent"));
+        client.evaluate(&state()).expect("answered");
+    }
+}
