@@ -31,6 +31,7 @@ pub mod engine;
 pub mod metrics;
 
 pub mod client;
+pub mod cores;
 pub mod soak;
 
 pub mod train;

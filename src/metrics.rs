@@ -65,6 +65,8 @@ struct VehicleLabels {
     vehicle: String,
 }
 
+const RELOAD_OUTCOMES: [&str; 2] = ["accepted", "refused"];
+
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct ReloadLabels {
     outcome: &'static str,
@@ -184,6 +186,10 @@ impl Metrics {
         let latency: Family<_, _, fn() -> Buckets> = Family::new_with_constructor(|| Buckets::new(BUCKETS_S));
         let (out_of_domain, refusals) = (Family::default(), Family::default());
         let (bundle_version, reloads) = (Family::default(), Family::default());
+        for outcome in RELOAD_OUTCOMES {
+            // there from the start, so that a rate sees the first one
+            let _ = Family::<_, Counter>::get_or_create(&reloads, &ReloadLabels { outcome });
+        }
         let mut registry = Registry::with_prefix("wade");
         registry.register_with_unit(
             "request_duration",
@@ -245,7 +251,7 @@ impl Metrics {
 
     /// Counts a bundle that was read while serving.
     pub fn count_reload(&self, accepted: bool) {
-        let outcome = if accepted { "accepted" } else { "refused" };
+        let outcome = RELOAD_OUTCOMES[usize::from(!accepted)];
         self.reloads.get_or_create(&ReloadLabels { outcome }).inc();
     }
 
@@ -317,7 +323,7 @@ mod tests {
         metrics.refuse(Transport::grpc_unary, "invalid_argument");
         let text = metrics.render();
         let bucket =
-            r#"wade_request_duration_seconds_bucket{le="1e-5",transport="grpc_unary",vehicle="husky"} 1"#;
+            r#"wade_request_duration_seconds_bucket{le="0.00001",transport="grpc_unary",vehicle="husky"} 1"#;
         assert!(text.contains(bucket), "{text}");
         assert!(text.contains(r#"wade_refusals_total{transport="grpc_unary",reason="invalid_argument"} 1"#));
     }

@@ -162,8 +162,8 @@ tests:
       - {series: 'wade_request_duration_seconds_bucket{instance="b", transport="shm", vehicle="husky", le="+Inf"}', values: '0+100x40'}
       - {series: 'wade_refusals_total{instance="a", transport="shm", reason="not_found"}', values: '0+1x40'}
       - {series: 'wade_refusals_total{instance="b", transport="shm", reason="not_found"}', values: '0+60x40'}
-      - {series: 'wade_reloads_total{instance="a", outcome="accepted"}', values: '_x20 1x20'}
-      - {series: 'wade_reloads_total{instance="b", outcome="refused"}', values: '_x20 1x20'}
+      - {series: 'wade_reloads_total{instance="a", outcome="accepted"}', values: '0x20 1x20'}
+      - {series: 'wade_reloads_total{instance="b", outcome="refused"}', values: '0x20 1x20'}
     promql_expr_test:
       - {expr: 'count by (alertname, instance) (ALERTS{alertstate="firing"})', eval_time: 4m, exp_samples: [
           {labels: '{alertname="WadeSlow", instance="b"}', value: 1},

@@ -334,6 +334,7 @@ fn a_server_that_cannot_read_its_bundles_never_says_serving() {
 fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
     let served = Served::with(|config| config.grpc.max_batch = 1 << 15);
     let runtime = runtime();
+    let _inside = runtime.enter();
     let (mut health, mut long, mut watched) = runtime.block_on(async {
         (HealthClient::new(channel(&served).await), client(&served).await, client(&served).await)
     });

@@ -10,7 +10,7 @@ const LAYERS: [&[&str]; 7] = [
     &["features", "effects", "analytic"],
     &["model", "bundle"],
     &["engine", "metrics"],
-    &["service", "client", "soak", "train"],
+    &["cores", "service", "client", "soak", "train"],
     &["config"],
 ];
 

@@ -96,7 +96,7 @@ fn a_server_goes_on_when_clients_are_killed() {
         // a client that asks without end, until it is killed in the middle of it
         let mut child = Command::new(env!("CARGO_BIN_EXE_wade"))
             .args(["soak", "--vehicle", "husky", "--transport", "shm-block", "--rate", "max"])
-            .args(["--duration", "60s", "--warm-up", "0s", "--pin", "off"])
+            .args(["--duration", "60s", "--warm-up", "1ms", "--pin", "off"])
             .arg("--addr")
             .arg(&served.config.shm.namespace)
             .arg("--vehicles")

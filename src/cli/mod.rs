@@ -9,6 +9,7 @@ mod state;
 mod train;
 mod vehicle;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -57,6 +58,14 @@ impl Cli {
             Command::Train(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
+    }
+}
+
+/// Prints to standard output; a reader that has seen enough, such as head, is no failure.
+fn emit(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        outcome => Ok(outcome?),
     }
 }
 

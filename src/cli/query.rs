@@ -12,8 +12,8 @@ use wade::client::{Client, GrpcClient, InProcess, Method, Reply, ShmClient};
 use wade::service::shm::Wait;
 use wade::service::{grpc, shm};
 
-use super::Vehicles;
 use super::state::StateArgs;
+use super::{Vehicles, emit};
 
 /// Ask for the forces in one state
 #[derive(Debug, Args)]
@@ -64,9 +64,9 @@ impl Query {
         let (mut client, names) = self.client()?;
         let reply = client.evaluate(&self.state.state())?;
         if self.json {
-            println!("{:#}", to_json(&self.vehicle, &names, &reply));
+            emit(&format!("{:#}\n", to_json(&self.vehicle, &names, &reply)))?;
         } else {
-            print!("{}", to_table(&self.vehicle, &names, &reply));
+            emit(&to_table(&self.vehicle, &names, &reply))?;
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -5,10 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use nix::sched::{CpuSet, sched_setaffinity};
-use nix::unistd::Pid;
 use tracing_subscriber::EnvFilter;
 use wade::config::{Config, Log};
+use wade::cores;
 use wade::service::run;
 use wade::service::shm::Wait;
 
@@ -31,7 +30,7 @@ pub struct Serve {
     #[arg(long, value_name = "ADDR")]
     listen: Option<String>,
     /// Unix socket of gRPC; empty for none
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", value_parser = path_or_nothing)]
     unix_socket: Option<PathBuf>,
     /// Address of metrics and probes; empty for none
     #[arg(long, value_name = "ADDR")]
@@ -63,7 +62,7 @@ impl Serve {
         let config = self.config()?;
         config.validate()?;
         start_log(&config.log)?;
-        pin(&config.cpus)?;
+        cores::pin_to(&config.cpus).context("cpus")?;
         let running = run::start(&config)?;
         tracing::info!(
             grpc = running.grpc_address().map(tracing::field::display),
@@ -97,6 +96,11 @@ impl Serve {
     }
 }
 
+/// The parser of paths refuses the empty string, which here means none.
+fn path_or_nothing(text: &str) -> Result<PathBuf, std::convert::Infallible> {
+    Ok(PathBuf::from(text))
+}
+
 fn set<T>(place: &mut T, value: Option<T>) {
     if let Some(value) = value {
         *place = value;
@@ -113,18 +117,6 @@ fn start_log(log: &Log) -> Result<()> {
         lines.init()
     }
     Ok(())
-}
-
-/// Keeps this process, and the threads it is about to start, on some CPUs; none named: on all.
-pub fn pin(cpus: &[usize]) -> Result<()> {
-    if cpus.is_empty() {
-        return Ok(());
-    }
-    let mut set = CpuSet::new();
-    for &cpu in cpus {
-        set.set(cpu).with_context(|| format!("cpus: there is no CPU {cpu}"))?;
-    }
-    sched_setaffinity(Pid::from_raw(0), &set).with_context(|| format!("cpus = {cpus:?}"))
 }
 
 /// Tells systemd, where it is systemd that started us.

@@ -10,6 +10,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use tempfile::TempDir;
 use wade::client::{Client, ClientError, GrpcClient, InProcess, Method, ShmClient};
+use wade::cores;
 use wade::domain::{Domain, Range};
 use wade::service::shm::Wait;
 use wade::service::wire::State;
@@ -118,7 +119,7 @@ impl Soak {
             (None, None) => String::new(),
         };
         if let Some(cpu) = client_cpu {
-            soak::pin_to_core(cpu)?;
+            cores::pin_to(&[cpu])?;
         }
         let mut client = self.connect(&at, server)?;
         let input = self.input(&self.domain(&at)?)?;
@@ -161,7 +162,7 @@ impl Soak {
 
     /// CPU of the server and of the client.
     fn cpus(&self) -> Result<(Option<usize>, Option<usize>)> {
-        let cores = soak::allowed_cores()?;
+        let cores = cores::allowed()?;
         Ok(match (self.pin, cores.as_slice()) {
             (Pin::Split, [first, second, ..]) => (Some(*first), Some(*second)),
             (Pin::Same, [first, ..]) => (Some(*first), Some(*first)),

@@ -1,5 +1,6 @@
 //! `wade vehicle`.
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -17,7 +18,7 @@ use wade::vehicle::build::build_reporting;
 use wade::vehicle::shipped;
 use wade::vehicle::spec::VehicleSpec;
 
-use super::{Vehicles, bundle_names};
+use super::{Vehicles, bundle_names, emit};
 
 /// Build, check and show vehicle bundles
 #[derive(Debug, Args)]
@@ -116,7 +117,7 @@ impl Vehicle {
                     names.iter().for_each(|name| println!("{name}"));
                 }
             }
-            Command::Show { name, vehicles, json } => show(&bundle::read(&vehicles.bundle(&name))?, json),
+            Command::Show { name, vehicles, json } => show(&bundle::read(&vehicles.bundle(&name))?, json)?,
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -160,7 +161,7 @@ fn check(directory: &Path, as_json: bool) -> ExitCode {
 /// Depths at which hydrostatics are shown, as shares of the height.
 const SHOWN_DEPTHS: [f64; 4] = [0.15, 0.30, 0.45, 0.60];
 
-fn show(bundle: &Bundle, as_json: bool) {
+fn show(bundle: &Bundle, as_json: bool) -> Result<()> {
     let vehicle = &bundle.vehicle;
     let lift = SHOWN_DEPTHS.map(|share| {
         let depth = share * vehicle.dimensions.height;
@@ -188,24 +189,40 @@ fn show(bundle: &Bundle, as_json: bool) {
                 .collect::<serde_json::Map<_, _>>(),
             "hydrostatics": lift.map(|(depth, force)| json!({"depth_m": depth, "fz_n": force})),
         });
-        println!("{document:#}");
-        return;
+        return emit(&format!("{document:#}\n"));
     }
-    println!("{}, version {}, weights: {}", vehicle.name, bundle.version, provenance.unwrap_or("none yet"));
-    println!(
+    let mut text = String::new();
+    // writing to a String cannot fail
+    let mut line = |line: String| {
+        let _ = writeln!(text, "{line}");
+    };
+    line(format!(
+        "{}, version {}, weights: {}",
+        vehicle.name,
+        bundle.version,
+        provenance.unwrap_or("none yet")
+    ));
+    line(format!(
         "L W H {:.3} x {:.3} x {:.3} m, ground at z {:.4} m, {:.1} kg",
         d.length, d.width, d.height, vehicle.z0, vehicle.mass
-    );
-    println!("{:<18} {:<7} {:>8}  centroid [m]            normal", "surface", "kind", "area m2");
+    ));
+    line(format!("{:<18} {:<7} {:>8}  centroid [m]            normal", "surface", "kind", "area m2"));
     for s in &vehicle.surfaces {
         let vector = |v: &wade::frame::Vec3| format!("{:7.3} {:7.3} {:7.3}", v.x, v.y, v.z);
         let kind = format!("{:?}", s.kind).to_lowercase();
-        println!("{:<18} {kind:<7} {:>8.4}  {} {}", s.name, s.area, vector(&s.centroid), vector(&s.normal));
+        line(format!(
+            "{:<18} {kind:<7} {:>8.4}  {} {}",
+            s.name,
+            s.area,
+            vector(&s.centroid),
+            vector(&s.normal)
+        ));
     }
     for (name, range) in ranges() {
-        println!("trained for {name:<20} {:.4} to {:.4}", range.min, range.max);
+        line(format!("trained for {name:<20} {:.4} to {:.4}", range.min, range.max));
     }
     for (depth, force) in lift {
-        println!("lift at rest in fresh water, {depth:.3} m deep: {force:.1} N");
+        line(format!("lift at rest in fresh water, {depth:.3} m deep: {force:.1} N"));
     }
+    emit(&text)
 }

@@ -16,14 +16,19 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 use tokio_stream::wrappers::UnixListenerStream;
+use tonic::codegen::http;
 use tonic::transport::server::{Router, TcpIncoming};
+use tonic::{Code, Status};
 use tonic_health::pb::health_server::HealthServer;
 use tonic_health::server::{HealthReporter, HealthService};
+use tower::layer::util::{Identity, Stack};
+use tower::util::MapResponseLayer;
 
 use super::admin::Reloader;
 use super::proto;
 use super::proto::admin_server::AdminServer;
 use super::proto::hydrodynamics_server::HydrodynamicsServer;
+use super::wire::Refusal;
 use crate::engine::{Admission, Engine};
 use crate::metrics::Metrics;
 
@@ -216,7 +221,7 @@ impl Server {
         }
     }
 
-    fn router(&self, stop: &watch::Receiver<bool>) -> Result<Router, GrpcError> {
+    fn router(&self, stop: &watch::Receiver<bool>) -> Result<Router<Layers>, GrpcError> {
         let handlers = handlers::Handlers {
             shared: self.shared.clone(),
             max_batch: self.config.max_batch,
@@ -231,6 +236,7 @@ impl Server {
                 .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
         };
         Ok(tonic::transport::Server::builder()
+            .layer(MapResponseLayer::new(name_the_size_limit as fn(_) -> _))
             .max_concurrent_streams(self.config.max_streams_per_connection)
             .http2_keepalive_interval(Some(Duration::from_secs(self.config.keepalive_s)))
             .add_service(
@@ -262,6 +268,25 @@ impl Server {
         };
         tokio::try_join!(tcp, unix).map(|_| ())
     }
+}
+
+type Body = tonic::body::Body;
+type Layers = Stack<MapResponseLayer<fn(http::Response<Body>) -> http::Response<Body>>, Identity>;
+
+/// tonic says OUT_OF_RANGE of a message over the size limit, other implementations RESOURCE_EXHAUSTED, which is also
+/// what the API guides reserve for limits. No handler of ours says OUT_OF_RANGE.
+fn name_the_size_limit(mut response: http::Response<Body>) -> http::Response<Body> {
+    let status = Status::from_header_map(response.headers());
+    if let Some(status) = status.filter(|status| status.code() == Code::OutOfRange) {
+        let headers = size_limit(&status).into_http::<Body>().into_parts().0.headers;
+        *response.headers_mut() = headers;
+    }
+    response
+}
+
+/// The status of a message over the size limit.
+pub(super) fn size_limit(status: &Status) -> Status {
+    Refusal::MessageTooLong { reason: status.message().to_owned() }.into()
 }
 
 /// Accepted connections with TCP_NODELAY, which the builder's own setting does not reach when it is handed a listener:

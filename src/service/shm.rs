@@ -64,6 +64,9 @@ const MAX_SLEEPERS: usize = 64;
 /// How long the server sleeps at most before it looks for a shutdown and for new vehicles.
 const HOUSEKEEPING: Duration = Duration::from_millis(50);
 
+/// Pause after a wait that failed, so that a lasting failure does not spin.
+const PAUSE: Duration = Duration::from_millis(1);
+
 /// The shared memory could not be set up.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("shared memory: cannot create {what}: {reason}")]
@@ -84,7 +87,10 @@ impl ShmError {
 /// A node that leaves the signals to their owner.
 pub(crate) fn node() -> Result<Node<ipc::Service>, ShmError> {
     let node = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<ipc::Service>();
-    node.map_err(|error| ShmError::new("a node")(&error))
+    node.map_err(|error| {
+        let hint = "; its files lie in /tmp/iceoryx2 and /dev/shm and serve the one user who owns them";
+        ShmError::new("a node")(&format!("{error}{hint}"))
+    })
 }
 
 pub(crate) type Exchange<Q, A> = request_response::PortFactory<ipc::Service, Q, (), A, ()>;
@@ -253,8 +259,9 @@ impl ShmServer {
             // a request that came before the listener slept has left its event, so it is not slept over
             Wait::Block => {
                 if let Err(error) = self.wake.timed_wait(|_| {}, HOUSEKEEPING) {
-                    tracing::warn!(?error, "waiting for shared-memory requests");
-                    std::thread::sleep(HOUSEKEEPING);
+                    // a signal, most likely; whatever it was, requests are still looked for
+                    tracing::debug!(?error, "waiting for shared-memory requests");
+                    std::thread::sleep(PAUSE);
                 }
             }
         }

@@ -277,6 +277,12 @@ pub enum Refusal {
         /// The limit.
         overloaded: Overloaded,
     },
+    /// A message over the size limit.
+    #[error("{reason}; send smaller batches, or raise grpc.max_message_bytes")]
+    MessageTooLong {
+        /// Its size and the limit.
+        reason: String,
+    },
     /// The caller's deadline passed before the answer was complete.
     #[error("the deadline passed {}", .answered.map_or_else(|| "before the computation".into(), |n| format!("after {n} states")))]
     DeadlineExceeded {
@@ -306,7 +312,7 @@ impl Refusal {
         match self {
             Self::UnknownVehicle(_) => Code::NotFound,
             Self::NotReady => Code::Unavailable,
-            Self::Overloaded { .. } => Code::ResourceExhausted,
+            Self::Overloaded { .. } | Self::MessageTooLong { .. } => Code::ResourceExhausted,
             Self::DeadlineExceeded { .. } => Code::DeadlineExceeded,
             Self::Invalid { .. }
             | Self::MissingState
@@ -334,7 +340,8 @@ impl Refusal {
                 ErrorDetails::with_resource_info("wade.v1.Vehicle", unknown.name.as_str(), "", message)
             }
             Self::Overloaded { .. } | Self::NotReady => ErrorDetails::with_retry_info(Some(RETRY_AFTER)),
-            Self::DeadlineExceeded { .. } => ErrorDetails::new(),
+            // the same message would be refused again, so there is no time to retry after
+            Self::DeadlineExceeded { .. } | Self::MessageTooLong { .. } => ErrorDetails::new(),
             Self::Invalid { invalid, index } => {
                 let name = invalid.field.name();
                 let field = index.map_or_else(|| format!("state.{name}"), |i| format!("{name}[{i}]"));

@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nix::sys::prctl;
 
-use super::{clock::Clock, pin::pin_to_core, schedule::Rate};
+use super::{clock::Clock, schedule::Rate};
+use crate::cores;
 
 /// About how often the control wakes where requests are far apart [ns].
 const PERIOD_NS: f64 = 10e6;
@@ -88,7 +89,7 @@ pub(super) fn watch(
     mut overshoots: Vec<Overshoot>,
     stop: &AtomicBool,
 ) -> Hiccups {
-    let core = core.filter(|&core| pin_to_core(core).is_ok());
+    let core = core.filter(|&core| cores::pin_to(&[core]).is_ok());
     // by default the kernel may delay a sleep by 50 us to save wake-ups; where it refuses, the median shows it
     let _ = prctl::set_timerslack(1);
     for due in (0..).map(|index| deadlines.at(index)).take_while(|&due| due < end) {

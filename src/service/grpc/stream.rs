@@ -7,10 +7,10 @@ use std::task::{Context, Poll};
 
 use tokio::sync::watch;
 use tokio_stream::Stream;
-use tonic::{Status, Streaming};
+use tonic::{Code, Status, Streaming};
 
 use super::handlers::{Call, answer};
-use super::{Shared, stopped};
+use super::{Shared, size_limit, stopped};
 use crate::engine::Permit;
 use crate::model::Model;
 use crate::service::proto;
@@ -58,6 +58,7 @@ impl Stream for Answers {
         }
         let answer = match Pin::new(&mut self.requests).poll_next(context) {
             Poll::Ready(Some(Ok(request))) => self.answer(request),
+            Poll::Ready(Some(Err(status))) if status.code() == Code::OutOfRange => Err(size_limit(&status)),
             Poll::Ready(Some(Err(status))) => Err(status),
             Poll::Ready(None) => return Poll::Ready(None),
             Poll::Pending if self.stop.as_mut().poll(context).is_ready() => {
