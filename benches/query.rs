@@ -1,62 +1,25 @@
-//! Time of a query in process, by vehicle and instruction set, beside its controls from the same run: what the core can
-//! do at most, the plain-loop reference, and an empty measurement. Nothing here fails on a time.
+//! Time of a query in process, by vehicle and instruction set, beside its controls from the same run: an empty
+//! measurement, the plain-loop reference, and the floor, what layer 2 would take at the peak of the core if no input were
+//! left out. Nothing here fails on a time.
 //!
 //! `cargo bench --bench query [-- --out benches/results]` prints a table, and writes it as CSV with machine and commit.
 #![allow(unsafe_code, reason = "the peak of the core is measured behind a CPU check")]
 
-use std::fmt::Write;
+mod common;
+
 use std::hint::black_box;
 use std::path::PathBuf;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 
-use hdrhistogram::Histogram;
+use common::{Row, Subject, Table};
 use wade::bundle;
 use wade::condition::Condition;
-use wade::features;
 use wade::forces::Forces;
 use wade::frame::{Vec3, WaterPlane, up_from_roll_pitch};
 use wade::geometry::hydrostatics::hydrostatics;
 use wade::model::kernel::Isa;
 use wade::model::network::WIDTH;
 use wade::model::{Model, Workspace};
-
-/// Each subject is measured in this many turns, one after the other, so that a drift of the machine meets all.
-const TURNS: usize = 10;
-/// Length of a turn.
-const TURN: Duration = Duration::from_millis(300);
-
-/// A row of the table.
-struct Row {
-    subject: String,
-    histogram: Histogram<u64>,
-    /// Multiply-adds of layer 2, where the subject has one.
-    multiply_adds: u64,
-}
-
-impl Row {
-    fn new(subject: impl Into<String>, multiply_adds: u64) -> Self {
-        let histogram = Histogram::new_with_bounds(1, 1_000_000_000, 3).expect("valid bounds");
-        Self { subject: subject.into(), histogram, multiply_adds }
-    }
-
-    fn us(&self, quantile: f64) -> f64 {
-        self.histogram.value_at_quantile(quantile) as f64 * 1e-3
-    }
-}
-
-/// Times each call of `work` for one turn.
-fn turn(row: &mut Row, work: &mut dyn FnMut()) {
-    let end = Instant::now() + TURN;
-    loop {
-        let start = Instant::now();
-        work();
-        let now = Instant::now();
-        row.histogram.saturating_record((now - start).as_nanos() as u64);
-        if now >= end {
-            break;
-        }
-    }
-}
 
 fn model(vehicle: &str, isa: Isa) -> Model {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles").join(vehicle);
@@ -74,26 +37,6 @@ fn all_wet(model: &Model) -> Condition {
 
 fn layer2(model: &Model) -> u64 {
     (model.vehicle().surfaces.len() * WIDTH * WIDTH) as u64
-}
-
-/// The reference network over every surface's row.
-fn reference(model: &Model, condition: &Condition) -> f32 {
-    let (vehicle, weights) = (model.vehicle(), model.weights());
-    let plane = condition.water_plane(vehicle.z0);
-    let global = weights.scaling.standardize(&features::global(condition, &vehicle.dimensions));
-    let direction = features::direction(&condition.velocity);
-    let rows = vehicle.surfaces.iter().zip(&vehicle.samples.surfaces).map(|(surface, samples)| {
-        let wet = samples.submergence(&plane);
-        let mut row = [0.0; features::INPUTS];
-        let fixed = features::surface_static(surface, &vehicle.dimensions).map(|x| x as f32);
-        let dynamic =
-            features::surface_dynamic(surface, &wet, &direction, &vehicle.dimensions).map(|x| x as f32);
-        row[..features::STATIC].copy_from_slice(&fixed);
-        row[features::STATIC..features::STATIC + features::DYNAMIC].copy_from_slice(&dynamic);
-        row[features::STATIC + features::DYNAMIC..].copy_from_slice(&global);
-        weights.network.forward(&row)[2]
-    });
-    rows.sum()
 }
 
 /// Rounds of twelve independent vector multiply-adds on registers alone: what the core can do at most.
@@ -146,114 +89,69 @@ fn peak() -> f64 {
     times.fold(0.0, f64::max)
 }
 
-fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    let out =
-        arguments.iter().position(|a| a == "--out").and_then(|i| arguments.get(i + 1)).map(PathBuf::from);
-    let mut subjects: Vec<(Row, Box<dyn FnMut()>)> = vec![(Row::new("nothing", 0), Box::new(|| ()))];
-    for vehicle in ["husky", "warthog"] {
-        for isa in Isa::available() {
-            let model = model(vehicle, isa);
-            let (condition, multiply_adds) = (all_wet(&model), layer2(&model));
-            let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
-            let work = move || model.evaluate(black_box(&condition), &mut workspace, &mut forces);
-            subjects
-                .push((Row::new(format!("{vehicle} query {}", isa.name()), multiply_adds), Box::new(work)));
+/// The query of a model in a state, `times` in a row.
+fn query(name: String, model: Model, condition: Condition, times: u64) -> Subject {
+    let row = Row::new(name, times * layer2(&model));
+    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    let work = move || {
+        for _ in 0..times {
+            model.evaluate(black_box(&condition), &mut workspace, &mut forces);
         }
-        let isa = Isa::available()[0];
-        let tilted = model(vehicle, isa);
-        let condition = Condition { up: up_from_roll_pitch(0.02, 0.05), ..all_wet(&tilted) };
-        let multiply_adds = layer2(&tilted);
-        let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
-        let work = move || tilted.evaluate(black_box(&condition), &mut workspace, &mut forces);
-        subjects.push((
-            Row::new(format!("{vehicle} query {} tilted", isa.name()), multiply_adds),
-            Box::new(work),
-        ));
-
-        let batch = model(vehicle, isa);
-        let condition = all_wet(&batch);
-        let multiply_adds = 256 * layer2(&batch);
-        let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
-        let work = move || {
-            for _ in 0..256 {
-                batch.evaluate(black_box(&condition), &mut workspace, &mut forces);
-            }
-        };
-        subjects
-            .push((Row::new(format!("{vehicle} 256 queries {}", isa.name()), multiply_adds), Box::new(work)));
-
-        let plain = model(vehicle, isa);
-        let condition = all_wet(&plain);
-        let multiply_adds = layer2(&plain);
-        let work = move || {
-            black_box(reference(&plain, black_box(&condition)));
-        };
-        subjects.push((Row::new(format!("{vehicle} reference"), multiply_adds), Box::new(work)));
-
-        let wet = model(vehicle, isa);
-        let level = WaterPlane::level(wet.vehicle().z0, 0.5 * wet.vehicle().dimensions.height);
-        let tilted = WaterPlane { normal: up_from_roll_pitch(0.05, 0.1), ..level };
-        for (name, plane) in [("level", level), ("tilted", tilted)] {
-            let samples = wet.vehicle().samples.clone();
-            let work = move || {
-                for surface in &samples.surfaces {
-                    black_box(surface.submergence(black_box(&plane)));
-                }
-            };
-            subjects.push((Row::new(format!("{vehicle} submergence {name}"), 0), Box::new(work)));
-        }
-        let work = move || {
-            let vehicle = wet.vehicle();
-            black_box(hydrostatics(&vehicle.hull.mesh, black_box(&level), 1000.0, &vehicle.center_of_mass));
-        };
-        subjects.push((Row::new(format!("{vehicle} exact hydrostatics"), 0), Box::new(work)));
-    }
-    for _ in 0..TURNS {
-        for (row, work) in &mut subjects {
-            turn(row, work.as_mut());
-        }
-    }
-    let peak = peak();
-    let mut csv = String::from(
-        "subject,count,p50_us,p99_us,p99_9_us,max_us,dense_share_of_peak,multiply_adds_per_s_peak\n",
-    );
-    println!(
-        "dense / peak: layer 2 as if no input were left out, against the peak of the core in the same run"
-    );
-    println!("peak of the core: {:.1} GFLOP/s in single precision", 2e-9 * peak);
-    println!(
-        "{:<30} {:>10} {:>10} {:>10} {:>14}",
-        "subject", "p50 [us]", "p99 [us]", "p99.9 [us]", "dense / peak"
-    );
-    for (row, _) in &subjects {
-        let share = row.multiply_adds as f64 / (row.us(0.5) * 1e-6) / peak;
-        let shown = if row.multiply_adds == 0 { String::new() } else { format!("{:.1} %", 100.0 * share) };
-        let (p50, p99, p99_9) = (row.us(0.5), row.us(0.99), row.us(0.999));
-        println!("{:<30} {p50:>10.2} {p99:>10.2} {p99_9:>10.2} {shown:>14}", row.subject);
-        let max = row.us(1.0);
-        let count = row.histogram.len();
-        // writing to a String cannot fail
-        let _ = writeln!(
-            csv,
-            "{},{count},{p50:.3},{p99:.3},{p99_9:.3},{max:.3},{share:.4},{peak:.4e}",
-            row.subject
-        );
-    }
-    if let Some(folder) = out {
-        write(&folder, &csv);
-    }
+    };
+    (row, Box::new(work))
 }
 
-fn write(folder: &std::path::Path, csv: &str) {
-    let days = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs() / 86_400;
-    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let cpu =
-        cpu.lines().find_map(|line| line.strip_prefix("model name\t: ")).unwrap_or("unknown").to_owned();
-    let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let header = format!("# commit {}, {cpu}, {cores} cores, day {days} since 1970\n", env!("WADE_COMMIT"));
-    let path = folder.join("query.csv");
-    std::fs::create_dir_all(folder).expect("the folder");
-    std::fs::write(&path, header + csv).expect("the table");
-    println!("{}", path.display());
+fn queries(vehicle: &str) -> Vec<Subject> {
+    let best = Isa::available()[0];
+    let of = |isa: Isa| model(vehicle, isa);
+    let name = |what: &str, isa: Isa| format!("{vehicle} {what} {}", isa.name());
+    let wet = all_wet(&of(best));
+    let tilted = Condition { up: up_from_roll_pitch(0.02, 0.05), ..wet };
+    let every_isa = Isa::available().into_iter().map(|isa| query(name("query", isa), of(isa), wet, 1));
+    let mut subjects: Vec<Subject> = every_isa.collect();
+    subjects.push(query(name("tilted query", best), of(best), tilted, 1));
+    subjects.push(query(name("256 queries", best), of(best), wet, 256));
+    let plain = of(best);
+    let row = Row::new(format!("{vehicle} reference, plain loops"), layer2(&plain));
+    let work = move || {
+        black_box(plain.reference(black_box(&wet)));
+    };
+    subjects.push((row, Box::new(work)));
+    subjects
+}
+
+fn parts(vehicle: &str) -> Vec<Subject> {
+    let model = model(vehicle, Isa::available()[0]);
+    let level = WaterPlane::level(model.vehicle().z0, 0.5 * model.vehicle().dimensions.height);
+    let tilted = WaterPlane { normal: up_from_roll_pitch(0.05, 0.1), ..level };
+    let mut subjects: Vec<Subject> = Vec::new();
+    for (name, plane) in [("level", level), ("tilted", tilted)] {
+        let samples = model.vehicle().samples.clone();
+        let work = move || {
+            for surface in &samples.surfaces {
+                black_box(surface.submergence(black_box(&plane)));
+            }
+        };
+        subjects.push((Row::new(format!("{vehicle} submergence {name}"), 0), Box::new(work)));
+    }
+    let work = move || {
+        let vehicle = model.vehicle();
+        black_box(hydrostatics(&vehicle.hull.mesh, black_box(&level), 1000.0, &vehicle.center_of_mass));
+    };
+    subjects.push((Row::new(format!("{vehicle} exact hydrostatics"), 0), Box::new(work)));
+    subjects
+}
+
+fn main() {
+    let mut subjects: Vec<Subject> = vec![(Row::new("control: nothing", 0), Box::new(|| ()))];
+    for vehicle in ["husky", "warthog"] {
+        subjects.extend(queries(vehicle));
+        subjects.extend(parts(vehicle));
+    }
+    common::measure(&mut subjects);
+    let mut table = Table::new("query");
+    table.set_peak(peak());
+    table.add(subjects);
+    table.print();
+    table.write_where_asked();
 }

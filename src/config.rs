@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::service::{grpc, http, run, shm};
+use crate::service::{grpc, http, shm};
 
 /// Settings of `wade serve`: the file deploy/wade.toml shows every key with its default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -122,7 +122,7 @@ impl Config {
         range(streams >= 1, "grpc.max_streams_per_connection", &streams, "1 or more")?;
         range(grpc.keepalive_s >= 1, "grpc.keepalive_s", &grpc.keepalive_s, "1 or more")?;
         let clients = self.shm.max_clients;
-        range((1..=256).contains(&clients), "shm.max_clients", &clients, "1 to 256")?;
+        range((1..=shm::MAX_CLIENTS).contains(&clients), "shm.max_clients", &clients, "1 to 64")?;
         let namespace = &self.shm.namespace;
         let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
         let named = (1..=64).contains(&namespace.len()) && namespace.bytes().all(plain);
@@ -133,6 +133,14 @@ impl Config {
 
     /// The folder of bundles, found where the default is not in the working directory.
     pub fn vehicles_directory(&self) -> PathBuf {
-        run::find_vehicles(&self.vehicles)
+        find_vehicles(&self.vehicles)
     }
+}
+
+/// The folder of bundles: as configured, or where an installation has it.
+fn find_vehicles(configured: &Path) -> PathBuf {
+    let installed =
+        std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join("../share/wade/vehicles")));
+    let fallback = configured == Path::new("vehicles") && !configured.exists();
+    installed.filter(|path| fallback && path.exists()).unwrap_or_else(|| configured.to_owned())
 }

@@ -56,7 +56,7 @@ pub const INPUTS: usize = GLOBAL + STATIC + DYNAMIC;
 const SUBMERGENCE_SCALE: f64 = 0.366;
 
 /// The paper clips the depth Froude number "to a finite range" without giving it. 5 lies above its fastest,
-/// shallowest case (4 m/s in 0.10 m: 4.04).
+/// shallowest case (4 m/s in 0.10 m: 4.04). The length Froude number has the same bound.
 const FROUDE_DEPTH_LIMIT: f64 = 5.0;
 
 /// The global features of a state, not yet standardised.

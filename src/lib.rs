@@ -9,7 +9,7 @@
 //! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`]), the body ([`geometry`], [`vehicle`]), its
 //! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
 //! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), the doors ([`service`], [`client`], [`soak`]), what
-//! learns it ([`train`]), and the settings ([`config`]).
+//! learns it ([`train`]), the settings ([`config`]) and the server as a whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
@@ -33,8 +33,10 @@ pub mod metrics;
 pub mod client;
 pub mod cores;
 pub mod soak;
+pub mod states;
 
 pub mod train;
 
 pub mod config;
+pub mod server;
 pub mod service;

@@ -21,20 +21,31 @@ const BUCKETS_S: [f64; 22] = [
     500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3,
 ];
 
-/// The way a request came in.
+/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, or shared memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EncodeLabelValue)]
 #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
 pub enum Transport {
     grpc_unary,
     grpc_batch,
     grpc_stream,
+    uds_unary,
+    uds_batch,
+    uds_stream,
     shm,
     shm_batch,
 }
 
 impl Transport {
-    const ALL: [Self; 5] =
-        [Self::grpc_unary, Self::grpc_batch, Self::grpc_stream, Self::shm, Self::shm_batch];
+    const ALL: [Self; 8] = [
+        Self::grpc_unary,
+        Self::grpc_batch,
+        Self::grpc_stream,
+        Self::uds_unary,
+        Self::uds_batch,
+        Self::uds_stream,
+        Self::shm,
+        Self::shm_batch,
+    ];
 
     /// The value of the label.
     pub fn name(self) -> &'static str {
@@ -42,6 +53,9 @@ impl Transport {
             Self::grpc_unary => "grpc_unary",
             Self::grpc_batch => "grpc_batch",
             Self::grpc_stream => "grpc_stream",
+            Self::uds_unary => "uds_unary",
+            Self::uds_batch => "uds_batch",
+            Self::uds_stream => "uds_stream",
             Self::shm => "shm",
             Self::shm_batch => "shm_batch",
         }
@@ -269,12 +283,16 @@ impl Metrics {
         let rows = Transport::ALL.into_iter().zip(&self.recorders).flat_map(|(transport, recorders)| {
             let recorders = recorders.read().unwrap_or_else(PoisonError::into_inner);
             let row = |(vehicle, recorder): (&String, &Arc<Recorder>)| {
-                let histograms = lock(&recorder.histograms);
+                // copied first: a query must not wait while percentiles are looked up
+                let (since_start, window) = {
+                    let histograms = lock(&recorder.histograms);
+                    (histograms.since_start.clone(), histograms.last.clone())
+                };
                 Latency {
                     transport,
                     vehicle: vehicle.clone(),
-                    since_start: Percentiles::of(&histograms.since_start),
-                    window: Percentiles::of(&histograms.last),
+                    since_start: Percentiles::of(&since_start),
+                    window: Percentiles::of(&window),
                 }
             };
             recorders.iter().map(row).collect::<Vec<_>>()

@@ -1,6 +1,6 @@
 //! Force and moment about a stated point.
 
-use std::ops::{Add, AddAssign, Sub};
+use std::ops::{Add, AddAssign};
 
 use crate::frame::Vec3;
 
@@ -35,13 +35,6 @@ impl Add for Wrench {
 impl AddAssign for Wrench {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
-    }
-}
-
-impl Sub for Wrench {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        Self { force: self.force - other.force, moment: self.moment - other.moment }
     }
 }
 

@@ -90,6 +90,9 @@ fn every_file_is_needed_and_its_absence_named() {
     }
 }
 
+/// What a test does to the bytes of a file.
+type Change = Box<dyn FnOnce(Vec<u8>) -> Vec<u8>>;
+
 #[test]
 fn faults_behind_a_good_checksum_are_named() {
     let nan = |tensor: &'static str| {
@@ -102,7 +105,7 @@ fn faults_behind_a_good_checksum_are_named() {
             bytes
         }
     };
-    let cases: Vec<(&str, Box<dyn FnOnce(Vec<u8>) -> Vec<u8>>, &str)> = vec![
+    let cases: Vec<(&str, Change, &str)> = vec![
         ("network.safetensors", Box::new(nan("w2")), "tensor w2"),
         ("network.safetensors", Box::new(nan("global_std")), "tensor global_std"),
         (

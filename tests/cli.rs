@@ -20,8 +20,22 @@ fn json(arguments: &[&str]) -> Value {
 
 #[test]
 fn every_subcommand_shows_an_example() {
-    for command in ["", "serve", "query", "predict", "soak", "vehicle", "train"] {
-        let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|a| !a.is_empty()).collect();
+    let commands = [
+        "",
+        "serve",
+        "query",
+        "predict",
+        "soak",
+        "vehicle",
+        "vehicle build",
+        "vehicle generate",
+        "vehicle check",
+        "vehicle list",
+        "vehicle show",
+        "train",
+    ];
+    for command in commands {
+        let arguments: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();
         let output = wade(&arguments);
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success() && text.contains("Example"), "{command}: {text}");
@@ -176,4 +190,24 @@ fn a_table_of_states_gets_its_forces() {
         2,
         "nothing is lost"
     );
+}
+
+#[test]
+fn a_bundle_never_takes_the_place_of_other_files() {
+    let folder = TempDir::new().expect("a folder");
+    let husky = folder.path().join("husky");
+    std::fs::create_dir(&husky).expect("made");
+    std::fs::write(husky.join("thesis.tex"), "irreplaceable").expect("written");
+    for out in [husky.clone(), folder.path().to_owned(), folder.path().join(".")] {
+        let output = wade(&["vehicle", "generate", "husky", "--out", &out.to_string_lossy()]);
+        assert_eq!(output.status.code(), Some(1), "{}", out.display());
+    }
+    assert_eq!(std::fs::read_to_string(husky.join("thesis.tex")).expect("still there"), "irreplaceable");
+}
+
+#[test]
+fn the_readme_is_finished() {
+    let readme =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).expect("readable");
+    assert!(!readme.contains("@@"), "a figure is missing");
 }

@@ -33,6 +33,6 @@ fn a_value_out_of_range_is_named() {
 fn an_address_that_is_none_is_refused_and_never_binds_another() {
     let mut config = Config::default();
     config.grpc.listen = "localhost".into();
-    let error = wade::service::run::start(&config).expect_err("refused").to_string();
+    let error = wade::server::start(&config).expect_err("refused").to_string();
     assert!(error.contains("grpc.listen"), "{error}");
 }

@@ -325,7 +325,7 @@ fn a_server_that_cannot_read_its_bundles_never_says_serving() {
     let other = tempfile::TempDir::new().expect("a folder");
     let mut config = common::config(other.path());
     config.vehicles = folder.path().to_owned();
-    let error = wade::service::run::start(&config).expect_err("a damaged bundle").to_string();
+    let error = wade::server::start(&config).expect_err("a damaged bundle").to_string();
     assert!(error.contains("network.safetensors"), "{error}");
     assert!(!config.grpc.unix_socket.exists(), "the socket is gone with the server");
 }
@@ -381,4 +381,50 @@ fn a_connection_that_never_speaks_does_not_hold_up_a_drain() {
     let start = Instant::now();
     served.running.shutdown();
     assert!(start.elapsed() < Duration::from_secs(10), "bounded by drain_s: {:?}", start.elapsed());
+}
+
+#[test]
+fn a_file_in_the_place_of_the_socket_is_not_removed() {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let mut config = common::config(folder.path());
+    std::fs::write(&config.grpc.unix_socket, "settings").expect("written");
+    wade::server::start(&config).expect_err("the place is taken");
+    assert_eq!(std::fs::read_to_string(&config.grpc.unix_socket).expect("still there"), "settings");
+    config.grpc.unix_socket = folder.path().join("other.sock");
+    // a socket that nobody listens on any more is taken over
+    drop(std::os::unix::net::UnixListener::bind(&config.grpc.unix_socket).expect("bound"));
+    assert!(config.grpc.unix_socket.exists());
+    wade::server::start(&config).expect("a stale socket is replaced").shutdown();
+}
+
+#[test]
+fn a_vehicle_without_weights_is_left_out_and_the_others_are_served() {
+    let folder = common::copy_of_vehicles();
+    let path = folder.path().join("warthog");
+    let untrained = wade::bundle::read(&path).expect("sound");
+    wade::bundle::write(&path, &wade::bundle::Bundle { trained: None, ..untrained }).expect("written");
+    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    runtime().block_on(async {
+        let mut client = client(&served).await;
+        let list = client.list_vehicles(proto::ListVehiclesRequest {}).await.expect("listed").into_inner();
+        let names: Vec<_> = list.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
+        assert_eq!(names, ["husky"]);
+    });
+}
+
+#[test]
+fn a_watch_of_our_health_hears_the_end_and_does_not_hold_up_a_drain() {
+    let served = Served::with(|config| config.drain_s = 3600.0);
+    let runtime = runtime();
+    let mut states = runtime.block_on(async {
+        let mut health = HealthClient::new(channel(&served).await);
+        health.watch(HealthCheckRequest { service: String::new() }).await.expect("watched").into_inner()
+    });
+    let stopping = std::thread::spawn(move || served.running.shutdown());
+    let mut seen = Vec::new();
+    while let Ok(Some(state)) = runtime.block_on(states.message()) {
+        seen.push(state.status());
+    }
+    assert_eq!(seen.last(), Some(&ServingStatus::NotServing), "{seen:?}");
+    stopping.join().expect("stopped long before its bound of an hour");
 }

@@ -3,10 +3,13 @@
 mod common;
 
 use common::{Numbers, VEHICLES, model};
+use wade::analytic;
 use wade::condition::{Condition, GroundContact};
 use wade::forces::Forces;
 use wade::frame::{GRAVITY, Vec3};
 use wade::model::{Model, Workspace};
+use wade::train::plan::Table;
+use wade::train::random::Random;
 
 fn evaluate(model: &Model, condition: &Condition) -> Forces {
     let mut forces = Forces::default();
@@ -97,4 +100,31 @@ fn states_beyond_the_training_domain_are_answered_and_marked() {
     assert_eq!(quantity, wade::domain::Quantity::Depth);
     assert!((excess - 0.10).abs() < 1e-9);
     assert!(forces.wrench.force.z > 0.0);
+}
+
+#[test]
+fn the_shipped_weights_answer_what_they_were_taught() {
+    let tables = [Table::HUSKY, Table::WARTHOG];
+    for (vehicle, table) in VEHICLES.into_iter().zip(tables) {
+        let model = model(vehicle);
+        assert_eq!(model.weights().provenance, analytic::PROVENANCE);
+        // cases of another seed than those of the training
+        let cases = table.latin_hypercube(100, &mut Random::new(99));
+        let stated = Vec3::from(model.weights().held_out_rms);
+        let within = cases.iter().filter(|condition| {
+            let taught: Vec3 = analytic::loads(model.vehicle(), condition).iter().sum();
+            let error = (evaluate(&model, condition).wrench.force - taught) / condition.density;
+            error.iter().zip(&stated).all(|(error, stated)| error.abs() < 3.0 * stated)
+        });
+        // a case or two in the fast, deep corners of the table are worse than what was held out
+        let within = within.count();
+        assert!(within >= 90, "{vehicle}: {within} of 100 cases are within three times the stated error");
+    }
+}
+
+#[test]
+fn a_wheel_that_only_just_touches_the_water_feels_nothing_below_either_convention() {
+    let condition = Condition { ground_contact: GroundContact::Dry, ..Condition::level(Vec3::zeros(), 1e-9) };
+    let forces = evaluate(&model("husky"), &condition);
+    assert!(forces.surfaces.iter().all(|load| load.wetted_fraction > 0.0 || load.force == Vec3::zeros()));
 }

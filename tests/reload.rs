@@ -114,19 +114,22 @@ fn reloads_every_second_under_load_cause_no_error_and_no_mixture() {
                     let clients = served.clients("husky");
                     let (_, mut client) = clients.into_iter().find(|(n, _)| *n == name).expect("known");
                     let mut versions = vec![0];
-                    let mut quiet = Histogram::<u64>::new(3).expect("valid");
+                    let mut latency = [(); 2].map(|()| Histogram::<u64>::new(3).expect("valid"));
+                    let begin = Instant::now();
                     let forces = client.evaluate(&state()).expect("answered").force;
                     while !stop.load(Ordering::Relaxed) {
                         let start = Instant::now();
                         let reply = client.evaluate(&state()).expect("no error while bundles are swapped");
-                        quiet.saturating_record(start.elapsed().as_nanos() as u64);
+                        // the first second comes before the first reload: the control
+                        let reloading = usize::from(begin.elapsed() > Duration::from_secs(1));
+                        latency[reloading].saturating_record(start.elapsed().as_nanos() as u64);
                         assert_eq!(reply.force, forces, "every version has these weights");
                         if versions.last() != Some(&reply.version) {
                             versions.push(reply.version);
                         }
                         std::thread::sleep(Duration::from_millis(1));
                     }
-                    (versions, quiet)
+                    (versions, latency)
                 })
             })
             .collect();
@@ -143,11 +146,10 @@ fn reloads_every_second_under_load_cause_no_error_and_no_mixture() {
             assert!(versions.is_sorted(), "{name}: never back to an older version: {versions:?}");
             assert_eq!(versions.len() as u32, RELOADS + 2, "{name}: every version was seen: {versions:?}");
             // shown, not asserted: a time depends on the machine
-            println!(
-                "{name}: p50 {} us, p99 {} us",
-                latency.value_at_quantile(0.5) / 1000,
-                latency.value_at_quantile(0.99) / 1000
-            );
+            for (what, latency) in ["without reloads", "with"].into_iter().zip(&latency) {
+                let us = |quantile| latency.value_at_quantile(quantile) / 1000;
+                println!("{name}, {what}: p50 {} us, p99 {} us of {}", us(0.5), us(0.99), latency.len());
+            }
         }
     });
 }

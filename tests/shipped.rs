@@ -97,13 +97,13 @@ fn at(vehicle: &Vehicle, row: &Row, link: f64) -> Hydrostatics {
     hydrostatics(&vehicle.hull.mesh, &plane, FRESH_WATER, &Vec3::new(0.0, 0.0, vehicle.z0 + link))
 }
 
-/// What a row may differ by: the issue asks for 10 % of every vertical force of the level table; 2 N for the rows of
-/// a few tens of newtons.
+/// A row may differ by 10 % of its vertical force; a tilted one, of which the table's plane is uncertain, by 2 N more.
 fn assert_forces(vehicle: &Vehicle, rows: &[Row], link: f64) {
     for row in rows {
         let force = at(vehicle, row, link).wrench.force;
         let off = (force - Vec3::from(row.3)).norm();
-        assert!(off < 0.10 * row.3[2] + 2.0, "{}: {row:?} but {force:?}", vehicle.name);
+        let slack = if (row.1, row.2) == (0.0, 0.0) { 0.0 } else { 2.0 };
+        assert!(off < 0.10 * row.3[2] + slack, "{}: {row:?} but {force:?}", vehicle.name);
     }
 }
 

@@ -82,7 +82,9 @@ fn a_living_client_finds_a_killed_and_restarted_server_again() {
         assert!(!error.is_empty());
 
         let _server = Process::start(folder.path(), &namespace, name);
+        let start = Instant::now();
         let after = until_answered(&mut client);
+        println!("{name}: found again {:?} after the new server was started", start.elapsed());
         assert_eq!(after.force_n, before.force_n, "{name}: the same bits from the new server");
     }
 }
@@ -225,4 +227,36 @@ fn requests_that_nobody_waits_for_do_not_hold_up_the_others() {
         drop(raw.single.send_copy(Query::from(&state())).expect("sent"));
         client.evaluate(&state()).expect("answered");
     }
+}
+
+#[test]
+fn a_client_that_never_waits_does_not_starve_the_others() {
+    let served = Served::with(|config| config.shm.wait = Wait::Spin);
+    let raw = Raw::new(&served);
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            for _ in 0..100 {
+                client_turn(&served);
+            }
+            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
+        // two requests alive at any time, each replaced as soon as it is answered
+        let mut alive: Vec<_> =
+            (0..2).map(|_| raw.single.send_copy(Query::from(&state())).expect("sent")).collect();
+        while !stop.load(std::sync::atomic::Ordering::Relaxed) {
+            for pending in &mut alive {
+                if pending.receive().expect("received").is_some()
+                    && let Ok(next) = raw.single.send_copy(Query::from(&state()))
+                {
+                    *pending = next;
+                }
+            }
+        }
+    });
+}
+
+/// One answer on a client of its own.
+fn client_turn(served: &Served) {
+    served.shm("husky", Wait::Spin).evaluate(&state()).expect("answered beside the others");
 }

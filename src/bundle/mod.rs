@@ -39,6 +39,8 @@ const SUBMERGENCE_FILE: &str = "submergence.safetensors";
 const NETWORK_FILE: &str = "network.safetensors";
 const SPEC_FILE: &str = "spec.toml";
 const SUMS_FILE: &str = "SHA256SUMS";
+const FILES: [&str; 8] =
+    [VEHICLE_FILE, HULL_FILE, PATCHES_FILE, SDF_FILE, SUBMERGENCE_FILE, NETWORK_FILE, SPEC_FILE, SUMS_FILE];
 
 /// Format of the bundles that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;
@@ -102,6 +104,12 @@ pub enum Fault {
     #[error("name = \"{name}\" must be 1 to 64 of a-z, 0-9, - and _")]
     NameSyntax {
         /// The name in the file.
+        name: String,
+    },
+    /// A file that is no part of a bundle, in a folder that a bundle would replace.
+    #[error("holds {name}, which is no part of a bundle: writing a bundle here would delete it")]
+    ForeignFile {
+        /// The file.
         name: String,
     },
     /// A line that is no checksum and file name.
@@ -267,8 +275,28 @@ pub fn read(directory: &Path) -> Result<Bundle, BundleError> {
     })
 }
 
+/// Refuses a place that a bundle of this name may not take: another name's folder, or one with other files in it.
+pub fn check_place(directory: &Path, name: &str) -> Result<(), BundleError> {
+    let placed = || {
+        vehicle_file::check_name(name, directory)?;
+        let entries = match fs::read_dir(directory) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+            entries => entries?,
+        };
+        for entry in entries {
+            let file = entry?.file_name();
+            if !FILES.iter().any(|known| file == *known) {
+                return Err(Fault::ForeignFile { name: file.to_string_lossy().into_owned() });
+            }
+        }
+        Ok(())
+    };
+    placed().map_err(at(directory))
+}
+
 /// Writes a bundle beside its place and then puts it there, so that a reader sees the one before or this one.
 pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
+    check_place(directory, &bundle.vehicle.name)?;
     let mut files = BTreeMap::from([
         (VEHICLE_FILE, VehicleFile::new(bundle).to_toml().into_bytes()),
         (HULL_FILE, write_stl(&bundle.vehicle.hull.mesh)),
@@ -283,7 +311,7 @@ pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
         files.insert(SPEC_FILE, spec.clone().into_bytes());
     }
     files.insert(SUMS_FILE, checksums::render(&files).into_bytes());
-    let staged = directory.with_extension("new");
+    let staged = directory.with_file_name(format!("{}.new", bundle.vehicle.name));
     let stage = || {
         let _ = fs::remove_dir_all(&staged);
         fs::create_dir_all(&staged)?;

@@ -15,6 +15,11 @@ use crate::geometry::submergence::Samples;
 use crate::model::Weights;
 use crate::model::network::{Network, OUTPUTS, Scaling, WIDTH};
 
+/// No weight or statistic is larger: with 256 inputs a layer and bounded states, every sum then stays finite.
+const LARGEST: f32 = 1e6;
+/// No standard deviation is smaller.
+const LEAST_DEVIATION: f32 = 1e-9;
+
 /// What is wrong with a tensor file.
 #[derive(Debug, thiserror::Error)]
 pub enum TensorError {
@@ -45,8 +50,16 @@ pub enum TensorError {
         /// Index of the number.
         index: usize,
     },
-    /// A standard deviation of zero or below.
-    #[error("tensor {name} holds a standard deviation that is not positive at {index}")]
+    /// A number so large that products with it would not stay finite.
+    #[error("tensor {name} holds a number beyond {LARGEST} at {index}")]
+    TooLarge {
+        /// The tensor.
+        name: &'static str,
+        /// Index of the number.
+        index: usize,
+    },
+    /// A standard deviation of zero or below, or too small to divide by.
+    #[error("tensor {name} holds a standard deviation below {LEAST_DEVIATION} at {index}")]
     NotPositive {
         /// The tensor.
         name: &'static str,
@@ -122,8 +135,11 @@ impl<'a> File<'a> {
     fn floats(&self, name: &'static str, shape: &[Option<usize>]) -> Result<Vec<f32>, TensorError> {
         let view = self.view(name, Dtype::F32, shape)?;
         let values: Vec<f32> = numbers(view.data(), f32::from_le_bytes);
-        match values.iter().position(|value| !value.is_finite()) {
-            Some(index) => Err(TensorError::NotFinite { name, index }),
+        if let Some(index) = values.iter().position(|value| !value.is_finite()) {
+            return Err(TensorError::NotFinite { name, index });
+        }
+        match values.iter().position(|value| value.abs() > LARGEST) {
+            Some(index) => Err(TensorError::TooLarge { name, index }),
             None => Ok(values),
         }
     }
@@ -135,7 +151,7 @@ impl<'a> File<'a> {
 
     fn deviations<const N: usize>(&self, name: &'static str) -> Result<[f32; N], TensorError> {
         let values = self.array::<N>(name)?;
-        match values.iter().position(|&value| value <= 0.0) {
+        match values.iter().position(|&value| value < LEAST_DEVIATION) {
             Some(index) => Err(TensorError::NotPositive { name, index }),
             None => Ok(values),
         }

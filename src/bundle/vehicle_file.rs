@@ -10,6 +10,7 @@ use crate::domain::{Domain, Quantity};
 use crate::frame::Vec3;
 use crate::geometry::submergence::Samples;
 use crate::geometry::surfaces::Hull;
+use crate::vehicle::spec::BodyFromStl;
 use crate::vehicle::{ContactPatch, Dimensions, Surface, SurfaceKind, Vehicle};
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -30,6 +31,10 @@ pub struct VehicleFile {
     inertia_kgm2: [[f64; 3]; 3],
     symmetric_left_right: bool,
     symmetric_front_rear: bool,
+    /// What was added after scale and axes of the STL [m].
+    body_from_stl_translation_m: [f64; 3],
+    /// Scale and axes of the STL that the hull came from.
+    body_from_stl: BodyFromStl,
     #[serde(skip_serializing_if = "Option::is_none")]
     domain: Option<Domain>,
     surface: Vec<SurfaceEntry>,
@@ -58,6 +63,19 @@ struct ContactEntry {
     area_m2: f64,
 }
 
+/// A name that can be part of a path and of a service's name, and that is its folder's.
+pub fn check_name(name: &str, directory: &Path) -> Result<(), Fault> {
+    let allowed = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
+    if name.is_empty() || name.len() > 64 || !name.bytes().all(allowed) {
+        return Err(Fault::NameSyntax { name: name.to_owned() });
+    }
+    // a path that ends in . or .. has no name of its own
+    if directory.file_name().is_none_or(|folder| folder != name) {
+        return Err(Fault::Name { name: name.to_owned() });
+    }
+    Ok(())
+}
+
 impl VehicleFile {
     /// Reads the file and checks what it says of itself.
     pub fn parse(bytes: &[u8], directory: &Path) -> Result<Self, Fault> {
@@ -71,14 +89,7 @@ impl VehicleFile {
             return Err(Fault::NewerFormat { found: format });
         }
         let file: Self = toml::from_str(&text)?;
-        let name = file.name.clone();
-        let allowed = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
-        if name.is_empty() || name.len() > 64 || !name.bytes().all(allowed) {
-            return Err(Fault::NameSyntax { name });
-        }
-        if directory.file_name().is_some_and(|folder| folder != name.as_str()) {
-            return Err(Fault::Name { name });
-        }
+        check_name(&file.name, directory)?;
         Ok(file)
     }
 
@@ -111,6 +122,8 @@ impl VehicleFile {
             mass_kg: vehicle.mass,
             center_of_mass_m: vehicle.center_of_mass.into(),
             inertia_kgm2: std::array::from_fn(|i| std::array::from_fn(|j| vehicle.inertia[(i, j)])),
+            body_from_stl: vehicle.body_from_stl,
+            body_from_stl_translation_m: vehicle.translation.into(),
             symmetric_left_right: vehicle.symmetric_left_right,
             symmetric_front_rear: vehicle.symmetric_front_rear,
             domain: bundle.trained.as_ref().map(|&(_, domain)| domain),
@@ -152,6 +165,8 @@ impl VehicleFile {
             mass: self.mass_kg,
             inertia: Matrix3::from_fn(|i, j| self.inertia_kgm2[i][j]),
             center_of_mass: Vec3::from(self.center_of_mass_m),
+            body_from_stl: self.body_from_stl,
+            translation: Vec3::from(self.body_from_stl_translation_m),
             symmetric_left_right: self.symmetric_left_right,
             symmetric_front_rear: self.symmetric_front_rear,
             surfaces: self.surface.iter().map(surface).collect::<Result<_, Fault>>()?,

@@ -69,6 +69,12 @@ fn emit(text: &str) -> Result<()> {
     }
 }
 
+/// Ends the program as clap does for arguments that do not go together.
+fn usage_error(message: &str) -> ! {
+    use clap::CommandFactory;
+    Cli::command().error(clap::error::ErrorKind::ArgumentConflict, message).exit()
+}
+
 /// Where the bundles are, for commands that read them themselves.
 #[derive(Debug, Args)]
 struct Vehicles {

@@ -8,10 +8,9 @@ use clap::Args;
 use wade::forces::Forces;
 use wade::model::Model;
 use wade::service::Evaluator;
-use wade::service::wire::State;
+use wade::states::{Row, unknown_columns};
 
 use super::Vehicles;
-use super::state::gravity;
 
 /// Forces for every row of a table of states
 ///
@@ -44,9 +43,12 @@ impl Predict {
     pub fn run(self) -> Result<ExitCode> {
         let model = self.vehicles.model(&self.vehicle)?;
         let states = self.states.display();
-        let mut reader = csv::Reader::from_path(&self.states).with_context(|| states.to_string())?;
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_path(&self.states)
+            .with_context(|| states.to_string())?;
         let headers = reader.headers().with_context(|| states.to_string())?.clone();
-        let columns = Columns::find(&headers).with_context(|| states.to_string())?;
+        check_columns(&headers).with_context(|| states.to_string())?;
         let staged = self.out.with_extension("partial");
         let mut writer = csv::Writer::from_path(&staged).with_context(|| staged.display().to_string())?;
         writer.write_record(headers.iter().map(str::to_owned).chain(self.names(&model)))?;
@@ -54,7 +56,7 @@ impl Predict {
         for (row, record) in reader.records().enumerate() {
             let at = || format!("{states}, row {}", row + 2);
             let record = record.with_context(at)?;
-            let state = columns.state(&record).with_context(at)?;
+            let state = Row::read(&record, &headers).with_context(at)?.state();
             let evaluated = evaluator.evaluate(&model, &state).with_context(at)?;
             let added = self.values(evaluated.forces);
             writer.write_record(record.iter().map(str::to_owned).chain(added))?;
@@ -82,63 +84,15 @@ impl Predict {
     }
 }
 
-/// Where the columns are.
-struct Columns {
-    velocity: [Option<usize>; 3],
-    angular_velocity: [Option<usize>; 3],
-    acceleration: [Option<usize>; 3],
-    angular_acceleration: [Option<usize>; 3],
-    roll: Option<usize>,
-    pitch: Option<usize>,
-    depth: Option<usize>,
-    density: Option<usize>,
-}
-
-impl Columns {
-    fn find(headers: &csv::StringRecord) -> Result<Self> {
-        let find = |name: &str| headers.iter().position(|header| header.trim() == name);
-        if let Some(missing) = ["vx", "vy", "vz", "depth"].into_iter().find(|name| find(name).is_none()) {
-            bail!(
-                "column {missing} is missing; there are: {}",
-                headers.iter().collect::<Vec<_>>().join(", ")
-            );
-        }
-        if let Some(taken) = NET.into_iter().find(|name| find(name).is_some()) {
-            bail!("column {taken} is there already: forces are what this adds");
-        }
-        Ok(Self {
-            velocity: ["vx", "vy", "vz"].map(find),
-            angular_velocity: ["wx", "wy", "wz"].map(find),
-            acceleration: ["ax", "ay", "az"].map(find),
-            angular_acceleration: ["alx", "aly", "alz"].map(find),
-            roll: find("roll"),
-            pitch: find("pitch"),
-            depth: find("depth"),
-            density: find("rho"),
-        })
+/// Refuses a table without a state or with forces already, and names the columns that nobody reads.
+fn check_columns(headers: &csv::StringRecord) -> Result<()> {
+    let has = |name: &str| headers.iter().any(|header| header.trim() == name);
+    if let Some(missing) = ["vx", "vy", "vz", "depth"].into_iter().find(|name| !has(name)) {
+        bail!("column {missing} is missing; there are: {}", headers.iter().collect::<Vec<_>>().join(", "));
     }
-
-    fn state(&self, record: &csv::StringRecord) -> Result<State> {
-        let number = |column: Option<usize>, default: f64| {
-            let Some(text) = column.and_then(|column| record.get(column)) else { return Ok(default) };
-            text.trim()
-                .parse::<f64>()
-                .with_context(|| format!("\"{text}\" in column {}", column.unwrap_or(0) + 1))
-        };
-        let vector = |columns: [Option<usize>; 3]| {
-            let [x, y, z] = columns.map(|column| number(column, 0.0));
-            Ok::<_, anyhow::Error>([x? as f32, y? as f32, z? as f32])
-        };
-        let default = State::default();
-        Ok(State {
-            velocity: vector(self.velocity)?,
-            angular_velocity: vector(self.angular_velocity)?,
-            acceleration: vector(self.acceleration)?,
-            angular_acceleration: vector(self.angular_acceleration)?,
-            gravity: gravity(number(self.roll, 0.0)?, number(self.pitch, 0.0)?),
-            depth: number(self.depth, 0.0)? as f32,
-            density: number(self.density, f64::from(default.density))? as f32,
-            ..default
-        })
+    if let Some(taken) = NET.into_iter().find(|name| has(name)) {
+        bail!("column {taken} is there already: forces are what this adds");
     }
+    unknown_columns(headers).iter().for_each(|column| eprintln!("column {column} is kept and not used"));
+    Ok(())
 }

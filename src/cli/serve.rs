@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use tracing_subscriber::EnvFilter;
 use wade::config::{Config, Log};
 use wade::cores;
-use wade::service::run;
+use wade::server;
 use wade::service::shm::Wait;
 
 /// Serve vehicles over gRPC, a Unix socket and shared memory
@@ -41,6 +41,9 @@ pub struct Serve {
     /// CPUs that the server may use, such as 0 or 0,1
     #[arg(long, value_delimiter = ',')]
     cpus: Option<Vec<usize>>,
+    /// End with the process that started this one
+    #[arg(long, hide = true)]
+    with_parent: bool,
     /// Filter of the logs, such as debug or wade::request=debug
     #[arg(long, env = "WADE_LOG")]
     log: Option<String>,
@@ -59,11 +62,14 @@ enum Shm {
 impl Serve {
     /// Serves until SIGTERM or SIGINT.
     pub fn run(self) -> Result<ExitCode> {
+        if self.with_parent {
+            nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM)?;
+        }
         let config = self.config()?;
         config.validate()?;
         start_log(&config.log)?;
         cores::pin_to(&config.cpus).context("cpus")?;
-        let running = run::start(&config)?;
+        let running = server::start(&config)?;
         tracing::info!(
             grpc = running.grpc_address().map(tracing::field::display),
             unix_socket = running.unix_path().map(|path| tracing::field::display(path.display())),
@@ -72,10 +78,11 @@ impl Serve {
             "serving"
         );
         notify(&[sd_notify::NotifyState::Ready]);
-        wait_for_signal()?;
+        wait_for_signal(&running)?;
+        let failed = running.has_failed();
         notify(&[sd_notify::NotifyState::Stopping]);
         running.shutdown();
-        Ok(ExitCode::SUCCESS)
+        Ok(ExitCode::from(u8::from(failed)))
     }
 
     fn config(self) -> Result<Config> {
@@ -126,15 +133,25 @@ fn notify(states: &[sd_notify::NotifyState]) {
     }
 }
 
-fn wait_for_signal() -> Result<()> {
+/// How often the server is looked at for a thread that has ended.
+const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
+
+/// Returns at SIGTERM or SIGINT, or when the server has failed and is best restarted.
+fn wait_for_signal(running: &server::Running) -> Result<()> {
     use tokio::signal::unix::{SignalKind, signal};
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(async {
         let (mut terminate, mut interrupt) =
             (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+        let failed = async {
+            while !running.has_failed() {
+                tokio::time::sleep(LOOK).await;
+            }
+        };
         tokio::select! {
             _ = terminate.recv() => tracing::info!("SIGTERM"),
             _ = interrupt.recv() => tracing::info!("SIGINT"),
+            () = failed => tracing::error!("ending, to be restarted"),
         }
         Ok(())
     })

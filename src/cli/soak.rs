@@ -17,8 +17,8 @@ use wade::service::wire::State;
 use wade::service::{grpc, shm};
 use wade::soak::{self, Config, Input, Rate, SendError, Slo};
 
-use super::Vehicles;
 use super::progress::soak_bar;
+use super::{Vehicles, emit, usage_error};
 
 /// Load a server at a steady rate for a stated time and report its latency
 ///
@@ -107,9 +107,13 @@ const START: Duration = Duration::from_secs(30);
 impl Soak {
     /// Runs the load and writes the report.
     pub fn run(self) -> Result<ExitCode> {
+        if self.addr.is_some() && self.transport == Transport::Inproc {
+            usage_error("--transport inproc has no server, so no --addr");
+        }
+        // minutes of measurement are not to be lost to a folder that cannot be written
+        soak::report::prepare(&self.out)?;
         let (server_cpu, client_cpu) = self.cpus()?;
         let server = match (&self.addr, self.transport) {
-            (Some(_), Transport::Inproc) => bail!("--transport inproc has no server, so no --addr"),
             (Some(_), _) | (None, Transport::Inproc) => None,
             (None, _) => Some(Server::start(&self, server_cpu)?),
         };
@@ -147,14 +151,21 @@ impl Soak {
         let report = soak::run(&config, &input, &mut send, &soak_bar());
         soak::report::write(&self.out, &report)?;
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&report)?);
+            emit(&format!("{}\n", serde_json::to_string_pretty(&report)?))?;
         } else {
             let r = &report.response_time_us;
-            println!(
-                "{:.0} Hz, response p50 {:.1} us, p95 {:.1}, p99 {:.1}, p99.9 {:.1}, max {:.1}; {} refused, {} lost",
-                report.rate_hz, r.p50, r.p95, r.p99, r.p99_9, r.max, report.errors, report.lost
-            );
-            println!("{}", self.out.join("soak.html").display());
+            emit(&format!(
+                "{:.0} Hz, response p50 {:.1} us, p95 {:.1}, p99 {:.1}, p99.9 {:.1}, max {:.1}; {} refused, {} lost\n{}\n",
+                report.rate_hz,
+                r.p50,
+                r.p95,
+                r.p99,
+                r.p99_9,
+                r.max,
+                report.errors,
+                report.lost,
+                self.out.join("soak.html").display()
+            ))?;
         }
         report.failures.iter().for_each(|failure| eprintln!("error: {failure}"));
         Ok(ExitCode::from(u8::from(!report.passed)))
@@ -203,6 +214,7 @@ impl Soak {
             });
             match answered {
                 Ok(client) => return Ok(Connected { client, _server: server }),
+                Err(error @ ClientError::Refused { .. }) => return Err(error.into()),
                 Err(error) if server.is_none() || start.elapsed() > START => return Err(error.into()),
                 Err(_) => std::thread::sleep(Duration::from_millis(20)),
             }
@@ -299,7 +311,13 @@ impl Server {
         let file = folder.path().join("wade.toml");
         std::fs::write(&file, toml::to_string(&config)?)?;
         let mut command = Command::new(std::env::current_exe()?);
-        command.arg("serve").arg("--config").arg(&file).stdin(Stdio::null()).stdout(Stdio::null());
+        command
+            .arg("serve")
+            .arg("--with-parent")
+            .arg("--config")
+            .arg(&file)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null());
         // what the caller's environment says is for the caller's server
         command.env_remove("WADE_VEHICLES").env_remove("WADE_LOG");
         let child = command.spawn().context("starting the server")?;

@@ -70,7 +70,7 @@ impl StateArgs {
 }
 
 /// The direction of gravity in the body frame.
-pub fn gravity(roll: f64, pitch: f64) -> [f32; 3] {
+fn gravity(roll: f64, pitch: f64) -> [f32; 3] {
     single(&-up_from_roll_pitch(roll, pitch).into_inner())
 }
 

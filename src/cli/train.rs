@@ -48,17 +48,25 @@ impl Train {
     /// Writes the next version of each bundle.
     pub fn run(self) -> Result<ExitCode> {
         let Data::Analytic = self.data;
-        let mut config = match &self.config {
+        let mut config: Config = match &self.config {
             Some(path) => {
                 let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
                 toml::from_str(&text).with_context(|| path.display().to_string())?
             }
             None => Config::default(),
         };
+        for (vehicle, table) in Config::default().tables {
+            config.tables.entry(vehicle).or_insert(table);
+        }
         config.epochs = self.epochs.unwrap_or(config.epochs);
         config.seed = self.seed.unwrap_or(config.seed);
         let directory = self.vehicles.directory();
-        let paths: Vec<_> = bundle_names(&directory)?.iter().map(|name| directory.join(name)).collect();
+        let (known, unknown): (Vec<_>, Vec<_>) =
+            bundle_names(&directory)?.into_iter().partition(|name| config.tables.contains_key(name));
+        unknown
+            .iter()
+            .for_each(|name| eprintln!("{name}: left as it is, there is no parameter table for it"));
+        let paths: Vec<_> = known.iter().map(|name| directory.join(name)).collect();
         let mut bundles: Vec<Bundle> =
             paths.iter().map(|path| bundle::read(path)).collect::<Result<_, _>>()?;
         let vehicles: Vec<_> = bundles.iter().map(|bundle| bundle.vehicle.clone()).collect();

@@ -34,6 +34,9 @@ pub struct Vehicle {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Make a bundle from an STL and a vehicle file
+    #[command(
+        after_help = "Example: wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover"
+    )]
     Build {
         /// The hull, any axes and unit
         #[arg(long, value_name = "FILE")]
@@ -49,6 +52,7 @@ enum Command {
         seal: bool,
     },
     /// Make the bundle of a vehicle that comes with wade, from its dimensions
+    #[command(after_help = "Example: wade vehicle generate husky --out vehicles/husky")]
     Generate {
         /// Which
         vehicle: Shipped,
@@ -57,6 +61,7 @@ enum Command {
         out: PathBuf,
     },
     /// Read everything in a bundle; exit status 1 where something is wrong
+    #[command(after_help = "Example: wade vehicle check vehicles/husky")]
     Check {
         /// Folder of the bundle
         bundle: PathBuf,
@@ -65,6 +70,7 @@ enum Command {
         json: bool,
     },
     /// Names of the bundles
+    #[command(after_help = "Example: wade vehicle list --json")]
     List {
         #[command(flatten)]
         vehicles: Vehicles,
@@ -73,6 +79,7 @@ enum Command {
         json: bool,
     },
     /// Dimensions, surfaces, training domain and hydrostatics of a vehicle
+    #[command(after_help = "Example: wade vehicle show warthog")]
     Show {
         /// Name of the vehicle
         name: String,
@@ -112,9 +119,9 @@ impl Vehicle {
             Command::List { vehicles, json } => {
                 let names = bundle_names(&vehicles.directory())?;
                 if json {
-                    println!("{}", json!(names));
+                    emit(&format!("{}\n", json!(names)))?;
                 } else {
-                    names.iter().for_each(|name| println!("{name}"));
+                    emit(&names.iter().map(|name| format!("{name}\n")).collect::<String>())?;
                 }
             }
             Command::Show { name, vehicles, json } => show(&bundle::read(&vehicles.bundle(&name))?, json)?,
@@ -125,6 +132,12 @@ impl Vehicle {
 
 fn build(spec_text: &str, spec_path: &Path, stl: &[u8], out: &Path, seal: bool) -> Result<()> {
     let spec: VehicleSpec = toml::from_str(spec_text).with_context(|| spec_path.display().to_string())?;
+    bundle::check_place(out, &spec.name)?;
+    let version = match bundle::read(out) {
+        Ok(before) => before.version + 1,
+        Err(_) if !out.exists() => 1,
+        Err(error) => return Err(error).context("the bundle in place cannot be read; move it away first"),
+    };
     let (vehicle, sealing) = build_reporting(&spec, stl, seal)?;
     if let Some(sealing) = sealing {
         eprintln!("sealed: {sealing:?}");
@@ -137,10 +150,12 @@ fn build(spec_text: &str, spec_path: &Path, stl: &[u8], out: &Path, seal: bool) 
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    let version = bundle::read(out).map_or(1, |before| before.version + 1);
+    let vehicle_translation = vehicle.translation;
     let bundle = Bundle { vehicle, version, trained: None, distance, spec: Some(spec_text.to_owned()) };
     bundle::write(out, &bundle)?;
+    let t = vehicle_translation;
     println!("{}: version {version}, no weights yet", out.display());
+    println!("body frame = axes and scale of the STL, then moved by ({:.4}, {:.4}, {:.4}) m", t.x, t.y, t.z);
     Ok(())
 }
 

@@ -127,6 +127,9 @@ impl GrpcClient {
 
     /// The forces in each state of a batch.
     pub fn evaluate_batch(&mut self, states: &[State]) -> Result<proto::EvaluateBatchResponse, ClientError> {
+        if states.windows(2).any(|pair| pair[0].dry_contact != pair[1].dry_contact) {
+            return Err(ClientError::MixedBatch);
+        }
         let request = self.request(batch_message(&self.vehicle, states));
         self.runtime
             .block_on(self.client.evaluate_batch(request))

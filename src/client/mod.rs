@@ -41,6 +41,9 @@ pub enum ClientError {
     /// The state is wrong.
     #[error(transparent)]
     Invalid(#[from] InvalidState),
+    /// A batch with both ground contacts, of which the message carries one.
+    #[error("the states of a batch must have the same ground contact")]
+    MixedBatch,
     /// A batch longer than the transport carries.
     #[error("a batch of {len}, the limit of this transport is {limit}")]
     BatchTooLong {

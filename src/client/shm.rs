@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use iceoryx2::node::Node;
 use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::client::Client;
-use iceoryx2::port::listener::Listener;
+use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::port_name::PortName;
 use iceoryx2::prelude::{ZeroCopySend, ipc};
@@ -17,6 +17,7 @@ use crate::service::shm_layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, Status, wake_name,
 };
 use crate::service::wire::State;
+use crate::vehicle::MAX_SURFACES;
 
 /// Spins this often between two looks at the clock.
 const SPINS_PER_LOOK: u32 = 64;
@@ -67,7 +68,11 @@ impl ShmClient {
             link.server_polls = answer.flags & SERVER_POLLS != 0;
             Ok(answer)
         })?;
-        answer.refusal().map_or(Ok(answer), |invalid| Err(invalid.into()))
+        match answer.refusal() {
+            Some(invalid) => Err(invalid.into()),
+            None if answer.status == Status::Ok as u32 => Ok(answer),
+            None => Err(unknown_status(answer.status)),
+        }
     }
 
     /// The forces in each state of a batch.
@@ -110,10 +115,11 @@ impl ShmClient {
             match refusal {
                 _ if status == Status::Ok as u32 => Ok(taken),
                 Some(invalid) => Err(invalid.into()),
-                None => Err(ClientError::Refused {
+                None if status == Status::InvalidBatch as u32 => Err(ClientError::Refused {
                     code: "InvalidArgument".into(),
                     message: "the batch is empty or too long".into(),
                 }),
+                None => Err(unknown_status(status)),
             }
         })
     }
@@ -220,12 +226,21 @@ impl Link {
                 return Err(ClientError::Timeout(left));
             }
             if let Some((listener, _)) = &mut self.sleep {
-                listener.timed_wait(|_| {}, left).map_err(|error| ClientError::NoServer {
-                    at: "shared memory".into(),
-                    reason: format!("{error:?}"),
-                })?;
+                // less than a microsecond would mean no limit to the system call
+                match listener.timed_wait(|_| {}, left.max(Duration::from_micros(1))) {
+                    Ok(_) | Err(ListenerWaitError::InterruptSignal) => {}
+                    Err(error) => return Err(self.lost(&error)),
+                }
             }
         }
+    }
+}
+
+/// A code that a newer server of the same layout may send.
+fn unknown_status(status: u32) -> ClientError {
+    ClientError::Refused {
+        code: "Unknown".into(),
+        message: format!("status {status}; is the client up to date?"),
     }
 }
 
@@ -249,7 +264,7 @@ impl From<&Answer> for Reply {
         Self {
             version: answer.bundle_version,
             provenance: answer.provenance().to_owned(),
-            surfaces: (0..answer.surface_count as usize).map(surface).collect(),
+            surfaces: (0..(answer.surface_count as usize).min(MAX_SURFACES)).map(surface).collect(),
             force: answer.force_n,
             moment: answer.moment_nm,
             about: answer.about_m,

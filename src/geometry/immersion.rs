@@ -19,17 +19,6 @@ impl WetTriangle {
         (b - a).cross(&(c - a)) * 0.5
     }
 
-    /// Centroid [m].
-    pub fn centroid(&self) -> Vec3 {
-        let [a, b, c] = self.vertices;
-        (a + b + c) / 3.0
-    }
-
-    /// Mean depth below the surface [m].
-    pub fn mean_depth(&self) -> f64 {
-        self.depths.iter().sum::<f64>() / 3.0
-    }
-
     /// Midpoints of the three edges with their depths [m]: with equal weights they integrate a quadratic exactly.
     pub fn edge_midpoints(&self) -> [(Vec3, f64); 3] {
         [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {

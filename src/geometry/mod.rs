@@ -2,8 +2,7 @@
 //!
 //! Everything here is in SI units; after `vehicle::build` it is in the body frame as well.
 //! Reading order: `mesh` and `stl` (triangles in and out), `parts`, `watertight` and `seal` (refuse or repair), `surfaces`
-//! (named patches), `immersion` and `hydrostatics` (clipping at the water plane, pressure), `pressure` (the same, prepared for queries),
-//! `submergence` (samples),
+//! (named patches), `immersion` and `hydrostatics` (clipping at the water plane, pressure), `submergence` (samples),
 //! `distance` (signed distance grid), `parametric` (closed parts by formula).
 
 pub mod distance;
@@ -13,7 +12,6 @@ pub mod mesh;
 pub mod parametric;
 mod parry;
 pub mod parts;
-pub mod pressure;
 pub mod sampling;
 pub mod seal;
 pub mod stl;

@@ -39,9 +39,15 @@ impl Solid {
     }
 }
 
+/// A hull with less than this share of the cube of its diagonal is flat.
+const FLAT_SHARE: f64 = 1e-9;
+
 /// The convex hull of the points, faces outward; `None` when they lie in a plane.
 pub(crate) fn convex_hull(points: &[Vec3]) -> Option<Mesh> {
     let points: Vec<Vector> = points.iter().map(to_parry).collect();
     let (vertices, faces) = try_convex_hull(&points).ok()?;
-    Some(Mesh { vertices: vertices.iter().map(from_parry).collect(), faces })
+    let hull = Mesh { vertices: vertices.iter().map(from_parry).collect(), faces };
+    // of points in a plane parry makes a sheet with two sides
+    let diagonal = hull.bounds()?.extent().norm();
+    (hull.volume() > FLAT_SHARE * diagonal.powi(3)).then_some(hull)
 }

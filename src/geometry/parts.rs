@@ -124,11 +124,15 @@ impl Part {
         self.solid.as_ref().map_or(f64::NEG_INFINITY, |s| -s.signed_distance(point))
     }
 
-    /// Every corner inside or on the other part, and no edge through it.
+    /// Every corner, middle of an edge and middle of a face inside or on the other part.
     pub(super) fn lies_in(&self, other: &Self) -> bool {
         let tolerance = other.tolerance();
-        let deepest = self.mesh.vertices.iter().map(|v| other.depth_inside(v));
-        let within = deepest.fold(f64::INFINITY, f64::min) >= -tolerance;
+        let corners = self.mesh.vertices.iter().copied();
+        let middles = (0..self.mesh.faces.len()).flat_map(|face| {
+            let [a, b, c] = self.mesh.triangle(face);
+            [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
+        });
+        let within = corners.chain(middles).all(|point| other.depth_inside(&point) >= -tolerance);
         within && self.volume.abs() <= other.volume.abs() * (1.0 + 1e-9)
     }
 

@@ -11,6 +11,10 @@
 //! a CPU feature. [`Isa`] can be had from [`Isa::available`] alone, so holding one proves that the CPU has it.
 
 #![allow(unsafe_code)]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "lanes in lock step, by index, are what the compiler vectorizes"
+)]
 
 use super::network::{Network, OUTPUTS, WIDTH};
 use crate::features::{DYNAMIC, GLOBAL, STATIC};

@@ -2,6 +2,7 @@
 
 pub mod kernel;
 pub mod network;
+mod reference;
 
 use crate::condition::{Condition, GroundContact};
 use crate::domain::Domain;
@@ -99,7 +100,7 @@ impl Model {
     /// Forces on every surface and the net wrench about the centre of mass, body frame.
     ///
     /// Allocates nothing once `forces` has held this many surfaces. Angular rates and accelerations do not enter the
-    /// paper's network; a state that has them is marked as outside the training domain where they matter.
+    /// paper's network. A state with angular rates is marked as outside the training domain; accelerations are not judged.
     pub fn evaluate(&self, condition: &Condition, workspace: &mut Workspace, forces: &mut Forces) {
         forces.outside = self.domain.outside(condition);
         self.immerse(condition, workspace, forces);
@@ -144,6 +145,9 @@ impl Model {
         let sign = if condition.ground_contact == GroundContact::Wetted { 1.0 } else { -1.0 };
         let plane = condition.water_plane(self.vehicle.z0);
         for patch in &self.vehicle.contacts {
+            if forces.surfaces[patch.surface].wetted_fraction == 0.0 {
+                continue;
+            }
             let lost = patch.lost_pressure(&plane, condition.density, &patch.center).force;
             forces.surfaces[patch.surface].force -= lost * sign;
         }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::bundle::{self, BundleError};
+use crate::bundle::{self, BundleError, Fault};
 use crate::engine::{Engine, UnknownVehicle};
 use crate::metrics::Metrics;
 use crate::model::Model;
@@ -21,7 +21,7 @@ pub enum LoadError {
         source: std::io::Error,
     },
     /// The folder holds none.
-    #[error("no vehicle bundle (a folder with a vehicle.toml) in {}", .directory.display())]
+    #[error("no trained vehicle bundle (a folder with a vehicle.toml) in {}", .directory.display())]
     Empty {
         /// The folder.
         directory: PathBuf,
@@ -59,7 +59,7 @@ impl Reloader {
         Self { directory, isa, engine, metrics, one_at_a_time: Mutex::new(()) }
     }
 
-    /// Reads every bundle of the folder; one that is not sound stops the start.
+    /// Reads every bundle of the folder; one that is not sound stops the start, one without weights is left out.
     pub fn load_all(&self) -> Result<(), LoadError> {
         let directory = self.directory.clone();
         let names = bundle::names_in(&directory)
@@ -67,18 +67,24 @@ impl Reloader {
         if names.is_empty() {
             return Err(LoadError::Empty { directory });
         }
-        let models: Result<Vec<Model>, _> =
-            names.iter().map(|name| bundle::load(&directory.join(name), self.isa)).collect();
-        for model in models? {
+        let mut models = Vec::new();
+        for name in names {
+            match bundle::load(&directory.join(&name), self.isa) {
+                Ok(model) => models.push(model),
+                Err(BundleError { fault: Fault::NoWeights, .. }) => {
+                    tracing::warn!(vehicle = name, "not served: it has no weights yet");
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        if models.is_empty() {
+            return Err(LoadError::Empty { directory });
+        }
+        for model in models {
             announce(&model, &self.metrics);
             self.engine.swap(model);
         }
         Ok(())
-    }
-
-    /// The engine that serves what was read.
-    pub fn engine(&self) -> &Arc<Engine> {
-        &self.engine
     }
 
     /// Reads one vehicle's bundle again, or all where the name is empty, and swaps in what is sound. What is not

@@ -7,7 +7,7 @@ mod stream;
 pub use convert::single;
 
 use std::net::{SocketAddr, TcpListener};
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -155,9 +155,9 @@ fn bind_unix(path: &Path) -> Result<UnixListener, GrpcError> {
         return Err(GrpcError::InUse { path: path.to_owned() });
     }
     let bind = || {
-        match std::fs::remove_file(path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-            _ => {}
+        // a socket that nobody listens on is a killed server's; anything else is not ours to remove
+        if std::fs::symlink_metadata(path).is_ok_and(|found| found.file_type().is_socket()) {
+            std::fs::remove_file(path)?;
         }
         let listener = UnixListener::bind(path)?;
         std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
@@ -166,6 +166,9 @@ fn bind_unix(path: &Path) -> Result<UnixListener, GrpcError> {
     };
     bind().map_err(|source| GrpcError::Bind { at: path.display().to_string(), source })
 }
+
+/// What a health check may ask about: the server as a whole, and its service.
+const HEALTH_NAMES: [&str; 2] = ["", "wade.v1.Hydrodynamics"];
 
 /// What the handlers share.
 #[derive(Debug, Clone)]
@@ -215,15 +218,27 @@ impl Server {
         self.set_health(tonic_health::ServingStatus::NotServing).await;
     }
 
+    /// Ends the streams of those who watch our health, once they have heard the last of it: a drain would wait for them.
+    pub async fn end_health_watches(&self) {
+        for service in HEALTH_NAMES {
+            self.health.clone().clear_service_status(service).await;
+        }
+    }
+
     async fn set_health(&self, status: tonic_health::ServingStatus) {
-        for service in ["", "wade.v1.Hydrodynamics"] {
+        for service in HEALTH_NAMES {
             self.health.set_service_status(service, status).await;
         }
     }
 
-    fn router(&self, stop: &watch::Receiver<bool>) -> Result<Router<Layers>, GrpcError> {
+    fn router(
+        &self,
+        names: handlers::Names,
+        stop: &watch::Receiver<bool>,
+    ) -> Result<Router<Layers>, GrpcError> {
         let handlers = handlers::Handlers {
             shared: self.shared.clone(),
+            names,
             max_batch: self.config.max_batch,
             requests: Arc::clone(&self.requests),
             streams: Arc::clone(&self.streams),
@@ -252,18 +267,21 @@ impl Server {
     pub async fn run(&self, listeners: &Listeners, stop: watch::Receiver<bool>) -> Result<(), GrpcError> {
         let at = |at: String| move |source| GrpcError::Bind { at, source };
         let tcp = async {
-            let Some(listener) = &listeners.tcp else { return Ok(()) };
+            let Some(listener) = &listeners.tcp else { return Ok(stopped(stop.clone()).await) };
             let listener = listener.try_clone().and_then(tokio::net::TcpListener::from_std);
             let listener = listener.map_err(at(self.config.listen.clone()))?;
-            let serving =
-                self.router(&stop)?.serve_with_incoming_shutdown(incoming(listener), stopped(stop.clone()));
+            let serving = self
+                .router(handlers::TCP, &stop)?
+                .serve_with_incoming_shutdown(incoming(listener), stopped(stop.clone()));
             serving.await.map_err(GrpcError::from)
         };
         let unix = async {
-            let Some((listener, path)) = &listeners.unix else { return Ok(()) };
+            let Some((listener, path)) = &listeners.unix else { return Ok(stopped(stop.clone()).await) };
             let listener = listener.try_clone().and_then(tokio::net::UnixListener::from_std);
             let listener = UnixListenerStream::new(listener.map_err(at(path.display().to_string()))?);
-            let serving = self.router(&stop)?.serve_with_incoming_shutdown(listener, stopped(stop.clone()));
+            let serving = self
+                .router(handlers::UNIX, &stop)?
+                .serve_with_incoming_shutdown(listener, stopped(stop.clone()));
             serving.await.map_err(GrpcError::from)
         };
         tokio::try_join!(tcp, unix).map(|_| ())

@@ -3,7 +3,6 @@
 pub mod admin;
 pub mod grpc;
 pub mod http;
-pub mod run;
 pub mod shm;
 pub mod shm_layout;
 pub mod wire;

@@ -23,6 +23,7 @@ use super::wire::{Refusal, State};
 use super::{Evaluator, nanoseconds_since};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
+use crate::model::Model;
 
 /// How the server waits for requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -43,7 +44,7 @@ pub struct Config {
     pub enabled: bool,
     /// How it waits.
     pub wait: Wait,
-    /// Most clients of one vehicle at a time.
+    /// Most clients of one vehicle at a time, at most [`MAX_CLIENTS`]; of all vehicles together there can be that many.
     pub max_clients: usize,
     /// First part of the services' names; servers beside each other need one each.
     pub namespace: String,
@@ -58,11 +59,16 @@ impl Default for Config {
 /// The namespace unless configured otherwise.
 pub const NAMESPACE: &str = "wade";
 
-/// Most sleeping clients that are remembered, and that can be at a time.
-const MAX_SLEEPERS: usize = 64;
+/// Most clients of all vehicles together: each has a place among those that wake and are woken.
+pub const MAX_CLIENTS: usize = 64;
 
 /// How long the server sleeps at most before it looks for a shutdown and for new vehicles.
 const HOUSEKEEPING: Duration = Duration::from_millis(50);
+
+/// Rounds of polling or of work between two looks at the clock.
+const ROUNDS_PER_LOOK: u32 = 1 << 10;
+/// Rounds of polling after which the core is offered to others.
+const ROUNDS_PER_YIELD: u32 = 1 << 12;
 
 /// Pause after a wait that failed, so that a lasting failure does not spin.
 const PAUSE: Duration = Duration::from_millis(1);
@@ -120,7 +126,12 @@ where
         .enable_safe_overflow_for_responses(true)
         .enable_fire_and_forget_requests(false)
         .open_or_create()
-        .map_err(|error| ShmError::new(name)(&error))
+        .or_else(|error| {
+            // a client that outlived a server with smaller limits keeps its service: those limits stay until it goes
+            let open = open::<Q, A>(node, name)?.ok_or_else(|| ShmError::new(name)(&error))?;
+            tracing::warn!(name, %error, "a living client keeps this service's former limits");
+            Ok(open)
+        })
 }
 
 /// Opens a service that a server has created; none where there is no such server.
@@ -147,17 +158,21 @@ pub(crate) fn events(
     let builder = node
         .service_builder(&service)
         .event()
-        .max_listeners(MAX_SLEEPERS)
-        .max_notifiers(MAX_SLEEPERS)
+        .max_listeners(MAX_CLIENTS)
+        .max_notifiers(MAX_CLIENTS)
         .max_nodes(96);
     builder.open_or_create().map_err(|error| ShmError::new(name)(&error))
 }
 
-/// The ports of one vehicle.
+type Request<Q, A> = ActiveRequest<ipc::Service, Q, (), A, ()>;
+
+/// The ports of one vehicle, and what has come in through them in this round.
 struct Door {
     vehicle: String,
     single: Server<ipc::Service, Query, (), Answer, ()>,
     batch: Server<ipc::Service, BatchQuery, (), BatchAnswer, ()>,
+    singles: Vec<(Instant, Request<Query, Answer>)>,
+    batches: Vec<(Instant, Request<BatchQuery, BatchAnswer>)>,
     single_recorder: Arc<Recorder>,
     batch_recorder: Arc<Recorder>,
 }
@@ -166,15 +181,22 @@ struct Door {
 pub struct ShmServer {
     config: Config,
     names: Names,
-    engine: Arc<Engine>,
-    metrics: Arc<Metrics>,
     node: Node<ipc::Service>,
     doors: Vec<Door>,
     wake: Listener<ipc::Service>,
+    desk: Desk,
+}
+
+/// What it takes to answer.
+struct Desk {
+    engine: Arc<Engine>,
+    metrics: Arc<Metrics>,
+    evaluator: Evaluator,
+    /// [`Answer::flags`] of every answer.
+    flags: u32,
     done: Notifier<ipc::Service>,
     /// Listeners of the clients that sleep, by wake key.
     sleepers: HashMap<u64, ListenerKey>,
-    evaluator: Evaluator,
 }
 
 impl ShmServer {
@@ -182,79 +204,85 @@ impl ShmServer {
     pub fn new(config: Config, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Result<Self, ShmError> {
         let node = node()?;
         let names = Names::new(&config.namespace);
-        let wake = events(&node, &names.wake())?
-            .listener_builder()
-            .create()
-            .map_err(|error| ShmError::new("the listener")(&error))?;
-        let done = events(&node, &names.done())?
-            .notifier_builder()
-            .create()
-            .map_err(|error| ShmError::new("the notifier")(&error))?;
-        let (doors, sleepers, evaluator) = (Vec::new(), HashMap::new(), Evaluator::default());
-        let mut server =
-            Self { config, names, engine, metrics, node, doors, wake, done, sleepers, evaluator };
-        server.open_new_doors()?;
+        let wake = events(&node, &names.wake())?.listener_builder().create();
+        let done = events(&node, &names.done())?.notifier_builder().create();
+        let desk = Desk {
+            engine,
+            metrics,
+            evaluator: Evaluator::default(),
+            flags: if config.wait == Wait::Spin { SERVER_POLLS } else { 0 },
+            done: done.map_err(|error| ShmError::new("the notifier")(&error))?,
+            sleepers: HashMap::new(),
+        };
+        let wake = wake.map_err(|error| ShmError::new("the listener")(&error))?;
+        let mut server = Self { config, names, node, doors: Vec::new(), wake, desk };
+        for vehicle in server.without_door() {
+            server.open_door(vehicle)?;
+        }
         Ok(server)
     }
 
-    /// Opens the services of vehicles that were added since.
-    fn open_new_doors(&mut self) -> Result<(), ShmError> {
-        for vehicle in self.engine.models().keys() {
-            if self.doors.iter().any(|door| door.vehicle == *vehicle) {
-                continue;
-            }
-            let clients = self.config.max_clients;
-            let single = exchange::<Query, Answer>(&self.node, &self.names.evaluate(vehicle), clients)?;
-            let batch = exchange::<BatchQuery, BatchAnswer>(
-                &self.node,
-                &self.names.evaluate_batch(vehicle),
-                clients,
-            )?;
-            // an answer that a client does not take is dropped: no client can hold up the others
-            let discard = BackpressureStrategy::DiscardData;
-            let port =
-                |error: &dyn std::fmt::Display| ShmError::new(format!("a server for {vehicle}"))(error);
-            self.doors.push(Door {
-                vehicle: vehicle.clone(),
-                single: single
-                    .server_builder()
-                    .backpressure_strategy(discard)
-                    .create()
-                    .map_err(|e| port(&e))?,
-                batch: batch
-                    .server_builder()
-                    .backpressure_strategy(discard)
-                    .create()
-                    .map_err(|e| port(&e))?,
-                single_recorder: self.metrics.recorder(Transport::shm, vehicle),
-                batch_recorder: self.metrics.recorder(Transport::shm_batch, vehicle),
-            });
-        }
+    /// Vehicles that are served and have no ports yet.
+    fn without_door(&self) -> Vec<String> {
+        let models = self.desk.engine.models();
+        let has_door = |name: &String| self.doors.iter().any(|door| door.vehicle == *name);
+        models.keys().filter(|name| !has_door(name)).cloned().collect()
+    }
+
+    fn open_door(&mut self, vehicle: String) -> Result<(), ShmError> {
+        let clients = self.config.max_clients;
+        let single = exchange::<Query, Answer>(&self.node, &self.names.evaluate(&vehicle), clients)?;
+        let batch =
+            exchange::<BatchQuery, BatchAnswer>(&self.node, &self.names.evaluate_batch(&vehicle), clients)?;
+        // an answer that a client does not take is dropped: no client can hold up the others
+        let discard = BackpressureStrategy::DiscardData;
+        let port = |error: &dyn std::fmt::Display| ShmError::new(format!("a server for {vehicle}"))(error);
+        let metrics = &self.desk.metrics;
+        self.doors.push(Door {
+            single: single.server_builder().backpressure_strategy(discard).create().map_err(|e| port(&e))?,
+            batch: batch.server_builder().backpressure_strategy(discard).create().map_err(|e| port(&e))?,
+            singles: Vec::new(),
+            batches: Vec::new(),
+            single_recorder: metrics.recorder(Transport::shm, &vehicle),
+            batch_recorder: metrics.recorder(Transport::shm_batch, &vehicle),
+            vehicle,
+        });
         Ok(())
     }
 
-    /// Answers until `stop` turns true.
+    /// Answers until `stop` turns true, and then what has come in until then.
     pub fn run(mut self, stop: &AtomicBool) {
         let mut next_housekeeping = Instant::now() + HOUSEKEEPING;
-        let mut idle = 0_u32;
+        let mut round = 0_u32;
         while !stop.load(Ordering::Relaxed) {
-            idle = if self.answer_round() { 0 } else { idle.saturating_add(1) };
-            if idle > 0 {
-                self.wait(idle);
+            round = round.wrapping_add(1);
+            let idle = !self.answer_round();
+            if idle {
+                self.wait(round);
             }
-            // the clock is read when there is nothing to do, and now and then under load
-            if idle.is_multiple_of(256) && Instant::now() >= next_housekeeping {
+            // the clock is read after a sleep, and now and then while there is work or polling
+            let look = (idle && self.config.wait == Wait::Block) || round.is_multiple_of(ROUNDS_PER_LOOK);
+            if look && Instant::now() >= next_housekeeping {
                 next_housekeeping = Instant::now() + HOUSEKEEPING;
-                if let Err(error) = self.open_new_doors() {
-                    tracing::error!(%error, "a new vehicle is not served over shared memory");
-                }
+                self.open_new_doors();
+            }
+        }
+        let end = Instant::now() + HOUSEKEEPING;
+        while self.answer_round() && Instant::now() < end {}
+    }
+
+    /// One vehicle's trouble is not the others'.
+    fn open_new_doors(&mut self) {
+        for vehicle in self.without_door() {
+            if let Err(error) = self.open_door(vehicle) {
+                tracing::error!(%error, "a new vehicle is not served over shared memory");
             }
         }
     }
 
-    fn wait(&mut self, idle: u32) {
+    fn wait(&mut self, round: u32) {
         match self.config.wait {
-            Wait::Spin if idle.is_multiple_of(4096) => std::thread::yield_now(),
+            Wait::Spin if round.is_multiple_of(ROUNDS_PER_YIELD) => std::thread::yield_now(),
             Wait::Spin => std::hint::spin_loop(),
             // a request that came before the listener slept has left its event, so it is not slept over
             Wait::Block => {
@@ -267,89 +295,102 @@ impl ShmServer {
         }
     }
 
-    /// Answers at most one request of each kind and vehicle; true where there was any.
+    /// Takes everything that is waiting, then answers it: taking one at a time would serve the first connections again
+    /// and again, since that is where looking starts. True where there was anything.
     fn answer_round(&mut self) -> bool {
-        let mut answered = false;
-        for index in 0..self.doors.len() {
-            answered |= self.answer_single(index) | self.answer_batch(index);
+        let mut any = false;
+        for door in &mut self.doors {
+            while let Some(request) = taken(door.single.receive()) {
+                door.singles.push((Instant::now(), request));
+            }
+            while let Some(request) = taken(door.batch.receive()) {
+                door.batches.push((Instant::now(), request));
+            }
+            any |= !door.singles.is_empty() || !door.batches.is_empty();
+            if let Ok(model) = self.desk.engine.model(&door.vehicle) {
+                for (arrived, request) in door.singles.drain(..) {
+                    self.desk.answer(&model, arrived, &request, &door.single_recorder);
+                }
+                for (arrived, request) in door.batches.drain(..) {
+                    self.desk.answer_batch(&model, arrived, &request, &door.batch_recorder);
+                }
+            }
         }
-        answered
+        any
     }
+}
 
-    fn answer_single(&mut self, index: usize) -> bool {
-        let door = &self.doors[index];
-        let Some(request) = taken(door.single.receive()) else { return false };
-        let arrived = Instant::now();
+impl Desk {
+    fn answer(
+        &mut self,
+        model: &Model,
+        arrived: Instant,
+        request: &Request<Query, Answer>,
+        recorder: &Recorder,
+    ) {
         let query = copy(request.payload());
-        let Ok(model) = self.engine.model(&door.vehicle) else { return true };
-        let mut answer = match self.evaluator.evaluate(&model, &State::from(&query)) {
-            Ok(evaluated) => Answer::new(&model, evaluated.forces, evaluated.compute_ns),
-            Err(invalid) => Answer::invalid(invalid),
+        let (mut answer, refusal) = match self.evaluator.evaluate(model, &State::from(&query)) {
+            Ok(evaluated) => (Answer::new(model, evaluated.forces, evaluated.compute_ns), None),
+            Err(invalid) => (Answer::invalid(invalid), Some(Refusal::from(invalid))),
         };
         answer.sequence = query.sequence;
-        answer.flags = self.flags();
+        answer.flags = self.flags;
         if sent(request.loan_uninit().map(|slot| slot.write_payload(answer).send())) {
             wake(&self.done, &mut self.sleepers, query.wake_key);
         }
-        match answer.refusal() {
-            None => door.single_recorder.record(arrived.elapsed(), answer.is_outside().into()),
-            Some(invalid) => self.metrics.refuse(Transport::shm, Refusal::from(invalid).reason()),
+        match refusal {
+            None => recorder.record(arrived.elapsed(), answer.is_outside().into()),
+            Some(refusal) => self.metrics.refuse(Transport::shm, refusal.reason()),
         }
-        true
+        tracing::debug!(target: "wade::request", transport = "shm", vehicle = model.vehicle().name, status = answer.status);
     }
 
-    fn answer_batch(&mut self, index: usize) -> bool {
-        let door = &self.doors[index];
-        let Some(request) = taken(door.batch.receive()) else { return false };
-        let arrived = Instant::now();
+    fn answer_batch(
+        &mut self,
+        model: &Model,
+        arrived: Instant,
+        request: &Request<BatchQuery, BatchAnswer>,
+        recorder: &Recorder,
+    ) {
         let header = copy(&request.payload().header);
-        let Ok(model) = self.engine.model(&door.vehicle) else { return true };
-        let Ok(mut slot) = request.loan_uninit() else { return true };
+        let Ok(mut slot) = request.loan_uninit() else { return };
         let answer: *mut BatchAnswer = slot.payload_mut().as_mut_ptr();
-        // SAFETY: the slot is ours until it is sent; all zeros is a valid BatchAnswer, whose fields are all numbers.
-        let answer = unsafe {
-            answer.write_bytes(0, 1);
-            &mut *answer
-        };
+        // SAFETY: the slot is ours until it is sent and was zero when the segment was made; its fields are all numbers,
+        // for which whatever an answer before this one left is a value too.
+        let answer = unsafe { &mut *answer };
+        let (count, valid) = (header.count as usize, (1..=MAX_BATCH as u32).contains(&header.count));
         answer.sequence = header.sequence;
-        answer.flags = self.flags();
-        let count = header.count as usize;
+        answer.flags = self.flags;
+        answer.status = if valid { Status::Ok as u32 } else { Status::InvalidBatch as u32 };
+        (answer.index, answer.count) = (0, 0);
         let mut outside = 0;
-        if count == 0 || count > MAX_BATCH {
-            answer.status = Status::InvalidBatch as u32;
-        } else {
-            for (i, slot) in answer.answers[..count].iter_mut().enumerate() {
-                let query = copy(&request.payload().queries[i]);
-                match self.evaluator.evaluate(&model, &State::from(&query)) {
-                    Ok(evaluated) => *slot = Answer::new(&model, evaluated.forces, evaluated.compute_ns),
-                    Err(invalid) => {
-                        *slot = Answer::invalid(invalid);
-                        answer.status = Status::InvalidState as u32;
-                        answer.index = i as u32;
-                        break;
-                    }
+        for i in 0..if valid { count } else { 0 } {
+            let query = copy(&request.payload().queries[i]);
+            let slot = &mut answer.answers[i];
+            match self.evaluator.evaluate(model, &State::from(&query)) {
+                Ok(evaluated) => *slot = Answer::new(model, evaluated.forces, evaluated.compute_ns),
+                Err(invalid) => {
+                    *slot = Answer::invalid(invalid);
+                    (answer.status, answer.index) = (Status::InvalidState as u32, i as u32);
+                    break;
                 }
-                slot.sequence = query.sequence;
-                outside += u64::from(slot.is_outside());
-                answer.count += 1;
             }
+            slot.sequence = query.sequence;
+            outside += u64::from(slot.is_outside());
+            answer.count += 1;
         }
         answer.compute_ns = nanoseconds_since(arrived);
-        let answered = answer.status == Status::Ok as u32;
-        // SAFETY: every byte was written above.
+        let status = answer.status;
+        // SAFETY: as above.
         if sent(Ok::<_, ()>(unsafe { slot.assume_init() }.send())) {
             wake(&self.done, &mut self.sleepers, header.wake_key);
         }
-        if answered {
-            door.batch_recorder.record(arrived.elapsed(), outside);
+        if status == Status::Ok as u32 {
+            recorder.record(arrived.elapsed(), outside);
         } else {
             self.metrics.refuse(Transport::shm_batch, "invalid_argument");
         }
-        true
-    }
-
-    fn flags(&self) -> u32 {
-        if self.config.wait == Wait::Spin { SERVER_POLLS } else { 0 }
+        tracing::debug!(target: "wade::request", transport = "shm_batch", vehicle = model.vehicle().name, count, status);
     }
 }
 
@@ -360,16 +401,8 @@ fn copy<T: Copy + ZeroCopySend>(shared: &T) -> T {
     unsafe { std::ptr::read_volatile(shared) }
 }
 
-type Received<Q, A, E> = Result<Option<ActiveRequest<ipc::Service, Q, (), A, ()>>, E>;
-
 /// A request, if there is one; a connection that failed is a client's trouble, not ours.
-fn taken<Q, A, E: std::fmt::Debug>(
-    received: Received<Q, A, E>,
-) -> Option<ActiveRequest<ipc::Service, Q, (), A, ()>>
-where
-    Q: ZeroCopySend + std::fmt::Debug + 'static,
-    A: ZeroCopySend + std::fmt::Debug + 'static,
-{
+fn taken<R, E: std::fmt::Debug>(received: Result<Option<R>, E>) -> Option<R> {
     received.unwrap_or_else(|error| {
         tracing::debug!(?error, "receiving over shared memory");
         None
@@ -396,7 +429,7 @@ fn wake(done: &Notifier<ipc::Service>, sleepers: &mut HashMap<u64, ListenerKey>,
     }
     // a client that is new, or one that is gone: forget it and look through those that listen now
     sleepers.remove(&key);
-    if sleepers.len() >= MAX_SLEEPERS {
+    if sleepers.len() >= MAX_CLIENTS {
         sleepers.clear();
     }
     let name = wake_name(key);

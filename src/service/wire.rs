@@ -71,10 +71,12 @@ pub enum Field {
     Quaternion = 9,
     /// `roll_pitch`
     RollPitch = 10,
+    /// `ground_contact`
+    GroundContact = 11,
 }
 
 impl Field {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::Velocity,
         Self::Current,
         Self::AngularVelocity,
@@ -85,6 +87,7 @@ impl Field {
         Self::Density,
         Self::Quaternion,
         Self::RollPitch,
+        Self::GroundContact,
     ];
 
     /// The name that the wire gives it.
@@ -100,6 +103,7 @@ impl Field {
             Self::Density => "density_kgpm3",
             Self::Quaternion => "world_from_body",
             Self::RollPitch => "roll_pitch",
+            Self::GroundContact => "ground_contact",
         }
     }
 
@@ -123,11 +127,13 @@ pub enum Problem {
     NotPositive = 4,
     /// Length differs from 1 by more than [`UNIT_TOLERANCE`].
     NotUnit = 5,
+    /// No value of the enumeration.
+    Unknown = 6,
 }
 
 impl Problem {
-    const ALL: [Self; 5] =
-        [Self::NotFinite, Self::TooLarge, Self::Negative, Self::NotPositive, Self::NotUnit];
+    const ALL: [Self; 6] =
+        [Self::NotFinite, Self::TooLarge, Self::Negative, Self::NotPositive, Self::NotUnit, Self::Unknown];
 
     /// The problem of a code of the shared-memory layout.
     pub fn from_code(code: u32) -> Option<Self> {
@@ -154,6 +160,7 @@ impl std::fmt::Display for InvalidState {
             Problem::TooLarge => write!(f, "{name} must not exceed {} in magnitude", limit(self.field)),
             Problem::Negative => write!(f, "{name} must not be negative"),
             Problem::NotPositive => write!(f, "{name} must be greater than zero"),
+            Problem::Unknown => write!(f, "{name} must be one of the values of its enumeration"),
             Problem::NotUnit => write!(f, "{name} must have length 1 (within {UNIT_TOLERANCE})"),
         }
     }
@@ -167,8 +174,9 @@ pub fn limit(field: Field) -> f64 {
     match field {
         Field::Velocity | Field::Current | Field::AngularVelocity | Field::Depth => 1e3,
         Field::Acceleration | Field::AngularAcceleration | Field::Density => 1e5,
-        Field::Gravity | Field::Quaternion => 1.0 + UNIT_TOLERANCE,
-        Field::RollPitch => 1e3,
+        // anything further from 1 is refused for its length
+        Field::Gravity | Field::Quaternion => 1e3,
+        Field::RollPitch | Field::GroundContact => 1e3,
     }
 }
 
@@ -204,7 +212,8 @@ fn vector(field: Field, values: &[f32; 3]) -> Result<Vec3, InvalidState> {
     Ok(Vec3::new(x?, y?, z?))
 }
 
-fn scalar(field: Field, value: f32) -> Result<f64, InvalidState> {
+/// A number that is finite and within its limit.
+pub(super) fn scalar(field: Field, value: f32) -> Result<f64, InvalidState> {
     let value = f64::from(value);
     if !value.is_finite() {
         Err(InvalidState { field, problem: Problem::NotFinite })

@@ -251,6 +251,17 @@ pub enum WriteError {
     Plot(#[from] PlotError),
 }
 
+/// Makes the folder and tries whether it can be written.
+pub fn prepare(dir: &Path) -> Result<(), WriteError> {
+    let probe = dir.join(".soak.probe");
+    let try_it = || {
+        fs::create_dir_all(dir)?;
+        fs::write(&probe, [])?;
+        fs::remove_file(&probe)
+    };
+    try_it().map_err(|source| WriteError::Io { path: dir.to_owned(), source })
+}
+
 /// Writes `soak.json`, `soak.hlog` and `soak.html` to a folder, which is made where it does not exist. Each file
 /// appears whole or not at all.
 pub fn write(dir: &Path, report: &Report) -> Result<(), WriteError> {

@@ -2,19 +2,8 @@
 
 use std::io::Read;
 
-use serde::Deserialize;
-
-use crate::{frame::up_from_roll_pitch, service::wire::State};
-
-/// Columns of a trial that say nothing about the state.
-const NOT_STATE: [&str; 17] = [
-    "yaw", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr", "fx", "fy", "fz", "mx", "my", "mz", "sim_fx",
-    "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz",
-];
-const STATE: [&str; 17] = [
-    "t", "vx", "vy", "vz", "wx", "wy", "wz", "roll", "pitch", "depth", "ax", "ay", "az", "alx", "aly", "alz",
-    "rho",
-];
+use crate::service::wire::{InvalidState, State};
+use crate::states::{BadValue, Row, unknown_columns};
 
 /// Why a trace cannot be played.
 #[derive(Debug, thiserror::Error)]
@@ -30,11 +19,21 @@ pub enum TraceError {
         /// Its time [s].
         t: f64,
     },
-    /// A value is infinite or not a number.
-    #[error("row {row}: a value is not finite")]
-    NotFinite {
+    /// A value is missing, infinite or no number.
+    #[error("row {row}: {source}")]
+    Value {
         /// Number of the row after the header, from 1.
         row: usize,
+        /// Column and value.
+        source: BadValue,
+    },
+    /// A state that no server would answer.
+    #[error("row {row}: {source}")]
+    State {
+        /// Number of the row after the header, from 1.
+        row: usize,
+        /// What is wrong with it.
+        source: InvalidState,
     },
     /// Fewer than two rows make no trace.
     #[error("the trace has {rows} rows; at least 2 are needed")]
@@ -42,53 +41,6 @@ pub enum TraceError {
         /// How many rows there are.
         rows: usize,
     },
-}
-
-#[derive(Debug, Deserialize)]
-struct Row {
-    t: f64,
-    vx: f32,
-    vy: f32,
-    vz: f32,
-    wx: f32,
-    wy: f32,
-    wz: f32,
-    depth: f32,
-    roll: Option<f64>,
-    pitch: Option<f64>,
-    ax: Option<f32>,
-    ay: Option<f32>,
-    az: Option<f32>,
-    alx: Option<f32>,
-    aly: Option<f32>,
-    alz: Option<f32>,
-    rho: Option<f32>,
-}
-
-impl Row {
-    fn state(&self) -> State {
-        let or_zero = |v: Option<f32>| v.unwrap_or(0.0);
-        let up = up_from_roll_pitch(self.roll.unwrap_or(0.0), self.pitch.unwrap_or(0.0));
-        let level = State::default();
-        State {
-            velocity: [self.vx, self.vy, self.vz],
-            angular_velocity: [self.wx, self.wy, self.wz],
-            acceleration: [self.ax, self.ay, self.az].map(or_zero),
-            angular_acceleration: [self.alx, self.aly, self.alz].map(or_zero),
-            gravity: [-up.x as f32, -up.y as f32, -up.z as f32],
-            depth: self.depth,
-            density: self.rho.unwrap_or(level.density),
-            ..level
-        }
-    }
-
-    fn is_finite(&self) -> bool {
-        let State { velocity, angular_velocity, acceleration, angular_acceleration, gravity, .. } =
-            self.state();
-        let vectors = [velocity, angular_velocity, acceleration, angular_acceleration, gravity];
-        let scalars = [self.depth, self.rho.unwrap_or(0.0)];
-        self.t.is_finite() && vectors.as_flattened().iter().chain(&scalars).all(|v| v.is_finite())
-    }
 }
 
 /// States by time.
@@ -105,11 +57,15 @@ impl Trace {
     pub(super) fn read(reader: impl Read) -> Result<Self, TraceError> {
         let mut reader =
             csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(reader);
-        let known = |name: &str| STATE.contains(&name) || NOT_STATE.contains(&name);
-        let unknown_columns = reader.headers()?.iter().filter(|h| !known(h)).map(str::to_owned).collect();
-        let mut trace = Self { times: Vec::new(), states: Vec::new(), unknown_columns };
-        for (index, row) in reader.deserialize::<Row>().enumerate() {
-            trace.push(index + 1, &row?)?;
+        let headers = reader.headers()?.clone();
+        let mut trace =
+            Self { times: Vec::new(), states: Vec::new(), unknown_columns: unknown_columns(&headers) };
+        for (index, record) in reader.records().enumerate() {
+            let row = index + 1;
+            trace.push(
+                row,
+                &Row::read(&record?, &headers).map_err(|source| TraceError::Value { row, source })?,
+            )?;
         }
         if trace.states.len() < 2 {
             return Err(TraceError::TooShort { rows: trace.states.len() });
@@ -120,14 +76,15 @@ impl Trace {
     }
 
     fn push(&mut self, number: usize, row: &Row) -> Result<(), TraceError> {
-        if !row.is_finite() {
-            return Err(TraceError::NotFinite { row: number });
+        let state = row.state();
+        state.check().map_err(|source| TraceError::State { row: number, source })?;
+        // a table without a clock has none to play by
+        let t = row.t.unwrap_or(f64::NAN);
+        if !t.is_finite() || self.times.last().is_some_and(|&last| t <= last) {
+            return Err(TraceError::Time { row: number, t });
         }
-        if self.times.last().is_some_and(|&last| row.t <= last) {
-            return Err(TraceError::Time { row: number, t: row.t });
-        }
-        self.times.push(row.t);
-        self.states.push(row.state());
+        self.times.push(t);
+        self.states.push(state);
         Ok(())
     }
 
@@ -176,7 +133,7 @@ mod tests {
         assert!(matches!(read(good), Err(TraceError::TooShort { rows: 1 })));
         assert!(matches!(read(&good.repeat(2)), Err(TraceError::Time { row: 2, .. })));
         let nan = format!("{good}1,NaN,0,0,0,0,0,0.3,,a,1\n");
-        assert!(matches!(read(&nan), Err(TraceError::NotFinite { row: 2 })));
+        assert!(matches!(read(&nan), Err(TraceError::State { row: 2, .. })));
         let missing = Trace::read("t,vx\n0,1\n1,1\n".as_bytes()).expect_err("vy is missing").to_string();
         assert!(missing.contains("vy"), "{missing}");
     }

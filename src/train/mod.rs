@@ -129,6 +129,12 @@ impl Config {
                 return Err(TrainError::Config { key, value, expected });
             }
         }
+        let value = self.least_learning_rate;
+        // with nothing to learn, random weights would be written as trained ones; NaN is neither below nor above
+        if value.is_nan() || value >= self.learning_rate {
+            let expected = "below learning_rate";
+            return Err(TrainError::Config { key: "least_learning_rate", value, expected });
+        }
         let shares = [("held_out_share", self.held_out_share), ("loss.alpha", self.loss.alpha)];
         match shares.into_iter().find(|(_, share)| !(0.0..=1.0).contains(share)) {
             Some((key, value)) => Err(TrainError::Config { key, value, expected: "between 0 and 1" }),

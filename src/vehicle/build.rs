@@ -91,8 +91,8 @@ pub fn build_reporting(
     let mut mesh = read_stl(stl)?;
     mesh.vertices.iter_mut().for_each(|v| *v = transform * *v);
     let (mesh, sealing) = closed(mesh, spec, sealed)?;
-    let mesh = centered(mesh)?;
-    let vehicle = assemble(spec, mesh)?;
+    let (mesh, translation) = centered(mesh)?;
+    let vehicle = assemble(spec, mesh, translation)?;
     vehicle.validate()?;
     Ok((vehicle, sealing))
 }
@@ -111,13 +111,13 @@ fn closed(mesh: Mesh, spec: &VehicleSpec, sealed: bool) -> Result<(Mesh, Option<
 }
 
 /// Centred on the bounding box, and rounded as the bundle's STL stores it: what is built is what is loaded.
-fn centered(mut mesh: Mesh) -> Result<Mesh, BuildError> {
+fn centered(mut mesh: Mesh) -> Result<(Mesh, Vec3), BuildError> {
     let center = mesh.bounds().ok_or(LeakError::Empty)?.center();
     mesh.vertices.iter_mut().for_each(|v| *v -= center);
-    Ok(read_stl(&write_stl(&mesh))?)
+    Ok((read_stl(&write_stl(&mesh))?, -center))
 }
 
-fn assemble(spec: &VehicleSpec, mesh: Mesh) -> Result<Vehicle, BuildError> {
+fn assemble(spec: &VehicleSpec, mesh: Mesh, translation: Vec3) -> Result<Vehicle, BuildError> {
     let bounds = mesh.bounds().ok_or(LeakError::Empty)?;
     let [length, width, height] = spec.dimensions_m.unwrap_or(bounds.extent().into());
     let dimensions = Dimensions { length, width, height };
@@ -133,6 +133,8 @@ fn assemble(spec: &VehicleSpec, mesh: Mesh) -> Result<Vehicle, BuildError> {
         mass: spec.mass_kg,
         inertia,
         center_of_mass: Vec3::from(spec.center_of_mass_m),
+        body_from_stl: spec.body_from_stl,
+        translation,
         symmetric_left_right: spec.symmetric_left_right,
         symmetric_front_rear: spec.symmetric_front_rear,
         contacts: spec.contact.iter().map(|c| contact(spec, c, &surfaces, z0)).collect::<Result<_, _>>()?,

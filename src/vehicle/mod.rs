@@ -17,6 +17,7 @@ pub use validate::VehicleError;
 
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::wrench::Wrench;
+use spec::BodyFromStl;
 
 /// Most surfaces a vehicle may have.
 pub const MAX_SURFACES: usize = 64;
@@ -35,16 +36,6 @@ pub enum SurfaceKind {
     Side,
     /// A wheel.
     Wheel,
-}
-
-impl SurfaceKind {
-    /// All kinds in one-hot order.
-    pub const ALL: [Self; 5] = [Self::Bottom, Self::Front, Self::Rear, Self::Side, Self::Wheel];
-
-    /// Position in the one-hot order.
-    pub fn index(self) -> usize {
-        self as usize
-    }
 }
 
 /// A named region of the hull with the source paper's descriptors; body frame.
@@ -116,6 +107,10 @@ pub struct Vehicle {
     pub inertia: Matrix3<f64>,
     /// Centre of mass [m].
     pub center_of_mass: Vec3,
+    /// How the coordinates of the STL became the body frame's.
+    pub body_from_stl: BodyFromStl,
+    /// What was added after scale and axes, so that the hull is centred [m].
+    pub translation: Vec3,
     /// True when left and right are mirror images, checked at the build.
     pub symmetric_left_right: bool,
     /// True when front and rear are mirror images, checked at the build.

@@ -11,7 +11,7 @@ use wade::client::{Client, GrpcClient, Method, ShmClient};
 use wade::config::Config;
 use wade::model::Model;
 use wade::model::kernel::Isa;
-use wade::service::run::{self, Running};
+use wade::server::{self, Running};
 use wade::service::shm::Wait;
 use wade::service::wire::State;
 
@@ -82,7 +82,7 @@ impl Served {
         let mut config = config(folder.path());
         change(&mut config);
         config.validate().expect("a valid configuration");
-        let running = run::start(&config).expect("the server starts");
+        let running = server::start(&config).expect("the server starts");
         Self { running, config, _folder: folder }
     }
 

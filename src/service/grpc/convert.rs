@@ -10,7 +10,7 @@ use crate::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
 use crate::metrics;
 use crate::model::Model;
 use crate::service::proto;
-use crate::service::wire::{Field, InvalidState, Problem, Refusal, State, UNIT_TOLERANCE};
+use crate::service::wire::{Field, InvalidState, Problem, Refusal, State, UNIT_TOLERANCE, scalar};
 use crate::vehicle::{Surface, SurfaceKind};
 
 use proto::state::Attitude;
@@ -28,28 +28,32 @@ pub fn state(message: &proto::State) -> Result<State, InvalidState> {
         gravity: message.attitude.as_ref().map_or(Ok(default.gravity), gravity)?,
         depth: message.depth_m,
         density: message.density_kgpm3.unwrap_or(default.density),
-        dry_contact: message.ground_contact() == proto::GroundContact::Dry,
+        dry_contact: is_dry(message.ground_contact)?,
     })
 }
 
+fn is_dry(ground_contact: i32) -> Result<bool, InvalidState> {
+    let known = proto::GroundContact::try_from(ground_contact);
+    known
+        .map(|contact| contact == proto::GroundContact::Dry)
+        .map_err(|_| InvalidState { field: Field::GroundContact, problem: Problem::Unknown })
+}
+
 fn gravity(attitude: &Attitude) -> Result<[f32; 3], InvalidState> {
-    let finite = |field, values: &[f32]| {
-        let ok = values.iter().all(|x| x.is_finite());
-        ok.then_some(()).ok_or(InvalidState { field, problem: Problem::NotFinite })
-    };
     let up = match attitude {
         Attitude::GravityDirection(g) => return Ok([g.x, g.y, g.z]),
         Attitude::WorldFromBody(q) => {
-            finite(Field::Quaternion, &[q.w, q.x, q.y, q.z])?;
-            let q = Quaternion::new(q.w, q.x, q.y, q.z).cast::<f64>();
+            let [w, x, y, z] = [q.w, q.x, q.y, q.z].map(|part| scalar(Field::Quaternion, part));
+            let q = Quaternion::new(w?, x?, y?, z?);
             if (q.norm() - 1.0).abs() > UNIT_TOLERANCE {
                 return Err(InvalidState { field: Field::Quaternion, problem: Problem::NotUnit });
             }
             up_from_quaternion(&UnitQuaternion::from_quaternion(q))
         }
         Attitude::RollPitch(attitude) => {
-            finite(Field::RollPitch, &[attitude.roll_rad, attitude.pitch_rad])?;
-            up_from_roll_pitch(attitude.roll_rad.into(), attitude.pitch_rad.into())
+            let [roll, pitch] =
+                [attitude.roll_rad, attitude.pitch_rad].map(|angle| scalar(Field::RollPitch, angle));
+            up_from_roll_pitch(roll?, pitch?)
         }
     };
     Ok(single(&-up.into_inner()))
@@ -74,7 +78,7 @@ pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<St
         rows(Field::AngularAcceleration, accelerations, len, default.angular_acceleration)?;
     let gravity = rows(Field::Gravity, &message.gravity_direction, len, default.gravity)?;
     let density = rows(Field::Density, &message.density_kgpm3, len, [default.density])?;
-    let dry_contact = message.ground_contact() == proto::GroundContact::Dry;
+    let dry_contact = is_dry(message.ground_contact)?;
     let state = |i: usize| State {
         velocity: velocity(i),
         current: current(i),

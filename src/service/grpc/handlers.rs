@@ -19,17 +19,33 @@ use crate::service::proto::hydrodynamics_server::Hydrodynamics;
 use crate::service::wire::Refusal;
 use crate::service::{Evaluator, nanoseconds_since, proto};
 
-/// States of a batch that are computed before others get their turn: about a millisecond.
-const STATES_PER_TURN: usize = 64;
+/// States of a batch or a stream that are computed before others get their turn: about a millisecond.
+pub(super) const STATES_PER_TURN: usize = 64;
 
 thread_local! {
     static EVALUATOR: RefCell<Evaluator> = RefCell::default();
 }
 
+/// What the metrics call the calls of one listener.
+#[derive(Debug, Clone, Copy)]
+pub struct Names {
+    unary: Transport,
+    batch: Transport,
+    stream: Transport,
+}
+
+/// The TCP listener's.
+pub(super) const TCP: Names =
+    Names { unary: Transport::grpc_unary, batch: Transport::grpc_batch, stream: Transport::grpc_stream };
+/// The Unix socket's.
+pub(super) const UNIX: Names =
+    Names { unary: Transport::uds_unary, batch: Transport::uds_batch, stream: Transport::uds_stream };
+
 /// The handlers of `wade.v1.Hydrodynamics`.
 #[derive(Debug)]
 pub struct Handlers {
     pub(super) shared: Shared,
+    pub(super) names: Names,
     pub(super) max_batch: usize,
     pub(super) requests: Arc<Admission>,
     pub(super) streams: Arc<Admission>,
@@ -44,12 +60,12 @@ impl Hydrodynamics for Handlers {
         &self,
         request: Request<proto::EvaluateRequest>,
     ) -> Result<Response<proto::EvaluateResponse>, Status> {
-        let call = Call::begin(&self.shared, Transport::grpc_unary, &request);
+        let call = Call::begin(&self.shared, self.names.unary, &request);
         let answer = call.admit(&self.requests).and_then(|_permit| {
             let request = request.get_ref();
             let model = self.shared.engine.model(&request.vehicle)?;
             call.check_deadline(None)?;
-            answer(&model, request.state.as_ref())
+            answer_state(&model, request.state.as_ref())
         });
         call.end(answer)
     }
@@ -58,7 +74,7 @@ impl Hydrodynamics for Handlers {
         &self,
         request: Request<proto::EvaluateBatchRequest>,
     ) -> Result<Response<proto::EvaluateBatchResponse>, Status> {
-        let call = Call::begin(&self.shared, Transport::grpc_batch, &request);
+        let call = Call::begin(&self.shared, self.names.batch, &request);
         let answer = match call.admit(&self.requests) {
             Ok(_permit) => self.batch(&call, request.get_ref()).await,
             Err(refusal) => Err(refusal),
@@ -70,12 +86,18 @@ impl Hydrodynamics for Handlers {
         &self,
         request: Request<Streaming<proto::EvaluateRequest>>,
     ) -> Result<Response<Self::StreamStream>, Status> {
-        let call = Call::begin(&self.shared, Transport::grpc_stream, &request);
+        let call = Call::begin(&self.shared, self.names.stream, &request);
         let admitted = self.streams.admit();
         match admitted.map_err(|overloaded| Refusal::Overloaded { what: "streams", overloaded }) {
             Ok(permit) => {
-                let answers =
-                    Answers::new(request.into_inner(), self.shared.clone(), permit, self.stop.clone());
+                let answers = Answers::new(
+                    request.into_inner(),
+                    self.shared.clone(),
+                    self.names.stream,
+                    call.deadline,
+                    permit,
+                    self.stop.clone(),
+                );
                 Ok(Response::new(answers))
             }
             Err(refusal) => Err(call.refuse(refusal)),
@@ -150,7 +172,7 @@ pub(super) struct Answered {
 }
 
 /// Answers one state on the thread that read it.
-pub(super) fn answer(
+pub(super) fn answer_state(
     model: &Arc<Model>,
     state: Option<&proto::State>,
 ) -> Result<(proto::EvaluateResponse, Answered), Refusal> {
@@ -163,7 +185,7 @@ pub(super) fn answer(
     })
 }
 
-/// One request from its arrival to its answer: deadline, span and metrics.
+/// One request from its arrival to its answer: deadline, metrics and, where asked for, a line in the log.
 pub(super) struct Call<'s> {
     shared: &'s Shared,
     transport: Transport,
@@ -179,16 +201,16 @@ impl<'s> Call<'s> {
         Self { shared, transport, arrived, deadline }
     }
 
-    /// A request within a stream, which has no deadline of its own.
-    pub(super) fn in_stream(shared: &'s Shared) -> Self {
-        Self { shared, transport: Transport::grpc_stream, arrived: Instant::now(), deadline: None }
+    /// A request within a stream, whose deadline is the stream's.
+    pub(super) fn in_stream(shared: &'s Shared, transport: Transport, deadline: Option<Instant>) -> Self {
+        Self { shared, transport, arrived: Instant::now(), deadline }
     }
 
     fn admit(&self, requests: &Arc<Admission>) -> Result<crate::engine::Permit, Refusal> {
         requests.admit().map_err(|overloaded| Refusal::Overloaded { what: "requests", overloaded })
     }
 
-    fn check_deadline(&self, answered: Option<usize>) -> Result<(), Refusal> {
+    pub(super) fn check_deadline(&self, answered: Option<usize>) -> Result<(), Refusal> {
         match self.deadline {
             Some(deadline) if Instant::now() >= deadline => Err(Refusal::DeadlineExceeded { answered }),
             _ => Ok(()),

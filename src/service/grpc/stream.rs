@@ -2,17 +2,17 @@
 
 use std::future::Future;
 use std::pin::Pin;
-use std::sync::Arc;
 use std::task::{Context, Poll};
+use std::time::Instant;
 
 use tokio::sync::watch;
 use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
-use super::handlers::{Call, answer};
+use super::handlers::{Call, STATES_PER_TURN, answer_state};
 use super::{Shared, size_limit, stopped};
 use crate::engine::Permit;
-use crate::model::Model;
+use crate::metrics::Transport;
 use crate::service::proto;
 use crate::service::wire::Refusal;
 
@@ -21,7 +21,10 @@ pub struct Answers {
     requests: Streaming<proto::EvaluateRequest>,
     shared: Shared,
     vehicle: String,
+    transport: Transport,
+    deadline: Option<Instant>,
     stop: Pin<Box<dyn Future<Output = ()> + Send>>,
+    answers_this_turn: usize,
     ended: bool,
     _permit: Permit,
 }
@@ -30,21 +33,33 @@ impl Answers {
     pub(super) fn new(
         requests: Streaming<proto::EvaluateRequest>,
         shared: Shared,
+        transport: Transport,
+        deadline: Option<Instant>,
         permit: Permit,
         stop: watch::Receiver<bool>,
     ) -> Self {
         let stop = Box::pin(stopped(stop));
-        Self { requests, shared, vehicle: String::new(), stop, ended: false, _permit: permit }
+        Self {
+            requests,
+            shared,
+            vehicle: String::new(),
+            transport,
+            deadline,
+            stop,
+            answers_this_turn: 0,
+            ended: false,
+            _permit: permit,
+        }
     }
 
     fn answer(&mut self, request: proto::EvaluateRequest) -> Result<proto::EvaluateResponse, Status> {
-        let call = Call::in_stream(&self.shared);
+        let call = Call::in_stream(&self.shared, self.transport, self.deadline);
         if !request.vehicle.is_empty() {
             self.vehicle = request.vehicle;
         }
-        let model: Result<Arc<Model>, Refusal> =
-            self.shared.engine.model(&self.vehicle).map_err(Refusal::from);
-        let answer = model.and_then(|model| answer(&model, request.state.as_ref()));
+        let model = || Ok::<_, Refusal>(self.shared.engine.model(&self.vehicle)?);
+        let answer = call.check_deadline(None).and_then(|()| model());
+        let answer = answer.and_then(|model| answer_state(&model, request.state.as_ref()));
         call.end(answer).map(tonic::Response::into_inner)
     }
 }
@@ -56,16 +71,27 @@ impl Stream for Answers {
         if self.ended {
             return Poll::Ready(None);
         }
+        if self.stop.as_mut().poll(context).is_ready() {
+            self.ended = true;
+            return Poll::Ready(Some(Err(Status::unavailable("the server is shutting down"))));
+        }
+        if self.answers_this_turn == STATES_PER_TURN {
+            // a client that sends without waiting would keep the thread to itself
+            self.answers_this_turn = 0;
+            context.waker().wake_by_ref();
+            return Poll::Pending;
+        }
         let answer = match Pin::new(&mut self.requests).poll_next(context) {
             Poll::Ready(Some(Ok(request))) => self.answer(request),
             Poll::Ready(Some(Err(status))) if status.code() == Code::OutOfRange => Err(size_limit(&status)),
             Poll::Ready(Some(Err(status))) => Err(status),
             Poll::Ready(None) => return Poll::Ready(None),
-            Poll::Pending if self.stop.as_mut().poll(context).is_ready() => {
-                Err(Status::unavailable("the server is shutting down"))
+            Poll::Pending => {
+                self.answers_this_turn = 0;
+                return Poll::Pending;
             }
-            Poll::Pending => return Poll::Pending,
         };
+        self.answers_this_turn += 1;
         self.ended = answer.is_err();
         Poll::Ready(Some(answer))
     }

@@ -1,7 +1,7 @@
 //! The server as a whole: started, ready, drained.
 
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
 
-use super::admin::{LoadError, Reloader};
-use super::grpc::{self, GrpcError, Listeners};
-use super::http::{self, HttpError};
-use super::shm::{ShmError, ShmServer};
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::metrics::Metrics;
 use crate::model::kernel::Isa;
+use crate::service::admin::{LoadError, Reloader};
+use crate::service::grpc::{self, GrpcError, Listeners};
+use crate::service::http::{self, HttpError};
+use crate::service::shm::{ShmError, ShmServer};
 
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -49,10 +49,15 @@ pub struct Running {
     http_address: Option<SocketAddr>,
     ready: Arc<AtomicBool>,
     stop: watch::Sender<bool>,
+    /// Probes are answered until everything else has ended.
+    stop_http: watch::Sender<bool>,
     stop_shm: Arc<AtomicBool>,
     runtime: Runtime,
     threads: Vec<JoinHandle<()>>,
+    housekeeping: Option<JoinHandle<()>>,
     drain: Duration,
+    /// A thread ended that should not have.
+    failed: Arc<AtomicBool>,
 }
 
 /// Binds everything, reads the bundles while health says NOT_SERVING, then says SERVING.
@@ -72,6 +77,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     };
     let runtime = runtime()?;
     let (stop, stopped) = watch::channel(false);
+    let (stop_http, http_stopped) = watch::channel(false);
     let mut running = Running {
         grpc: Arc::new(runtime.block_on(grpc::Server::new(config.grpc.clone(), shared))),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
@@ -79,16 +85,20 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         stop_shm: Arc::new(AtomicBool::new(false)),
         drain: Duration::from_secs_f64(config.drain_s),
         threads: Vec::new(),
+        housekeeping: None,
         reloader,
         metrics,
         listeners,
         stop,
+        stop_http,
         runtime,
+        failed: Arc::new(AtomicBool::new(false)),
     };
     for _ in 0..config.grpc.threads {
         running.spawn_grpc(stopped.clone())?;
     }
-    running.spawn_housekeeping(http_listener, Duration::from_secs_f64(config.latency_window_s), stopped)?;
+    let window = Duration::from_secs_f64(config.latency_window_s);
+    running.spawn_housekeeping(http_listener, window, http_stopped)?;
     running.reloader.load_all()?;
     if config.shm.enabled {
         running.spawn_shm(config, engine)?;
@@ -137,6 +147,7 @@ impl Running {
         let start = Instant::now();
         self.ready.store(false, Ordering::Relaxed);
         self.runtime.block_on(self.grpc.set_not_serving());
+        self.runtime.block_on(self.grpc.end_health_watches());
         self.stop_shm.store(true, Ordering::Relaxed);
         self.stop.send_replace(true);
         for thread in self.threads.drain(..) {
@@ -144,13 +155,17 @@ impl Running {
                 tracing::error!("a server thread panicked");
             }
         }
+        self.stop_http.send_replace(true);
+        if self.housekeeping.take().is_some_and(|thread| thread.join().is_err()) {
+            tracing::error!("the HTTP thread panicked");
+        }
         tracing::info!(elapsed = ?start.elapsed(), "drained");
     }
 
     fn spawn_grpc(&mut self, stop: watch::Receiver<bool>) -> Result<(), StartError> {
         let (server, listeners, drain) = (Arc::clone(&self.grpc), Arc::clone(&self.listeners), self.drain);
         let runtime = runtime()?;
-        self.spawn("wade-grpc", move || {
+        let thread = self.spawn("wade-grpc", move || {
             let outcome = runtime.block_on(async {
                 let serving = std::pin::pin!(server.run(&listeners, stop.clone()));
                 bounded(serving, stop.clone(), drain).await
@@ -161,7 +176,9 @@ impl Running {
                 None => tracing::warn!(?drain, "connections were still open at the drain's bound: closed"),
             }
             runtime.shutdown_background();
-        })
+        })?;
+        self.threads.push(thread);
+        Ok(())
     }
 
     /// HTTP and the turning of the latency windows, away from the threads that answer queries.
@@ -171,9 +188,9 @@ impl Running {
         window: Duration,
         stop: watch::Receiver<bool>,
     ) -> Result<(), StartError> {
-        let (metrics, ready, drain) = (Arc::clone(&self.metrics), Arc::clone(&self.ready), self.drain);
+        let (metrics, ready) = (Arc::clone(&self.metrics), Arc::clone(&self.ready));
         let runtime = runtime()?;
-        self.spawn("wade-http", move || {
+        let thread = self.spawn("wade-http", move || {
             let rotating = async {
                 let mut ticks = tokio::time::interval(window);
                 ticks.tick().await;
@@ -192,11 +209,13 @@ impl Running {
                 let work = std::pin::pin!(async { tokio::join!(rotating, serving) });
                 tokio::select! {
                     _ = work => {}
-                    () = grpc::stopped(stop.clone()) => tokio::time::sleep(drain.min(CLOSING)).await,
+                    () = grpc::stopped(stop.clone()) => {}
                 }
             });
             runtime.shutdown_background();
-        })
+        })?;
+        self.housekeeping = Some(thread);
+        Ok(())
     }
 
     fn spawn_shm(&mut self, config: &Config, engine: Arc<Engine>) -> Result<(), StartError> {
@@ -204,7 +223,7 @@ impl Running {
         let stop = Arc::clone(&self.stop_shm);
         // ports stay with the thread that made them, so it says whether it could
         let (report, opened) = std::sync::mpsc::channel();
-        self.spawn("wade-shm", move || match ShmServer::new(settings, engine, metrics) {
+        let thread = self.spawn("wade-shm", move || match ShmServer::new(settings, engine, metrics) {
             Ok(server) => {
                 let _ = report.send(Ok(()));
                 server.run(&stop);
@@ -213,15 +232,48 @@ impl Running {
                 let _ = report.send(Err(error));
             }
         })?;
+        self.threads.push(thread);
         opened
             .recv()
             .unwrap_or_else(|_| Err(ShmError::new("the thread")(&"it ended")))
             .map_err(StartError::from)
     }
 
-    fn spawn(&mut self, name: &str, body: impl FnOnce() + Send + 'static) -> Result<(), StartError> {
-        self.threads.push(std::thread::Builder::new().name(name.into()).spawn(body)?);
-        Ok(())
+    fn spawn(&self, name: &str, body: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, StartError> {
+        let guard = Guard {
+            name: name.to_owned(),
+            stop: self.stop.subscribe(),
+            ready: Arc::clone(&self.ready),
+            failed: Arc::clone(&self.failed),
+        };
+        let body = move || {
+            let _guard = guard;
+            body();
+        };
+        Ok(std::thread::Builder::new().name(name.into()).spawn(body)?)
+    }
+
+    /// True where a thread has ended that should not have: the server is best restarted.
+    pub fn has_failed(&self) -> bool {
+        self.failed.load(Ordering::Relaxed)
+    }
+}
+
+/// Notices when a thread ends, by a panic too, although nobody has asked for it.
+struct Guard {
+    name: String,
+    stop: watch::Receiver<bool>,
+    ready: Arc<AtomicBool>,
+    failed: Arc<AtomicBool>,
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        if !*self.stop.borrow() {
+            tracing::error!(thread = self.name, "ended unasked: no longer ready");
+            self.ready.store(false, Ordering::Relaxed);
+            self.failed.store(true, Ordering::Relaxed);
+        }
     }
 }
 
@@ -232,9 +284,6 @@ impl Drop for Running {
         }
     }
 }
-
-/// How long HTTP goes on after the stop, so that a probe sees that we are not ready.
-const CLOSING: Duration = Duration::from_millis(20);
 
 /// Runs to the end, or until the bound has passed since the stop.
 async fn bounded<F: Future + Unpin>(
@@ -247,14 +296,4 @@ async fn bounded<F: Future + Unpin>(
         () = grpc::stopped(stop) => {}
     }
     tokio::time::timeout(bound, work).await.ok()
-}
-
-/// The folder of bundles: as configured, or where an installation or the source tree has it.
-pub fn find_vehicles(configured: &Path) -> PathBuf {
-    let installed =
-        std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join("../share/wade/vehicles")));
-    let source = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles");
-    let fallback = configured == Path::new("vehicles") && !configured.exists();
-    let found = installed.into_iter().chain([source]).find(|path| fallback && path.exists());
-    found.unwrap_or_else(|| configured.to_owned())
 }

@@ -1,0 +1,89 @@
+//! A table of states: CSV with the columns of a trial, SI units and radians by name.
+
+use serde::Deserialize;
+
+use crate::frame::up_from_roll_pitch;
+use crate::service::grpc::single;
+use crate::service::wire::State;
+
+/// Columns that describe a state.
+const STATE: [&str; 17] = [
+    "t", "vx", "vy", "vz", "wx", "wy", "wz", "roll", "pitch", "depth", "ax", "ay", "az", "alx", "aly", "alz",
+    "rho",
+];
+/// Columns of a trial that say nothing about the state.
+const NOT_STATE: [&str; 17] = [
+    "yaw", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr", "fx", "fy", "fz", "mx", "my", "mz", "sim_fx",
+    "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz",
+];
+
+/// Columns that no trial has: to be reported, and ignored.
+pub fn unknown_columns(headers: &csv::StringRecord) -> Vec<String> {
+    let known = |name: &str| STATE.contains(&name) || NOT_STATE.contains(&name);
+    headers.iter().map(str::trim).filter(|header| !known(header)).map(str::to_owned).collect()
+}
+
+/// One row; an optional column that is missing or blank has its default.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Row {
+    /// Time [s].
+    pub t: Option<f64>,
+    vx: f64,
+    vy: f64,
+    vz: f64,
+    depth: f64,
+    wx: Option<f64>,
+    wy: Option<f64>,
+    wz: Option<f64>,
+    roll: Option<f64>,
+    pitch: Option<f64>,
+    ax: Option<f64>,
+    ay: Option<f64>,
+    az: Option<f64>,
+    alx: Option<f64>,
+    aly: Option<f64>,
+    alz: Option<f64>,
+    rho: Option<f64>,
+}
+
+/// A row that holds no state.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("\"{value}\" in column {column} is no number")]
+pub struct BadValue {
+    /// Name of the column; or what is wrong with the row as a whole.
+    pub column: String,
+    /// What stands there.
+    pub value: String,
+}
+
+impl Row {
+    /// Reads a record under these headers.
+    pub fn read(record: &csv::StringRecord, headers: &csv::StringRecord) -> Result<Self, BadValue> {
+        record.deserialize(Some(headers)).map_err(|error| {
+            let field = match error.kind() {
+                csv::ErrorKind::Deserialize { err, .. } => err.field(),
+                _ => None,
+            };
+            let at = |record: &csv::StringRecord, field: u64| record.get(field as usize).map(str::to_owned);
+            let column = field.and_then(|field| at(headers, field)).unwrap_or_else(|| error.to_string());
+            BadValue { column, value: field.and_then(|field| at(record, field)).unwrap_or_default() }
+        })
+    }
+
+    /// The state of the row.
+    pub fn state(&self) -> State {
+        let or_zero = |value: Option<f64>| value.unwrap_or(0.0) as f32;
+        let up = up_from_roll_pitch(self.roll.unwrap_or(0.0), self.pitch.unwrap_or(0.0));
+        let level = State::default();
+        State {
+            velocity: [self.vx, self.vy, self.vz].map(|value| value as f32),
+            angular_velocity: [self.wx, self.wy, self.wz].map(or_zero),
+            acceleration: [self.ax, self.ay, self.az].map(or_zero),
+            angular_acceleration: [self.alx, self.aly, self.alz].map(or_zero),
+            gravity: single(&-up.into_inner()),
+            depth: self.depth as f32,
+            density: self.rho.map_or(level.density, |rho| rho as f32),
+            ..level
+        }
+    }
+}
