@@ -107,9 +107,9 @@ impl Table {
 
     fn csv(&self) -> String {
         let seconds = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs();
-        let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-        let cpu = cpu.lines().find_map(|line| line.strip_prefix("model name\t: ")).unwrap_or("unknown");
-        let cores = std::thread::available_parallelism().map_or(0, usize::from);
+        let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let cpu = cpuinfo.lines().find_map(|line| line.strip_prefix("model name\t: ")).unwrap_or("unknown");
+        let cores = cpuinfo.lines().filter(|line| line.starts_with("processor")).count();
         let commit = env!("WADE_COMMIT");
         let mut csv = format!("# commit {commit}, {cpu}, {cores} cores, {seconds} s since 1970\n");
         if let Some(peak) = self.peak {
