@@ -7,14 +7,14 @@ use crate::frame::{Vec3, WaterPlane};
 /// Density of fresh water [kg/m3].
 pub const FRESH_WATER: f64 = 1000.0;
 
-/// Whether water reaches under the contact patches of the tyres.
+/// Whether water reaches under the contact patches of the tires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum GroundContact {
-    /// Full Archimedes: water reaches under a treaded tyre on rough ground.
+    /// Full Archimedes: water reaches under a treaded tire on rough ground.
     #[default]
     Wetted,
-    /// No water pressure under the contact patches, as for a tyre pressed on a smooth bed.
+    /// No water pressure under the contact patches, as for a tire pressed on a smooth bed.
     Dry,
 }
 
@@ -37,7 +37,7 @@ pub struct Condition {
     pub density: f64,
     /// World up in the body frame.
     pub up: UnitVector3<f64>,
-    /// Whether water reaches under the tyres.
+    /// Whether water reaches under the tires.
     pub ground_contact: GroundContact,
 }
 

@@ -20,7 +20,7 @@ pub struct SurfaceForce {
 pub struct Forces {
     /// One load a surface, in the vehicle's order.
     pub surfaces: Vec<SurfaceForce>,
-    /// Net force and moment about the centre of mass.
+    /// Net force and moment about the center of mass.
     pub wrench: Wrench,
     /// One standard deviation of the net force [N].
     pub uncertainty: Vec3,

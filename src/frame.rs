@@ -1,6 +1,6 @@
 //! Frames and the water plane.
 //!
-//! Body frame: right-handed FLU (x forward, y left, z up), origin at the centre of the hull's bounding box,
+//! Body frame: right-handed FLU (x forward, y left, z up), origin at the center of the hull's bounding box,
 //! SI units, radians. `z0` is the z of the ground-contact plane in that frame.
 
 use nalgebra::{UnitQuaternion, UnitVector3, Vector3};

@@ -1,8 +1,8 @@
 //! Hydrodynamic forces on ground vehicles that drive into water: a vehicle's geometry and weights in, forces on each
 //! surface and the net wrench out.
 //!
-//! Body frame: right-handed FLU (x forward, y left, z up), origin at the centre of the hull's bounding box. SI units,
-//! radians, forces in N, moments in N m about the centre of mass. Depth is the height of the undisturbed water surface
+//! Body frame: right-handed FLU (x forward, y left, z up), origin at the center of the hull's bounding box. SI units,
+//! radians, forces in N, moments in N m about the center of mass. Depth is the height of the undisturbed water surface
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:

@@ -32,7 +32,7 @@ fn of<'a>(vehicle: &Vehicle, forces: &'a [Vec3], name: &str) -> &'a Vec3 {
 
 #[test]
 fn drag_constant_of_the_warthog_is_near_the_known_baseline() {
-    // C = -Fx / v^2 [N s2/m2] at 4, 8, 10 in: Cd 2.1 on the wetted width of front wheels and rockers. The shipped tyre
+    // C = -Fx / v^2 [N s2/m2] at 4, 8, 10 in: Cd 2.1 on the wetted width of front wheels and rockers. The shipped tire
     // is rounded at its shoulders where the baseline takes its full width, hence the wide tolerance in shallow water.
     for (depth, baseline, tolerance) in [(0.1016, 54.3, 0.25), (0.2032, 109.8, 0.2), (0.254, 149.5, 0.2)] {
         let c = -net(warthog(), &Condition::level(Vec3::x() * 2.0, depth)).x / 4.0;

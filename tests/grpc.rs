@@ -332,12 +332,18 @@ fn a_server_that_cannot_read_its_bundles_never_says_serving() {
 
 #[test]
 fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
-    let served = Served::with(|config| config.grpc.max_batch = 1 << 15);
+    let served = Served::with(|config| {
+        config.grpc.max_batch = 1 << 16;
+        config.grpc.max_requests = 1;
+        // this is about what is answered, on a machine of any speed
+        config.drain_s = PATIENCE.as_secs_f64();
+    });
     let runtime = runtime();
     let _inside = runtime.enter();
     let (mut health, mut long, mut watched) = runtime.block_on(async {
         (HealthClient::new(channel(&served).await), client(&served).await, client(&served).await)
     });
+    let mut probe = runtime.block_on(client(&served));
     let check = HealthCheckRequest { service: String::new() };
     let mut states = runtime.block_on(health.watch(check)).expect("watched").into_inner();
     let (sender, outgoing) = tokio::sync::mpsc::channel(1);
@@ -346,9 +352,16 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
         watched.stream(ReceiverStream::new(outgoing)).await.expect("opened").into_inner()
     });
     runtime.block_on(answers.message()).expect("answered").expect("one");
-    let in_flight = runtime.spawn(async move { long.evaluate_batch(batch(1 << 15)).await });
-    // the batch has reached the server once its own connection has sent it: let the runtime run
-    runtime.block_on(tokio::time::sleep(Duration::from_millis(50)));
+    // long to compute, short to send
+    let request = proto::EvaluateBatchRequest { omit_surfaces: true, ..batch(1 << 14) };
+    let in_flight = runtime.spawn(async move { long.evaluate_batch(request).await });
+    // the batch is in flight once it has taken the one place that there is
+    runtime.block_on(async {
+        let start = Instant::now();
+        while probe.evaluate(crate::request("husky", 0.1)).await.is_ok() {
+            assert!(start.elapsed() < PATIENCE && !in_flight.is_finished(), "the batch never arrived");
+        }
+    });
     let Served { running, config, .. } = served;
     let stopping = std::thread::spawn(move || {
         let start = Instant::now();
@@ -368,7 +381,7 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
         }
         assert_eq!(last, ServingStatus::NotServing);
     });
-    drop((states, health, watched, sender));
+    drop((states, health, watched, probe, sender));
     let elapsed = stopping.join().expect("stopped");
     assert!(elapsed < Duration::from_secs_f64(config.drain_s) + PATIENCE, "{elapsed:?}");
 }
@@ -426,5 +439,7 @@ fn a_watch_of_our_health_hears_the_end_and_does_not_hold_up_a_drain() {
         seen.push(state.status());
     }
     assert_eq!(seen.last(), Some(&ServingStatus::NotServing), "{seen:?}");
+    // a client that stands still cannot say goodbye, and would be waited for
+    drop((states, runtime));
     stopping.join().expect("stopped long before its bound of an hour");
 }

@@ -38,8 +38,8 @@ fn a_level_box_displaces_its_draft() {
 }
 
 #[test]
-fn a_heeled_box_has_the_metacentre_of_the_wall_sided_formula() {
-    // B(phi) of a wall-sided hull about its level centre of buoyancy: BM tan(phi) sideways, BM tan^2(phi)/2 up
+fn a_heeled_box_has_the_metacenter_of_the_wall_sided_formula() {
+    // B(phi) of a wall-sided hull about its level center of buoyancy: BM tan(phi) sideways, BM tan^2(phi)/2 up
     let (length, beam, draft, heel) = (2.0, 1.0, 0.2, 0.1_f64);
     let up = up_from_roll_pitch(heel, 0.0);
     let water = WaterPlane::new(-0.25, draft, up);

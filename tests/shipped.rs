@@ -192,7 +192,7 @@ fn mirror_partners_are_mirror_images() {
 }
 
 #[test]
-fn dry_contact_patches_take_away_the_pressure_under_the_tyres() {
+fn dry_contact_patches_take_away_the_pressure_under_the_tires() {
     // 0.157 m2 in all: the warthog-like CFD mesh loses 157, 313 and 392 N at 4, 8 and 10 in against Archimedes
     let vehicle = warthog().unwrap().vehicle().unwrap();
     for (depth, lost) in [(0.1016, 157.0), (0.2032, 313.0), (0.254, 392.0)] {

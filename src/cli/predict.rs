@@ -15,7 +15,7 @@ use super::Vehicles;
 /// Forces for every row of a table of states
 ///
 /// Columns: vx vy vz and depth; optionally wx wy wz, roll pitch, ax ay az, alx aly alz, rho, in SI units and radians.
-/// Adds fx fy fz mx my mz about the centre of mass and in_domain (1 or 0); other columns are kept.
+/// Adds fx fy fz mx my mz about the center of mass and in_domain (1 or 0); other columns are kept.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   wade predict --vehicle warthog --states in.csv --out out.csv --per-surface")]

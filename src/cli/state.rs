@@ -39,7 +39,7 @@ pub struct StateArgs {
     /// Angular acceleration [rad/s2]
     #[arg(long, value_name = "AX,AY,AZ", value_parser = vector, allow_hyphen_values = true)]
     angular_acceleration: Option<[f32; 3]>,
-    /// Whether water reaches under the tyres
+    /// Whether water reaches under the tires
     #[arg(long, value_enum, default_value_t = Contact::Wetted)]
     ground_contact: Contact,
 }

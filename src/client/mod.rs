@@ -78,7 +78,7 @@ pub struct Reply {
     pub force: [f32; 3],
     /// Net moment [N m] about `about`.
     pub moment: [f32; 3],
-    /// Centre of mass, body frame [m].
+    /// Center of mass, body frame [m].
     pub about: [f32; 3],
     /// One standard deviation of the net force [N].
     pub uncertainty: [f32; 3],

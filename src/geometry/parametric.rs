@@ -125,8 +125,8 @@ pub fn cylinder(center: &Vec3, radius: f64, width: f64, facets: u32) -> Mesh {
     revolve(center, &[(-half, 0.0), (-half, radius), (half, radius), (half, 0.0)], facets)
 }
 
-/// A tyre: a cylinder whose tread of full radius is narrower than the tyre, with conical shoulders.
-pub fn tyre(center: &Vec3, radius: f64, width: f64, tread: f64, shoulder: f64, facets: u32) -> Mesh {
+/// A tire: a cylinder whose tread of full radius is narrower than the tire, with conical shoulders.
+pub fn tire(center: &Vec3, radius: f64, width: f64, tread: f64, shoulder: f64, facets: u32) -> Mesh {
     let (half, flat, edge) = (0.5 * width, 0.5 * tread, radius - shoulder);
     let profile = [(-half, 0.0), (-half, edge), (-flat, radius), (flat, radius), (half, edge), (half, 0.0)];
     revolve(center, &profile, facets)

@@ -97,7 +97,7 @@ impl Model {
         self.kernel.isa()
     }
 
-    /// Forces on every surface and the net wrench about the centre of mass, body frame.
+    /// Forces on every surface and the net wrench about the center of mass, body frame.
     ///
     /// Allocates nothing once `forces` has held this many surfaces. Angular rates and accelerations do not enter the
     /// paper's network. A state with angular rates is marked as outside the training domain; accelerations are not judged.

@@ -125,7 +125,7 @@ pub struct Answer {
     pub force_n: [f32; 3],
     /// Net moment about `about_m` [N m].
     pub moment_nm: [f32; 3],
-    /// Centre of mass, body frame [m].
+    /// Center of mass, body frame [m].
     pub about_m: [f32; 3],
     /// One standard deviation of the net force [N].
     pub uncertainty_n: [f32; 3],

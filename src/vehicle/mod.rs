@@ -70,7 +70,7 @@ pub struct Dimensions {
     pub height: f64,
 }
 
-/// Where a tyre stands on the ground; body frame.
+/// Where a tire stands on the ground; body frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPatch {
     /// Index of the surface that stands there.
@@ -84,7 +84,7 @@ pub struct ContactPatch {
 impl ContactPatch {
     /// The load that the hull loses when no water reaches under the patch, about `about` [N, N m].
     ///
-    /// `F = -rho g delta A z` with the depth `delta` of the centre: add it to the hydrostatics of the surface for
+    /// `F = -rho g delta A z` with the depth `delta` of the center: add it to the hydrostatics of the surface for
     /// `GroundContact::Dry`.
     pub fn lost_pressure(&self, plane: &WaterPlane, density: f64, about: &Vec3) -> Wrench {
         let depth = plane.depth_below(&self.center).max(0.0);
@@ -103,13 +103,13 @@ pub struct Vehicle {
     pub z0: f64,
     /// Mass [kg].
     pub mass: f64,
-    /// Inertia about the centre of mass [kg m2].
+    /// Inertia about the center of mass [kg m2].
     pub inertia: Matrix3<f64>,
-    /// Centre of mass [m].
+    /// Center of mass [m].
     pub center_of_mass: Vec3,
     /// How the coordinates of the STL became the body frame's.
     pub body_from_stl: BodyFromStl,
-    /// What was added after scale and axes, so that the hull is centred [m].
+    /// What was added after scale and axes, so that the hull is centerd [m].
     pub translation: Vec3,
     /// True when left and right are mirror images, checked at the build.
     pub symmetric_left_right: bool,
@@ -117,7 +117,7 @@ pub struct Vehicle {
     pub symmetric_front_rear: bool,
     /// The named surfaces, K of them.
     pub surfaces: Vec<Surface>,
-    /// Contact patches of the tyres; may be empty.
+    /// Contact patches of the tires; may be empty.
     pub contacts: Vec<ContactPatch>,
     /// The closed hull and the surface of each face.
     pub hull: Hull,

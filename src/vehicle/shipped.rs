@@ -1,6 +1,6 @@
 //! The two vehicles that come with us, as parametric bodies. They pass through the same `build` as anybody's STL.
 //!
-//! Each dimension is marked: published (Clearpath user manuals), measured (on the public meshes, undeflected tyres),
+//! Each dimension is marked: published (Clearpath user manuals), measured (on the public meshes, undeflected tires),
 //! tuned (so that the vertical force of the sealed public mesh is met at every depth of its table), or chosen (free).
 
 use super::Vehicle;
@@ -8,7 +8,7 @@ use super::build::{BuildError, build};
 use super::spec::VehicleSpec;
 use crate::frame::Vec3;
 use crate::geometry::mesh::{Bounds, Mesh, write_stl};
-use crate::geometry::parametric::{Section, cuboid, cylinder, loft, tyre};
+use crate::geometry::parametric::{Section, cuboid, cylinder, loft, tire};
 
 /// Facets of a wheel: the displaced volume of a cylinder is right to 1 % from a fifth of the radius up.
 pub const WHEEL_FACETS: u32 = 64;
@@ -66,7 +66,7 @@ pub fn warthog() -> Result<Shipped, toml::de::Error> {
     // radius and width measured, axles from the measured length 1.524 and width 1.391; tread and shoulder tuned to the
     // sealed wheels alone (251, 745, 1027 N at 4, 8, 10 in)
     for (x, y) in corners(0.5 * 1.524 - 0.305, 0.5 * (1.391 - 0.254)) {
-        mesh.append(&tyre(&Vec3::new(x, y, ground + 0.305), 0.305, 0.254, 0.115, 0.056, WHEEL_FACETS));
+        mesh.append(&tire(&Vec3::new(x, y, ground + 0.305), 0.305, 0.254, 0.115, 0.056, WHEEL_FACETS));
     }
     mesh.append(&warthog_chassis(ground));
     for side in [1.0, -1.0] {

@@ -14,9 +14,9 @@ pub struct VehicleSpec {
     pub name: String,
     /// Mass [kg].
     pub mass_kg: f64,
-    /// Centre of mass in the body frame [m].
+    /// Center of mass in the body frame [m].
     pub center_of_mass_m: [f64; 3],
-    /// Inertia about the centre of mass [kg m2]; default: a solid box of the dimensions, an estimate.
+    /// Inertia about the center of mass [kg m2]; default: a solid box of the dimensions, an estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia_kg_m2: Option<[[f64; 3]; 3]>,
     /// Reference length, width, height [m]; default: the bounding box.
@@ -44,7 +44,7 @@ pub struct VehicleSpec {
     pub patch: Vec<PatchSpec>,
     /// Which faces belong to which surface: the first rule that holds for a face decides.
     pub rule: Vec<Rule>,
-    /// Contact patches of the tyres.
+    /// Contact patches of the tires.
     #[serde(default)]
     pub contact: Vec<ContactSpec>,
 }
@@ -53,7 +53,7 @@ fn yes() -> bool {
     true
 }
 
-/// Scale and axes of the STL; the hull is then centred on its bounding box.
+/// Scale and axes of the STL; the hull is then centerd on its bounding box.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BodyFromStl {
@@ -159,7 +159,7 @@ pub struct Rule {
     pub within_deg: Option<f64>,
 }
 
-/// One tyre's contact with the ground.
+/// One tire's contact with the ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactSpec {
@@ -167,7 +167,7 @@ pub struct ContactSpec {
     pub patch: String,
     /// Area without water in the convention `dry` [m2].
     pub area_m2: f64,
-    /// Centre [m]; default: below the centroid of the surface.
+    /// Center [m]; default: below the centroid of the surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub center_xy_m: Option<[f64; 2]>,
 }

@@ -65,7 +65,7 @@ pub enum VehicleError {
         surfaces: usize,
     },
     /// A contact patch that names no surface or has no area.
-    #[error("contact patch {index} names no surface or has no sound area and centre")]
+    #[error("contact patch {index} names no surface or has no sound area and center")]
     Contact {
         /// Index of the contact patch.
         index: usize,
@@ -100,7 +100,7 @@ impl Vehicle {
                 return Err(VehicleError::Number { quantity, value, expected: "positive and finite" });
             }
         }
-        for (quantity, value) in [("z0", self.z0), ("centre of mass", self.center_of_mass.sum())] {
+        for (quantity, value) in [("z0", self.z0), ("center of mass", self.center_of_mass.sum())] {
             if !value.is_finite() {
                 return Err(VehicleError::Number { quantity, value, expected: "finite" });
             }
