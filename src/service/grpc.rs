@@ -267,7 +267,10 @@ impl Server {
     pub async fn run(&self, listeners: &Listeners, stop: watch::Receiver<bool>) -> Result<(), GrpcError> {
         let at = |at: String| move |source| GrpcError::Bind { at, source };
         let tcp = async {
-            let Some(listener) = &listeners.tcp else { return Ok(stopped(stop.clone()).await) };
+            let Some(listener) = &listeners.tcp else {
+                stopped(stop.clone()).await;
+                return Ok(());
+            };
             let listener = listener.try_clone().and_then(tokio::net::TcpListener::from_std);
             let listener = listener.map_err(at(self.config.listen.clone()))?;
             let serving = self
@@ -276,7 +279,10 @@ impl Server {
             serving.await.map_err(GrpcError::from)
         };
         let unix = async {
-            let Some((listener, path)) = &listeners.unix else { return Ok(stopped(stop.clone()).await) };
+            let Some((listener, path)) = &listeners.unix else {
+                stopped(stop.clone()).await;
+                return Ok(());
+            };
             let listener = listener.try_clone().and_then(tokio::net::UnixListener::from_std);
             let listener = UnixListenerStream::new(listener.map_err(at(path.display().to_string()))?);
             let serving = self
