@@ -35,6 +35,7 @@ pub mod cores;
 pub mod soak;
 pub mod states;
 
+pub mod cfd;
 pub mod train;
 
 pub mod config;

@@ -10,7 +10,7 @@ const LAYERS: [&[&str]; 8] = [
     &["features", "effects", "analytic"],
     &["model", "bundle"],
     &["engine", "metrics"],
-    &["cores", "service", "states", "client", "soak", "train"],
+    &["cores", "service", "states", "client", "soak", "train", "cfd"],
     &["config"],
     &["server"],
 ];

@@ -3,6 +3,7 @@
 use super::immersion::{WetTriangle, wet_triangles};
 use super::mesh::Mesh;
 use super::surfaces::Hull;
+use crate::condition::FRESH_WATER;
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::wrench::Wrench;
 
@@ -32,6 +33,20 @@ pub fn hydrostatics(mesh: &Mesh, plane: &WaterPlane, density: f64, about: &Vec3)
         wet_triangles(mesh, face, plane).iter().for_each(|t| sums.add(t, about));
     }
     sums.finish(plane, density, about)
+}
+
+/// Depth at which a level hull of `mass` [kg] floats in fresh water [m]; the height of the hull where it sinks.
+pub fn float_depth(mesh: &Mesh, z0: f64, mass: f64) -> f64 {
+    let top = mesh.bounds().map_or(z0, |bounds| bounds.max.z);
+    let (mut sinks, mut floats) = (0.0, top - z0);
+    // the displaced volume grows with depth: bisection to a micrometer
+    while floats - sinks > 1e-6 {
+        let depth = 0.5 * (sinks + floats);
+        let displaced =
+            hydrostatics(mesh, &WaterPlane::level(z0, depth), FRESH_WATER, &Vec3::zeros()).displaced_volume;
+        if displaced * FRESH_WATER < mass { sinks = depth } else { floats = depth }
+    }
+    floats
 }
 
 /// The pressure load on each surface about `about` [N, N m], in the order of the surfaces.

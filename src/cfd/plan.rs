@@ -1,0 +1,575 @@
+//! Which cases to compute: a folder with `campaign.toml` (vehicle and settings) and `plan.csv` (a row a case).
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Rotation3, UnitVector3};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::case::Settings;
+use crate::condition::{Condition, GroundContact};
+use crate::domain::Range;
+use crate::frame::{Vec3, up_from_roll_pitch};
+use crate::train::plan::Table;
+use crate::train::random::Random;
+use crate::vehicle::Vehicle;
+
+/// File of the settings.
+pub const CAMPAIGN_FILE: &str = "campaign.toml";
+/// File of the cases.
+pub const PLAN_FILE: &str = "plan.csv";
+
+/// What a case is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Set {
+    /// The source paper's parameter table.
+    Paper,
+    /// Any heading, from standstill, tilted, up to floating depth.
+    Wide,
+    /// The states of the paper set once more with moving bed and turning wheels.
+    Driving,
+    /// Surge accelerations.
+    Unsteady,
+    /// Cases that others know the answer of: at rest, head-on at the paper's depths, three meshes.
+    Check,
+}
+
+impl fmt::Display for Set {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Paper => "paper",
+            Self::Wide => "wide",
+            Self::Driving => "driving",
+            Self::Unsteady => "unsteady",
+            Self::Check => "check",
+        })
+    }
+}
+
+/// What the bed does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Bed {
+    /// Bed and wheels at rest relative to the vehicle: a vehicle parked in a current.
+    #[default]
+    Parked,
+    /// The bed moves with the water and the wheels roll on it: a vehicle that drives through still water.
+    Driving,
+}
+
+/// One case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// Unique name, `<vehicle>-<set>-<number>`; the name of its folder.
+    pub id: String,
+    /// What it is for.
+    pub set: Set,
+    /// Speed through the water at the start [m/s].
+    pub speed_mps: f64,
+    /// Direction of the velocity in the body frame seen from above: 0 forward, 90 to the left [degrees].
+    pub heading_deg: f64,
+    /// Depth at the body origin [m].
+    pub depth_m: f64,
+    /// Density of the fluid [kg/m3].
+    pub density_kgpm3: f64,
+    /// Roll, positive lowers the right side [degrees].
+    pub roll_deg: f64,
+    /// Pitch, positive lowers the nose [degrees].
+    pub pitch_deg: f64,
+    /// What the bed does.
+    pub bed: Bed,
+    /// Size of the cells relative to the settings.
+    pub cell_scale: f64,
+    /// Speed after the ramp of an unsteady case [m/s]; the same as `speed_mps` for a steady one.
+    pub end_speed_mps: f64,
+    /// Duration of the ramp [s]; 0 for a steady case.
+    pub ramp_s: f64,
+}
+
+impl Case {
+    /// A steady level case on the standard mesh over a parked bed; `number` counts within vehicle and set.
+    fn steady(vehicle: &str, set: Set, number: usize, speed_mps: f64, depth_m: f64) -> Self {
+        Self {
+            id: format!("{vehicle}-{set}-{number:04}"),
+            set,
+            speed_mps,
+            heading_deg: 0.0,
+            depth_m,
+            density_kgpm3: crate::condition::FRESH_WATER,
+            roll_deg: 0.0,
+            pitch_deg: 0.0,
+            bed: Bed::Parked,
+            cell_scale: 1.0,
+            end_speed_mps: speed_mps,
+            ramp_s: 0.0,
+        }
+    }
+
+    /// True when the speed changes.
+    pub fn is_unsteady(&self) -> bool {
+        self.ramp_s > 0.0
+    }
+
+    /// True when wheels stand on the bed as on level ground.
+    pub fn is_level(&self) -> bool {
+        self.roll_deg == 0.0 && self.pitch_deg == 0.0
+    }
+
+    /// World up in the body frame.
+    pub fn up(&self) -> UnitVector3<f64> {
+        up_from_roll_pitch(self.roll_deg.to_radians(), self.pitch_deg.to_radians())
+    }
+
+    /// Rotation from the body frame to the frame of the case.
+    pub fn cfd_from_body(&self) -> Rotation3<f64> {
+        let [roll, pitch, yaw] = [self.roll_deg, self.pitch_deg, -self.heading_deg].map(f64::to_radians);
+        Rotation3::from_euler_angles(roll, pitch, yaw)
+    }
+
+    /// The state that the case computes at a given speed and acceleration along the velocity, body frame.
+    pub fn condition(&self, speed: f64, acceleration: f64) -> Condition {
+        let forward = self.cfd_from_body().inverse() * Vec3::x();
+        let velocity = forward * speed;
+        let ground_velocity = match self.bed {
+            Bed::Parked => Vec3::zeros(),
+            Bed::Driving => velocity,
+        };
+        let ground_contact = if self.is_level() { GroundContact::Dry } else { GroundContact::Wetted };
+        Condition {
+            velocity,
+            ground_velocity,
+            acceleration: forward * acceleration,
+            density: self.density_kgpm3,
+            up: self.up(),
+            ground_contact,
+            ..Condition::level(velocity, self.depth_m)
+        }
+    }
+}
+
+/// What a campaign is about; the file `campaign.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Campaign {
+    /// Format of the folder.
+    pub format: u32,
+    /// Name of the vehicle's bundle.
+    pub vehicle: String,
+    /// SHA-256 of its hull and surfaces, so that a vehicle that changed since is noticed.
+    pub hull_sha256: String,
+    /// The table that the plan covers.
+    pub table: Table,
+    /// How every case is computed.
+    #[serde(default)]
+    pub settings: Settings,
+}
+
+/// The format this version writes and reads.
+pub const FORMAT: u32 = 1;
+
+/// Why a campaign folder was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// A file that cannot be read or written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file that does not parse.
+    #[error("{path}: {message}")]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Where and what.
+        message: String,
+    },
+    /// A folder of a newer format.
+    #[error("{path}: format {found}, this version of wade reads {FORMAT}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        found: u32,
+    },
+    /// Two rows of one name.
+    #[error("{path}: case `{id}` stands there twice")]
+    Twice {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        id: String,
+    },
+    /// A number out of its range.
+    #[error("{path}: case `{id}`: {field} is {value}, which is not {expected}")]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The case.
+        id: String,
+        /// The column.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// Driving twins need the paper set.
+    #[error(
+        "there are {available} cases of the paper set without a driving twin, {wanted} are asked for: plan more of the paper set first"
+    )]
+    NoTwin {
+        /// Cases to take a twin of.
+        available: usize,
+        /// Twins asked for.
+        wanted: usize,
+    },
+    /// The plan of another vehicle, or of this one before it changed.
+    #[error(
+        "{path}: the plan was made for a `{vehicle}` with another hull: plan anew, or bring that bundle back"
+    )]
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// Name of the vehicle.
+        vehicle: String,
+    },
+}
+
+/// A campaign and its cases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The settings.
+    pub campaign: Campaign,
+    /// The cases in the order of their planning.
+    pub cases: Vec<Case>,
+}
+
+impl Plan {
+    /// Reads a campaign folder.
+    pub fn read(folder: &Path) -> Result<Self, PlanError> {
+        let path = folder.join(CAMPAIGN_FILE);
+        let text = std::fs::read_to_string(&path).map_err(|source| io(&path, source))?;
+        let campaign: Campaign = toml::from_str(&text).map_err(|e| syntax(&path, &e))?;
+        if campaign.format != FORMAT {
+            return Err(PlanError::Format { path, found: campaign.format });
+        }
+        let path = folder.join(PLAN_FILE);
+        let mut reader = csv::Reader::from_path(&path).map_err(|e| syntax(&path, &e))?;
+        let cases: Vec<Case> =
+            reader.deserialize().collect::<Result<_, _>>().map_err(|e| syntax(&path, &e))?;
+        let mut seen = BTreeSet::new();
+        for case in &cases {
+            if !seen.insert(&case.id) {
+                return Err(PlanError::Twice { path, id: case.id.clone() });
+            }
+            check(&path, case)?;
+        }
+        Ok(Self { campaign, cases })
+    }
+
+    /// Writes the campaign folder.
+    pub fn write(&self, folder: &Path) -> Result<(), PlanError> {
+        std::fs::create_dir_all(folder).map_err(|source| io(folder, source))?;
+        let path = folder.join(CAMPAIGN_FILE);
+        let text = toml::to_string(&self.campaign).map_err(|e| syntax(&path, &e))?;
+        std::fs::write(&path, text).map_err(|source| io(&path, source))?;
+        let path = folder.join(PLAN_FILE);
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        for case in &self.cases {
+            writer.serialize(case).map_err(|e| syntax(&path, &e))?;
+        }
+        let bytes = writer.into_inner().map_err(|e| syntax(&path, &e))?;
+        // a plan is extended in place: the old one stays whole until the new one is
+        let partial = path.with_extension("csv.partial");
+        std::fs::write(&partial, bytes).map_err(|source| io(&partial, source))?;
+        std::fs::rename(&partial, &path).map_err(|source| io(&path, source))
+    }
+
+    /// Adds cases of a set; none is repeated, and the earlier ones stay as they are.
+    pub fn extend(&mut self, set: Set, count: usize, seed: u64, float_depth: f64) -> Result<(), PlanError> {
+        // two vehicles of one seed get two plans
+        let name =
+            self.campaign.vehicle.bytes().fold(0_u64, |sum, byte| sum.wrapping_mul(31) + u64::from(byte));
+        let mut random = Random::new(seed ^ name);
+        let fresh = match set {
+            Set::Paper => self.hypercube(set, count, &paper_ranges(&self.campaign.table), &mut random),
+            Set::Wide => {
+                self.hypercube(set, count, &wide_ranges(&self.campaign.table, float_depth), &mut random)
+            }
+            Set::Driving => self.twins(count)?,
+            Set::Unsteady => self.surges(),
+            Set::Check => self.checks(),
+        };
+        let known: BTreeSet<String> = self.cases.iter().map(|c| c.id.clone()).collect();
+        self.cases.extend(fresh.into_iter().filter(|case| !known.contains(&case.id)));
+        Ok(())
+    }
+
+    /// Refuses a vehicle whose hull or surfaces are not those that the plan was made for.
+    pub fn check_vehicle(&self, folder: &Path, vehicle: &Vehicle) -> Result<(), PlanError> {
+        if vehicle.name == self.campaign.vehicle && hull_hash(vehicle) == self.campaign.hull_sha256 {
+            return Ok(());
+        }
+        Err(PlanError::Changed { path: folder.join(CAMPAIGN_FILE), vehicle: self.campaign.vehicle.clone() })
+    }
+
+    fn of(&self, set: Set) -> impl Iterator<Item = &Case> {
+        self.cases.iter().filter(move |case| case.set == set)
+    }
+
+    fn hypercube(&self, set: Set, count: usize, ranges: &[Range; 6], random: &mut Random) -> Vec<Case> {
+        let taken: Vec<[f64; 6]> = self.of(set).map(coordinates).collect();
+        let axes: Vec<Vec<f64>> = (0..6)
+            .map(|axis| {
+                let taken: Vec<f64> = taken.iter().map(|point| point[axis]).collect();
+                free_strata(ranges[axis], &taken, count, random)
+            })
+            .collect();
+        (0..count)
+            .map(|i| {
+                let [speed, heading, depth, density, roll, pitch] = std::array::from_fn(|axis| axes[axis][i]);
+                Case {
+                    heading_deg: heading,
+                    density_kgpm3: density,
+                    roll_deg: roll,
+                    pitch_deg: pitch,
+                    ..Case::steady(&self.campaign.vehicle, set, taken.len() + i, speed, depth)
+                }
+            })
+            .collect()
+    }
+
+    /// The paper cases that move most nearly straight ahead, once more with a driving bed.
+    fn twins(&self, count: usize) -> Result<Vec<Case>, PlanError> {
+        let twin_id = |case: &Case| case.id.replacen("-paper-", "-driving-", 1);
+        let known: BTreeSet<&str> = self.cases.iter().map(|case| case.id.as_str()).collect();
+        let mut free: Vec<&Case> =
+            self.of(Set::Paper).filter(|c| !known.contains(twin_id(c).as_str())).collect();
+        if free.len() < count {
+            return Err(PlanError::NoTwin { available: free.len(), wanted: count });
+        }
+        free.sort_by(|a, b| a.heading_deg.total_cmp(&b.heading_deg));
+        let twin =
+            |case: &Case| Case { id: twin_id(case), set: Set::Driving, bed: Bed::Driving, ..case.clone() };
+        Ok(free.into_iter().take(count).map(twin).collect())
+    }
+
+    /// Ramps of the speed at three depths, up and down, gentle and hard; head-on, and one broadside.
+    fn surges(&self) -> Vec<Case> {
+        let Table { speed_mps, depth_m, .. } = self.campaign.table;
+        let depth = |share: f64| depth_m.min + share * (depth_m.max - depth_m.min);
+        let (slow, fast) = (0.25 * speed_mps.max, 0.5 * speed_mps.max);
+        let ramps = [
+            (slow, fast, 1.0, 0.0),
+            (fast, slow, 1.0, 0.0),
+            (slow, fast, 0.5, 0.0),
+            (slow, fast, 2.0, 0.0),
+            (slow, fast, 1.0, 90.0),
+        ];
+        let depths = [0.33, 0.67, 1.0];
+        let states = depths.iter().flat_map(|&share| ramps.map(|ramp| (depth(share), ramp)));
+        states
+            .enumerate()
+            .map(|(i, (depth, (from, to, ramp_s, heading_deg)))| Case {
+                end_speed_mps: to,
+                ramp_s,
+                heading_deg,
+                ..Case::steady(&self.campaign.vehicle, Set::Unsteady, i, from, depth)
+            })
+            .collect()
+    }
+
+    /// At rest at three depths; head-on at two speeds for each; one of them on three meshes.
+    fn checks(&self) -> Vec<Case> {
+        let Table { speed_mps, depth_m, .. } = self.campaign.table;
+        let inch = 0.0254;
+        // the depths of the paper's trials with the Warthog, and the same shares of the table for other vehicles
+        let depths = [4.0, 8.0, 10.0].map(|inches: f64| {
+            let share = (inches * inch - 0.10) / 0.30;
+            depth_m.min + share * (depth_m.max - depth_m.min)
+        });
+        let speeds = [0.0, 0.25 * speed_mps.max, 0.5 * speed_mps.max];
+        let states = depths.iter().flat_map(|&depth| speeds.map(|speed| (speed, depth, 1.0)));
+        let meshes = [0.72, 0.5].map(|scale| (speeds[2], depths[1], scale));
+        states
+            .chain(meshes)
+            .enumerate()
+            .map(|(i, (speed, depth, cell_scale))| Case {
+                cell_scale,
+                ..Case::steady(&self.campaign.vehicle, Set::Check, i, speed, depth)
+            })
+            .collect()
+    }
+}
+
+/// SHA-256 of the corners of every face, its surface, and the contact patches.
+pub fn hull_hash(vehicle: &Vehicle) -> String {
+    let mut sha = Sha256::new();
+    let mesh = &vehicle.hull.mesh;
+    let mut point = |p: &Vec3| p.iter().for_each(|x| sha.update((*x as f32).to_le_bytes()));
+    (0..mesh.faces.len()).flat_map(|face| mesh.triangle(face)).for_each(|corner| point(&corner));
+    vehicle.contacts.iter().for_each(|patch| point(&(patch.center + Vec3::z() * patch.area)));
+    vehicle.hull.face_surface.iter().for_each(|surface| sha.update(surface.to_le_bytes()));
+    vehicle.surfaces.iter().for_each(|surface| sha.update(surface.name.as_bytes()));
+    sha.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn io(path: &Path, source: std::io::Error) -> PlanError {
+    PlanError::Io { path: path.to_owned(), source }
+}
+
+fn syntax(path: &Path, error: &dyn fmt::Display) -> PlanError {
+    PlanError::Syntax { path: path.to_owned(), message: error.to_string() }
+}
+
+/// Refuses a row that no solver should see.
+fn check(path: &Path, case: &Case) -> Result<(), PlanError> {
+    let fields = [
+        ("speed_mps", case.speed_mps, 0.0, 30.0, "a speed from 0 to 30 m/s"),
+        ("end_speed_mps", case.end_speed_mps, 0.0, 30.0, "a speed from 0 to 30 m/s"),
+        ("heading_deg", case.heading_deg, -180.0, 180.0, "an angle from -180 to 180 degrees"),
+        ("depth_m", case.depth_m, 0.005, 50.0, "a depth from 0.005 to 50 m"),
+        ("density_kgpm3", case.density_kgpm3, 100.0, 20_000.0, "a density from 100 to 20000 kg/m3"),
+        ("roll_deg", case.roll_deg, -45.0, 45.0, "an angle from -45 to 45 degrees"),
+        ("pitch_deg", case.pitch_deg, -45.0, 45.0, "an angle from -45 to 45 degrees"),
+        ("cell_scale", case.cell_scale, 0.2, 5.0, "a factor from 0.2 to 5"),
+        ("ramp_s", case.ramp_s, 0.0, 60.0, "a time from 0 to 60 s"),
+    ];
+    let wrong = fields.into_iter().find(|(_, value, min, max, _)| !(min..=max).contains(&value));
+    match wrong {
+        Some((field, value, .., expected)) => {
+            Err(PlanError::Value { path: path.to_owned(), id: case.id.clone(), field, value, expected })
+        }
+        None => Ok(()),
+    }
+}
+
+fn coordinates(case: &Case) -> [f64; 6] {
+    [case.speed_mps, case.heading_deg, case.depth_m, case.density_kgpm3, case.roll_deg, case.pitch_deg]
+}
+
+const ZERO: Range = Range { min: 0.0, max: 0.0 };
+
+/// Speed, heading, depth, density, roll, pitch; a flow angle of 90 degrees is a heading of 0.
+fn paper_ranges(table: &Table) -> [Range; 6] {
+    let heading = Range { min: 90.0 - table.angle_deg.max, max: 90.0 - table.angle_deg.min };
+    [table.speed_mps, heading, table.depth_m, table.density_kgpm3, ZERO, ZERO]
+}
+
+fn wide_ranges(table: &Table, float_depth: f64) -> [Range; 6] {
+    let speed = Range { min: 0.0, max: table.speed_mps.max };
+    let heading = Range { min: 0.0, max: 180.0 };
+    let depth = Range { min: table.depth_m.min, max: table.depth_m.max.max(float_depth) };
+    let tilt = Range { min: -10.0, max: 10.0 };
+    [speed, heading, depth, table.density_kgpm3, tilt, tilt]
+}
+
+/// `count` new values for an axis that has `taken`: the range in as many strata as there will be points, one new
+/// value in each of `count` strata that hold none, in random order.
+///
+/// With nothing taken this is a Latin hypercube (McKay, Beckman, Conover, Technometrics 1979); extended it stays near
+/// one (as the augmented designs of Stein, Technometrics 1987).
+fn free_strata(range: Range, taken: &[f64], count: usize, random: &mut Random) -> Vec<f64> {
+    let total = taken.len() + count;
+    let width = (range.max - range.min) / total as f64;
+    let stratum = |value: f64| if width > 0.0 { ((value - range.min) / width) as usize } else { 0 };
+    let occupied: BTreeSet<usize> =
+        if width > 0.0 { taken.iter().map(|v| stratum(*v)).collect() } else { BTreeSet::new() };
+    let mut free: Vec<usize> = (0..total).filter(|s| !occupied.contains(s)).collect();
+    random.shuffle(&mut free);
+    free.truncate(count);
+    free.into_iter().map(|s| range.min + width * (s as f64 + random.unit())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn plan() -> Plan {
+        let campaign = Campaign {
+            format: FORMAT,
+            vehicle: "warthog".into(),
+            hull_sha256: String::new(),
+            table: Table::WARTHOG,
+            settings: Settings::default(),
+        };
+        Plan { campaign, cases: Vec::new() }
+    }
+
+    #[test]
+    fn a_seed_gives_its_plan_and_an_extension_keeps_it() {
+        let (mut once, mut twice) = (plan(), plan());
+        once.extend(Set::Paper, 40, 7, 0.378).unwrap();
+        twice.extend(Set::Paper, 40, 7, 0.378).unwrap();
+        assert_eq!(once, twice);
+        twice.extend(Set::Paper, 20, 8, 0.378).unwrap();
+        assert_eq!(twice.cases[..40], once.cases[..]);
+        assert_eq!(twice.cases.len(), 60);
+        let speeds: BTreeSet<u64> = twice.cases.iter().map(|c| c.speed_mps.to_bits()).collect();
+        assert_eq!(speeds.len(), 60, "no case is repeated");
+        let ids: BTreeSet<&str> = twice.cases.iter().map(|c| c.id.as_str()).collect();
+        assert_eq!(ids.len(), 60);
+    }
+
+    #[test]
+    fn hits_each_stratum_once_and_fills_the_gaps_when_extended() {
+        let range = Range { min: 0.5, max: 4.0 };
+        let mut random = Random::new(3);
+        let mut values = free_strata(range, &[], 30, &mut random);
+        let stratum = |v: f64, n: f64| ((v - 0.5) / 3.5 * n) as usize;
+        let hit: BTreeSet<usize> = values.iter().map(|v| stratum(*v, 30.0)).collect();
+        assert_eq!(hit.len(), 30);
+        values.extend(free_strata(range, &values, 30, &mut random));
+        let hit: BTreeSet<usize> = values.iter().map(|v| stratum(*v, 60.0)).collect();
+        assert!(hit.len() >= 58, "of 60 strata {} hold a value", hit.len());
+    }
+
+    #[test]
+    fn the_condition_moves_as_the_heading_says_and_is_tilted_as_the_attitude_says() {
+        let case = Case { heading_deg: 90.0, ..Case::steady("warthog", Set::Paper, 0, 2.0, 0.2) };
+        let condition = case.condition(2.0, 0.5);
+        assert!((condition.velocity - Vec3::new(0.0, 2.0, 0.0)).norm() < 1e-12);
+        assert!((condition.acceleration - Vec3::new(0.0, 0.5, 0.0)).norm() < 1e-12);
+        assert_eq!(condition.ground_velocity, Vec3::zeros());
+        let tilted = Case { roll_deg: 5.0, pitch_deg: -8.0, heading_deg: 30.0, ..case };
+        let up = tilted.cfd_from_body().inverse() * Vec3::z();
+        assert!((up - tilted.up().into_inner()).norm() < 1e-12);
+        assert!(tilted.condition(2.0, 0.0).velocity.dot(&up).abs() < 1e-12, "the flow is horizontal");
+    }
+
+    #[test]
+    fn driving_twins_are_the_straightest_paper_cases_and_never_twice() {
+        let mut plan = plan();
+        plan.extend(Set::Paper, 10, 1, 0.378).unwrap();
+        plan.extend(Set::Driving, 4, 1, 0.378).unwrap();
+        plan.extend(Set::Driving, 4, 1, 0.378).unwrap();
+        let twins: Vec<&Case> = plan.of(Set::Driving).collect();
+        assert_eq!(twins.len(), 8);
+        assert!(twins.iter().all(|c| c.bed == Bed::Driving));
+        assert!(plan.extend(Set::Driving, 4, 1, 0.378).is_err());
+    }
+
+    #[test]
+    fn a_folder_reads_back_as_written_and_a_bad_row_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut plan = plan();
+        for set in [Set::Paper, Set::Wide, Set::Unsteady, Set::Check] {
+            plan.extend(set, 5, 1, 0.378).unwrap();
+        }
+        plan.write(folder.path()).unwrap();
+        assert_eq!(Plan::read(folder.path()).unwrap(), plan);
+        plan.cases[3].density_kgpm3 = f64::NAN;
+        plan.write(folder.path()).unwrap();
+        let error = Plan::read(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("warthog-paper-0003") && error.contains("density_kgpm3"), "{error}");
+    }
+}

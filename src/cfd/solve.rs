@@ -1,0 +1,498 @@
+//! One case from its files to section averages.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use super::case::{self, Inputs};
+use super::openfoam::{MeshKind, internal_vectors};
+use super::placement::Placement;
+use super::plan::Case;
+use super::poly_mesh::{MeshHull, PolyMeshError};
+use crate::frame::Vec3;
+
+/// Duration of a section [s], as the source paper averages.
+pub const SECTION_S: f64 = 0.1;
+/// How many times the inflow the potential flow may be fast. Round the corners of a staircase it is up to five times as
+/// fast; the fault of Debian's build shows as thousands.
+const FASTEST: f64 = 10.0;
+/// Share of the force at rest below which a dynamic force does not matter.
+const UNSEEN: f64 = 0.05;
+
+/// Load on one surface about the body origin, body frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// Pressure and viscous force [N].
+    pub force: [f64; 3],
+    /// Moment about the body origin [N m].
+    pub moment: [f64; 3],
+    /// The viscous part of the force [N].
+    pub viscous: [f64; 3],
+}
+
+/// Averages over one section.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Section {
+    /// Start [s].
+    pub start_s: f64,
+    /// End [s].
+    pub end_s: f64,
+    /// Mean speed through the water [m/s].
+    pub speed_mps: f64,
+    /// Mean acceleration along the velocity [m/s2].
+    pub acceleration_mps2: f64,
+    /// Load on each surface.
+    pub loads: Vec<Load>,
+}
+
+/// What a case gave.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// The case.
+    pub case: Case,
+    /// The solver, as data are labelled with it.
+    pub solver: String,
+    /// Kind of the mesh.
+    pub mesh_kind: MeshKind,
+    /// Cells of the mesh.
+    pub cells: usize,
+    /// Courant number of the attempt that held.
+    pub courant: f64,
+    /// Attempts, 1 or 2.
+    pub attempts: u32,
+    /// Time steps.
+    pub steps: usize,
+    /// Processor time of all programs of the attempt that held [s].
+    pub core_s: f64,
+    /// Windows computed until the mean had settled.
+    pub windows: u32,
+    /// True when it had.
+    pub settled: bool,
+    /// Change of the mean net force from the first to the second half of the last window, body frame [N].
+    pub drift: [f64; 3],
+    /// Mass that went in and did not come out over what went in, mean of the last window.
+    pub mass_imbalance: f64,
+    /// Load on each surface at rest on the mesh of the case.
+    pub rest: Vec<Load>,
+    /// Names of the surfaces.
+    pub surfaces: Vec<String>,
+    /// The sections of the last window; of an unsteady case, from half a second before the ramp to the end.
+    pub sections: Vec<Section>,
+}
+
+/// Why a case gave nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum SolveError {
+    /// A file that cannot be read or written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A program that failed.
+    #[error("{program} failed after {seconds:.0} s: {last_lines} (whole log: {log})")]
+    Program {
+        /// Its name.
+        program: &'static str,
+        /// How long it ran.
+        seconds: f64,
+        /// The end of its log.
+        last_lines: String,
+        /// Its log.
+        log: PathBuf,
+    },
+    /// A program that took too long.
+    #[error("{program} was ended after {seconds:.0} s, the limit of the settings (log: {log})")]
+    TooLong {
+        /// Its name.
+        program: &'static str,
+        /// The limit.
+        seconds: f64,
+        /// Its log.
+        log: PathBuf,
+    },
+    /// The potential flow is absurd.
+    #[error(
+        "the potential flow reaches {speed:.1} m/s in an inflow of {inflow:.2} m/s: mesh or solver is broken"
+    )]
+    PotentialFlow {
+        /// Largest speed [m/s].
+        speed: f64,
+        /// Inflow [m/s].
+        inflow: f64,
+    },
+    /// The mesh cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] PolyMeshError),
+    /// A force history that does not cover the window.
+    #[error("{path}: {problem}")]
+    History {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// A force that is not a number.
+    #[error("surface `{surface}` has a force that is not finite")]
+    NotFinite {
+        /// The surface.
+        surface: String,
+    },
+}
+
+impl SolveError {
+    /// True where smaller time steps may help.
+    pub fn is_divergence(&self) -> bool {
+        matches!(
+            self,
+            Self::Program { program: "interFoam", .. } | Self::TooLong { .. } | Self::NotFinite { .. }
+        )
+    }
+}
+
+/// Computes a case in `folder`, which must be empty or absent.
+pub fn solve(folder: &Path, inputs: &Inputs, attempts: u32) -> Result<Outcome, SolveError> {
+    let placement = Placement::new(inputs.vehicle, inputs.case);
+    let files = inputs.files(&placement);
+    case::write(folder, &files).map_err(|source| io(folder, source))?;
+    let mut running = Running { folder, inputs, started: Instant::now() };
+    running.program("blockMesh", &[])?;
+    running.program("snappyHexMesh", &["-overwrite"])?;
+    let hull = MeshHull::read(folder, inputs.vehicle, &placement)?;
+    running.program("setFields", &[])?;
+    running.start_flow(&placement)?;
+
+    let settings = inputs.settings;
+    let (mut windows, mut end) = (1, inputs.first_end());
+    let mut window = loop {
+        running.program("interFoam", &[])?;
+        let window = Window::read(folder, inputs, &placement, end)?;
+        let rest = hull.at_rest(inputs.vehicle, &inputs.case.condition(0.0, 0.0));
+        if inputs.case.is_unsteady()
+            || windows == settings.windows
+            || window.is_settled(&rest, settings.drift)
+        {
+            break window;
+        }
+        windows += 1;
+        end += settings.window_s;
+        let path = folder.join("system/controlDict");
+        std::fs::write(&path, inputs.control(&placement, end - settings.window_s, end))
+            .map_err(|source| io(&path, source))?;
+    };
+    let rest = hull.at_rest(inputs.vehicle, &inputs.case.condition(0.0, 0.0));
+    let settled = window.is_settled(&rest, settings.drift);
+    let (steps, core_s) = running.cost();
+    Ok(Outcome {
+        case: inputs.case.clone(),
+        solver: inputs.solver.label(),
+        mesh_kind: inputs.solver.mesh_kind,
+        cells: hull.cells,
+        courant: settings.courant,
+        attempts,
+        steps,
+        core_s,
+        windows,
+        settled,
+        drift: window.drift.into(),
+        mass_imbalance: mass_imbalance(folder, window.from, end),
+        rest: rest
+            .iter()
+            .map(|w| Load { force: w.force.into(), moment: w.moment.into(), viscous: [0.0; 3] })
+            .collect(),
+        surfaces: inputs.vehicle.surfaces.iter().map(|s| s.name.clone()).collect(),
+        sections: std::mem::take(&mut window.sections),
+    })
+}
+
+fn io(path: &Path, source: std::io::Error) -> SolveError {
+    SolveError::Io { path: path.to_owned(), source }
+}
+
+struct Running<'a> {
+    folder: &'a Path,
+    inputs: &'a Inputs<'a>,
+    started: Instant,
+}
+
+impl Running<'_> {
+    /// Runs a program to its end; its log is appended to `log.<program>`.
+    fn program(&mut self, program: &'static str, arguments: &[&str]) -> Result<(), SolveError> {
+        let log = self.folder.join(format!("log.{program}"));
+        let file = File::options().create(true).append(true).open(&log).map_err(|source| io(&log, source))?;
+        let errors = file.try_clone().map_err(|source| io(&log, source))?;
+        let mut command = self.inputs.solver.command(program);
+        let command = command.args(arguments).current_dir(self.folder).stdout(file).stderr(errors);
+        let mut child = command.spawn().map_err(|source| io(Path::new(program), source))?;
+        let limit = self.inputs.settings.limit_s;
+        let started = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().map_err(|source| io(Path::new(program), source))? {
+                break status;
+            }
+            if self.started.elapsed().as_secs_f64() > limit {
+                // it may have ended in between, which is as good
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(SolveError::TooLong { program, seconds: limit, log });
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        if status.success() {
+            return Ok(());
+        }
+        let text =
+            std::fs::read(&log).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default();
+        let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        let is_reason = |line: &&str| line.contains("FATAL") || line.contains("sigFpe");
+        let from = lines.iter().rposition(is_reason).unwrap_or(lines.len().saturating_sub(3));
+        let last_lines = lines[from..].iter().take(6).copied().collect::<Vec<_>>().join(" | ");
+        Err(SolveError::Program { program, seconds: started.elapsed().as_secs_f64(), last_lines, log })
+    }
+
+    /// The potential flow round the vehicle, with the boundary conditions of the viscous flow.
+    fn start_flow(&mut self, placement: &Placement) -> Result<(), SolveError> {
+        let inflow = self.inputs.case.speed_mps;
+        if inflow > 0.0 {
+            self.program("potentialFoam", &[])?;
+        }
+        let path = self.folder.join("0/U");
+        let text = std::fs::read_to_string(&path).map_err(|source| io(&path, source))?;
+        let speeds = internal_vectors(&text).into_iter().map(|u| u[0].hypot(u[1]).hypot(u[2]));
+        // NaN is larger than anything here: max() alone would drop it
+        let speed = speeds.fold(0.0, |most, speed: f64| if speed <= most { most } else { speed });
+        if inflow > 0.0 && !(speed <= FASTEST * inflow) {
+            return Err(SolveError::PotentialFlow { speed, inflow });
+        }
+        let head = text.split("boundaryField").next().unwrap_or_default();
+        let text = head.to_owned() + &self.inputs.viscous_boundary(placement);
+        std::fs::write(&path, text).map_err(|source| io(&path, source))?;
+        let pressure = self.folder.join("0/p");
+        std::fs::remove_file(&pressure).map_err(|source| io(&pressure, source))
+    }
+
+    /// Time steps, and processor time of all programs [s].
+    fn cost(&self) -> (usize, f64) {
+        let programs = ["blockMesh", "snappyHexMesh", "setFields", "potentialFoam", "interFoam"];
+        let mut steps = 0;
+        let mut core_s = 0.0;
+        for program in programs {
+            let text = std::fs::read(self.folder.join(format!("log.{program}"))).unwrap_or_default();
+            let text = String::from_utf8_lossy(&text);
+            if program == "interFoam" {
+                steps = text.lines().filter(|line| line.starts_with("Time = ")).count();
+            }
+            core_s += processor_time(&text);
+        }
+        (steps, core_s)
+    }
+}
+
+/// Sum over the runs in a log of the last `ExecutionTime` or `Finished meshing in` of each [s].
+fn processor_time(log: &str) -> f64 {
+    let (mut sum, mut last) = (0.0, 0.0);
+    for line in log.lines() {
+        let value =
+            line.strip_prefix("ExecutionTime = ").or_else(|| line.strip_prefix("Finished meshing in = "));
+        if let Some(seconds) = value.and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok()) {
+            if seconds < last {
+                sum += last;
+            }
+            last = seconds;
+        }
+    }
+    sum + last
+}
+
+/// The last window of a case.
+struct Window {
+    from: f64,
+    drift: Vec3,
+    mean: Vec3,
+    sections: Vec<Section>,
+}
+
+impl Window {
+    fn read(folder: &Path, inputs: &Inputs, placement: &Placement, end: f64) -> Result<Self, SolveError> {
+        let settings = inputs.settings;
+        let length = inputs.vehicle.dimensions.length;
+        let from = if inputs.case.is_unsteady() {
+            settings.settle(length, inputs.case.speed_mps) - 0.5
+        } else {
+            end - settings.window_s
+        };
+        let count = ((end - from) / SECTION_S).round() as usize;
+        let mut sections: Vec<Section> = (0..count)
+            .map(|i| section(inputs, from + i as f64 * SECTION_S, from + (i + 1) as f64 * SECTION_S))
+            .collect();
+        let back = placement.cfd_from_body.inverse();
+        for surface in &inputs.vehicle.surfaces {
+            let post = folder.join("postProcessing").join(&surface.name);
+            let force = read_history(&post, "force.dat")?;
+            let moment = read_history(&post, "moment.dat")?;
+            for section in &mut sections {
+                let average = |history: &History, columns: usize| {
+                    let mean = history.average(section.start_s, section.end_s, columns);
+                    mean.map(|mean| back * mean).ok_or_else(|| SolveError::History {
+                        path: post.clone(),
+                        problem: "the history does not cover the window",
+                    })
+                };
+                let load = Load {
+                    force: average(&force, 0)?.into(),
+                    moment: average(&moment, 0)?.into(),
+                    viscous: average(&force, 6)?.into(),
+                };
+                let all = load.force.iter().chain(&load.moment).chain(&load.viscous);
+                if !all.clone().all(|x| x.is_finite()) {
+                    return Err(SolveError::NotFinite { surface: surface.name.clone() });
+                }
+                section.loads.push(load);
+            }
+        }
+        let half = sections.len() / 2;
+        let mean = |sections: &[Section]| {
+            let nets = sections.iter().map(|s| s.loads.iter().map(|l| Vec3::from(l.force)).sum::<Vec3>());
+            nets.sum::<Vec3>() / sections.len().max(1) as f64
+        };
+        let drift = mean(&sections[half..]) - mean(&sections[..half]);
+        Ok(Self { from, drift, mean: mean(&sections), sections })
+    }
+
+    /// True when the halves differ by less than `share` of the dynamic force in every component, or by what no one
+    /// can see beside the force at rest.
+    fn is_settled(&self, rest: &[crate::wrench::Wrench], share: f64) -> bool {
+        let still: Vec3 = rest.iter().map(|w| w.force).sum();
+        let dynamic = (self.mean - still).norm();
+        self.drift.amax() <= share * dynamic.max(UNSEEN * still.norm())
+    }
+}
+
+fn section(inputs: &Inputs, start_s: f64, end_s: f64) -> Section {
+    let case = inputs.case;
+    let settle = inputs.settings.settle(inputs.vehicle.dimensions.length, case.speed_mps);
+    let middle = 0.5 * (start_s + end_s);
+    let progress = if case.is_unsteady() { ((middle - settle) / case.ramp_s).clamp(0.0, 1.0) } else { 0.0 };
+    let ramping = progress > 0.0 && progress < 1.0;
+    let change = case.end_speed_mps - case.speed_mps;
+    Section {
+        start_s,
+        end_s,
+        speed_mps: case.speed_mps + progress * change,
+        acceleration_mps2: if ramping { change / case.ramp_s } else { 0.0 },
+        loads: Vec::new(),
+    }
+}
+
+/// Rows of numbers against time.
+struct History {
+    times: Vec<f64>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl History {
+    /// Mean of three columns from `first` on over [start, end): each row holds for the step that ends with it.
+    fn average(&self, start: f64, end: f64, first: usize) -> Option<Vec3> {
+        let mut sum = Vec3::zeros();
+        let mut weight = 0.0;
+        let mut before = 0.0;
+        for (time, row) in self.times.iter().zip(&self.rows) {
+            let overlap = time.min(end) - f64::max(before, start);
+            if overlap > 0.0 {
+                sum += Vec3::new(*row.get(first)?, *row.get(first + 1)?, *row.get(first + 2)?) * overlap;
+                weight += overlap;
+            }
+            before = *time;
+        }
+        (weight > 0.5 * (end - start)).then(|| sum / weight)
+    }
+}
+
+/// A history over all restarts: what a later one computed anew replaces the earlier.
+fn read_history(folder: &Path, file: &str) -> Result<History, SolveError> {
+    let entries = std::fs::read_dir(folder).map_err(|source| io(folder, source))?;
+    let mut starts: Vec<(f64, PathBuf)> = entries
+        .flatten()
+        .filter_map(|entry| Some((entry.file_name().to_str()?.parse().ok()?, entry.path().join(file))))
+        .collect();
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut rows: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for (start, path) in starts {
+        rows.retain(|time, _| f64::from_bits(*time) <= start);
+        let text = std::fs::read_to_string(&path).map_err(|source| io(&path, source))?;
+        for line in text.lines().filter(|line| !line.starts_with('#')) {
+            let clean = line.replace(['(', ')'], " ");
+            let numbers: Option<Vec<f64>> = clean.split_ascii_whitespace().map(|x| x.parse().ok()).collect();
+            let numbers = numbers.filter(|numbers| numbers.len() > 1);
+            let numbers =
+                numbers.ok_or(SolveError::History { path: path.clone(), problem: "a row is damaged" })?;
+            // times are positive, so that their bits sort as they do
+            rows.insert(numbers[0].to_bits(), numbers[1..].to_vec());
+        }
+    }
+    let (times, rows) = rows.into_iter().map(|(time, row)| (f64::from_bits(time), row)).unzip();
+    Ok(History { times, rows })
+}
+
+/// Mean of (inflow - outflow) over inflow; NaN never: 0 where nothing flows or nothing was recorded.
+fn mass_imbalance(folder: &Path, start: f64, end: f64) -> f64 {
+    let flow = |patch: &str| {
+        let folder = folder.join("postProcessing").join(format!("mass_flow_{patch}"));
+        let history = read_history(&folder, "surfaceFieldValue.dat").ok()?;
+        let inside = history.times.iter().zip(&history.rows).filter(|(t, _)| **t > start && **t <= end);
+        let values: Vec<f64> = inside.filter_map(|(_, row)| row.first().copied()).collect();
+        Some(values.iter().sum::<f64>() / values.len().max(1) as f64)
+    };
+    let flows: Option<Vec<f64>> =
+        ["inlet_water", "inlet_air", "outlet", "top"].map(flow).into_iter().collect();
+    match flows {
+        // flows out of the domain are positive
+        Some(flows) if flows[0].abs() > 1e-9 => flows.iter().sum::<f64>().abs() / flows[0].abs(),
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn averages_weigh_each_row_by_its_step() {
+        let history = History {
+            times: vec![0.1, 0.2, 0.4],
+            rows: vec![vec![9.0, 0.0, 0.0], vec![1.0, 0.0, 0.0], vec![4.0, 0.0, 0.0]],
+        };
+        let mean = history.average(0.1, 0.4, 0).unwrap();
+        assert!((mean.x - 3.0).abs() < 1e-12, "{mean}");
+        assert!(history.average(0.4, 0.8, 0).is_none());
+    }
+
+    #[test]
+    fn a_restart_replaces_what_it_computed_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        for (start, text) in
+            [("0", "# t\n0.1 (1 0 0)\n0.2 (2 0 0)\n0.3 (3 0 0)\n"), ("0.2", "0.25 (7 0 0)\n")]
+        {
+            std::fs::create_dir(folder.path().join(start)).unwrap();
+            std::fs::write(folder.path().join(start).join("force.dat"), text).unwrap();
+        }
+        let history = read_history(folder.path(), "force.dat").unwrap();
+        assert_eq!(history.times, [0.1, 0.2, 0.25]);
+    }
+
+    #[test]
+    fn processor_time_adds_up_over_restarts() {
+        let log = "ExecutionTime = 3.5 s  ClockTime = 4 s\nExecutionTime = 9 s\nExecutionTime = 1 s\n";
+        assert!((processor_time(log) - 10.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,287 @@
+//! `wade campaign`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use wade::bundle;
+use wade::cfd::case::Settings;
+use wade::cfd::openfoam::OpenFoam;
+use wade::cfd::plan::{self, Campaign, Plan, Set};
+use wade::cfd::run::{Event, Machine, Work};
+use wade::geometry::hydrostatics::float_depth;
+use wade::train;
+
+use super::Vehicles;
+
+/// Plan, run and collect a CFD campaign with OpenFOAM
+#[derive(Debug, Args)]
+#[command(after_help = "Example, from nothing to a data set:
+  wade campaign plan --vehicle husky --set paper --cases 175 --out campaigns/husky
+  nice wade campaign run campaigns/husky --jobs 2
+  wade campaign collect campaigns/husky")]
+pub struct CampaignCommand {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Add cases to a plan, or begin one
+    Plan(PlanCommand),
+    /// Compute the cases that are not done yet
+    Run(Run),
+}
+
+impl CampaignCommand {
+    /// Runs the subcommand.
+    pub fn run(self) -> Result<ExitCode> {
+        match self.command {
+            Command::Plan(command) => command.run(),
+            Command::Run(command) => command.run(),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SetName {
+    Paper,
+    Wide,
+    Driving,
+    Unsteady,
+    Check,
+}
+
+impl From<SetName> for Set {
+    fn from(name: SetName) -> Self {
+        match name {
+            SetName::Paper => Self::Paper,
+            SetName::Wide => Self::Wide,
+            SetName::Driving => Self::Driving,
+            SetName::Unsteady => Self::Unsteady,
+            SetName::Check => Self::Check,
+        }
+    }
+}
+
+/// Add cases to a plan, or begin one
+///
+/// The same seed gives the same plan; called again on the same folder it adds cases and repeats none.
+#[derive(Debug, Args)]
+struct PlanCommand {
+    /// Name of the vehicle's bundle
+    #[arg(long)]
+    vehicle: String,
+    #[command(flatten)]
+    vehicles: Vehicles,
+    /// What to add: `paper` and `wide` are Latin hypercubes, `driving` the straightest paper cases with a moving bed,
+    /// `unsteady` and `check` fixed lists
+    #[arg(long, value_enum)]
+    set: SetName,
+    /// Cases to add
+    #[arg(long, default_value_t = 175)]
+    cases: usize,
+    /// Seed of the hypercube
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Ranges of the plan, TOML with speed_mps, angle_deg, density_kgpm3, depth_m, each { min, max }
+    /// [default: the source paper's, for the shipped vehicles]
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// Settings of every case, TOML; only when the plan is begun
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Folder of the campaign
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl PlanCommand {
+    fn run(self) -> Result<ExitCode> {
+        let bundle = bundle::read(&self.vehicles.bundle(&self.vehicle))?;
+        let exists = self.out.join(plan::CAMPAIGN_FILE).exists();
+        let mut plan = if exists { Plan::read(&self.out)? } else { self.begin(&bundle.vehicle)? };
+        plan.check_vehicle(&self.out, &bundle.vehicle)?;
+        if exists && (self.settings.is_some() || self.table.is_some()) {
+            bail!("{} has its settings and its table already: edit them there", self.out.display());
+        }
+        let before = plan.cases.len();
+        let float = float_depth(&bundle.vehicle.hull.mesh, bundle.vehicle.z0, bundle.vehicle.mass);
+        plan.extend(self.set.into(), self.cases, self.seed, float)?;
+        plan.write(&self.out)?;
+        println!(
+            "{}: {} cases, {} of them new",
+            self.out.display(),
+            plan.cases.len(),
+            plan.cases.len() - before
+        );
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn begin(&self, vehicle: &wade::vehicle::Vehicle) -> Result<Plan> {
+        let table = match &self.table {
+            Some(path) => read_toml(path)?,
+            None => *train::Config::default().tables.get(&self.vehicle).with_context(|| {
+                format!("no ranges are known for `{}`: give them with --table", self.vehicle)
+            })?,
+        };
+        if !table.is_valid() {
+            bail!("the table has a range upside down, or a speed or density that is not positive");
+        }
+        let settings: Settings = self.settings.as_ref().map_or_else(|| Ok(Settings::default()), read_toml)?;
+        let hull_sha256 = plan::hull_hash(vehicle);
+        let campaign =
+            Campaign { format: plan::FORMAT, vehicle: self.vehicle.clone(), hull_sha256, table, settings };
+        Ok(Plan { campaign, cases: Vec::new() })
+    }
+}
+
+fn read_toml<T: serde::de::DeserializeOwned>(path: &PathBuf) -> Result<T> {
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    toml::from_str(&text).with_context(|| path.display().to_string())
+}
+
+/// Compute the cases that are not done yet
+///
+/// Killed at any time it goes on where it was. A case that diverges is tried once more with smaller steps, then set
+/// aside with its log and named at the end; `--again` tries those once more.
+#[derive(Debug, Args)]
+struct Run {
+    /// Folder of the campaign
+    campaign: PathBuf,
+    #[command(flatten)]
+    vehicles: Vehicles,
+    /// Cases at a time, each on a core of its own
+    #[arg(long, default_value_t = 2)]
+    jobs: usize,
+    /// Only this set; may be given several times
+    #[arg(long, value_enum)]
+    set: Vec<SetName>,
+    /// Only this case; may be given several times
+    #[arg(long, value_name = "ID")]
+    case: Vec<String>,
+    /// Where the cases are computed [default: `work` in the folder of the campaign]
+    #[arg(long, value_name = "DIR")]
+    work: Option<PathBuf>,
+    /// Keep the folders of cases that are done
+    #[arg(long)]
+    keep: bool,
+    /// Try cases again that were set aside
+    #[arg(long)]
+    again: bool,
+}
+
+impl Run {
+    fn run(self) -> Result<ExitCode> {
+        let plan = Plan::read(&self.campaign)?;
+        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
+        if let Some(unknown) = self.case.iter().find(|id| !plan.cases.iter().any(|c| c.id == **id)) {
+            bail!("{} has no case `{unknown}`", self.campaign.display());
+        }
+        let folder = self.work.clone().unwrap_or_else(|| self.campaign.join("work"));
+        let work = Work { folder, keep: self.keep };
+        let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
+        let is_chosen = |case: &plan::Case| {
+            (sets.is_empty() || sets.contains(&case.set))
+                && (self.case.is_empty() || self.case.contains(&case.id))
+                && (self.again || !work.failure_path(&case.id).exists())
+        };
+        let cases: Vec<plan::Case> = plan.cases.iter().filter(|case| is_chosen(case)).cloned().collect();
+        let solver = OpenFoam::find()?;
+        eprintln!("{}", solver.label());
+        let machine = Machine {
+            vehicle: &bundle.vehicle,
+            settings: &plan.campaign.settings,
+            solver: &solver,
+            work: &work,
+        };
+        let mut progress = Progress::new(cases.len(), self.jobs)?;
+        let mut failed = Vec::new();
+        machine.run(&cases, self.jobs, &mut |event| progress.hear(event, &mut failed))?;
+        progress.finish();
+        for (id, reason) in &failed {
+            println!("set aside: {id}: {reason}");
+        }
+        println!("{} computed, {} set aside", progress.done, failed.len());
+        let earlier =
+            plan.cases.iter().filter(|case| work.failure_path(&case.id).exists()).count() - failed.len();
+        if earlier > 0 {
+            println!("{earlier} set aside earlier were left alone: --again tries them once more");
+        }
+        Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+}
+
+/// One line: cases done, cores busy, time left. Where no one watches, a line a case.
+struct Progress {
+    bar: ProgressBar,
+    total: usize,
+    done: usize,
+    busy: usize,
+    jobs: usize,
+    started: Instant,
+}
+
+impl Progress {
+    fn new(total: usize, jobs: usize) -> Result<Self> {
+        let bar = ProgressBar::new(total as u64);
+        bar.set_style(ProgressStyle::with_template("{wide_bar} {pos}/{len} cases, {msg}")?);
+        Ok(Self { bar, total, done: 0, busy: 0, jobs, started: Instant::now() })
+    }
+
+    fn hear(&mut self, event: Event, failed: &mut Vec<(String, String)>) {
+        let line = match event {
+            Event::Started { .. } => {
+                self.busy += 1;
+                None
+            }
+            Event::Retried { id, reason } => Some(format!("{id}: once more with smaller steps: {reason}")),
+            Event::Done { outcome } => {
+                self.busy -= 1;
+                self.done += 1;
+                self.bar.inc(1);
+                let settled = if outcome.settled { "" } else { ", not settled" };
+                Some(format!(
+                    "{}: {} cells, {} steps, {:.0} s{settled}",
+                    outcome.case.id, outcome.cells, outcome.steps, outcome.core_s
+                ))
+            }
+            Event::Failed { id, reason } => {
+                self.busy -= 1;
+                let line = format!("{id}: set aside: {reason}");
+                failed.push((id, reason));
+                Some(line)
+            }
+        };
+        self.bar.set_message(self.message(failed.len()));
+        if let Some(line) = line {
+            if self.bar.is_hidden() {
+                eprintln!("{}/{} {line} ({})", self.done, self.total, self.message(failed.len()));
+            } else if failed.last().is_some_and(|(id, _)| line.starts_with(id)) {
+                self.bar.println(line);
+            }
+        }
+    }
+
+    fn message(&self, failed: usize) -> String {
+        let ended = self.done + failed;
+        let left = match ended {
+            0 => "time left unknown".to_owned(),
+            _ => {
+                let each = self.started.elapsed().as_secs_f64() / ended as f64;
+                let seconds = each * (self.total - ended) as f64;
+                format!("{} left", indicatif::HumanDuration(Duration::from_secs_f64(seconds)))
+            }
+        };
+        let aside = if failed > 0 { format!(", {failed} set aside") } else { String::new() };
+        format!("{} of {} cores busy, {left}{aside}", self.busy, self.jobs)
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
