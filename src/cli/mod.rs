@@ -7,6 +7,7 @@ mod serve;
 mod soak;
 mod state;
 mod train;
+mod validate;
 mod vehicle;
 
 use std::io::Write;
@@ -43,6 +44,8 @@ enum Command {
     Soak(soak::Soak),
     /// Train a network for the vehicles of a folder
     Train(train::Train),
+    /// Hold a model against two laws of physics along the motion of trials
+    Validate(validate::Validate),
     /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
@@ -56,6 +59,7 @@ impl Cli {
             Command::Predict(command) => command.run(),
             Command::Soak(command) => command.run(),
             Command::Train(command) => command.run(),
+            Command::Validate(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
     }
