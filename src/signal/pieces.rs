@@ -31,8 +31,8 @@ mod tests {
     fn a_recording_splits_at_its_holes_and_jitter_is_none() {
         let times = [0.0, 0.9, 2.1, 3.0, 9.5, 10.4, 11.5];
         assert_eq!(pieces(&times), [0..4, 4..7]);
-        assert_eq!(pieces(&times[..4]), [0..4]);
-        assert_eq!((pieces(&times[..1]), median_step(&times[..1])), (vec![0..1], None));
+        assert_eq!(pieces(&times[..4]), vec![0..4; 1]);
+        assert_eq!((pieces(&times[..1]), median_step(&times[..1])), (vec![0..1; 1], None));
         assert!(pieces(&[]).is_empty());
     }
 }

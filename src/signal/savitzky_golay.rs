@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_weights_are_the_published_ones() {
-        // Savitzky and Golay 1964, table I (quadratic, 9 points: divisor 231) and table IV (first derivative: divisor 60)
+        // the tables of Savitzky and Golay 1964 for 9 points and a quadratic: divisors 231 and, for the slope, 60
         let filter = SavitzkyGolay::new(9, 2).unwrap();
         let smooth = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0].map(|w| w / 231.0);
         let slope = [-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0].map(|w| w / 60.0);

@@ -91,8 +91,9 @@ impl Trial {
         let table = Table::read(path, &REQUIRED, &optional)?;
         check_presence(&table, manifest)?;
         table.check_time(2)?;
-        check_limits(&table)?;
+        // what contradicts another column is told more precisely than what lies beyond a limit
         check_angles(&table)?;
+        check_limits(&table)?;
         let t = table.column("t").to_vec();
         let velocity = vectors(&table, ["vx", "vy", "vz"]).unwrap_or_default();
         let angular_velocity = vectors(&table, ["wx", "wy", "wz"]).unwrap_or_default();

@@ -21,8 +21,8 @@ const ANGLES: [(&str, &str); 3] = [("roll", "wx"), ("pitch", "wy"), ("yaw", "wz"
 
 /// Two columns say the same but for a factor when they are correlated as well as this.
 const SAME: f64 = 0.9;
-/// Least spread of an angle [rad] or an acceleration [m/s2] from which a factor can be told.
-const EXCITED: f64 = 0.02;
+/// Least spread of the smaller and of the larger of two columns from which a factor can be told [rad or m/s2].
+const EXCITED: [f64; 2] = [0.002, 0.02];
 /// Share by which a factor of 57.3 or 1 / 9.81 may be missed by noise and filters.
 const FACTOR_TOLERANCE: f64 = 0.3;
 
@@ -109,8 +109,8 @@ fn factor(x: &[f64], y: &[f64]) -> Option<f64> {
     let pairs = || x.iter().zip(y).map(|(x, y)| (x - mx, y - my));
     let (xx, yy) = pairs().fold((0.0, 0.0), |(xx, yy), (x, y)| (xx + x * x, yy + y * y));
     let xy: f64 = pairs().map(|(x, y)| x * y).sum();
-    let excited = (xx.min(yy) / x.len().max(1) as f64).sqrt() > EXCITED * 1e-1
-        && (xx.max(yy) / x.len().max(1) as f64).sqrt() > EXCITED;
+    let spread = |squares: f64| (squares / x.len().max(1) as f64).sqrt();
+    let excited = spread(xx.min(yy)) > EXCITED[0] && spread(xx.max(yy)) > EXCITED[1];
     (excited && xy > SAME * (xx * yy).sqrt()).then(|| (yy / xx).sqrt())
 }
 

@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn three_points_by_hand() {
-        // slope 28 / 14, rest 0.5 (2.5 - 2)^2 ... worked by hand: y - 2x = 0.5, -1, 0.5
+        // slope 28 / 14; y - 2x = 0.5, -1, 0.5
         let fit = through_origin(&[1.0, 2.0, 3.0], &[2.5, 3.0, 6.5]).unwrap();
         assert!((fit.slope - 2.0).abs() < 1e-12);
         assert!((fit.slope_std - (1.5_f64 / 2.0 / 14.0).sqrt()).abs() < 1e-12);

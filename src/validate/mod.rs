@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 pub use check::Check;
 pub use drag::{DragAtDepth, DragScaling, PairConfig, Ratio, drag_coefficient};
 pub use folder::{FolderError, OutFolder};
-pub use mocap::{Kinematics, MocapConfig, process, trials_from_recordings};
+pub use mocap::{Kinematics, MocapConfig, Rig, process, trials_from_recordings};
 pub use paper::PaperDepth;
 pub use planar::{NotPlanar, PlanarConfig, planar_section};
 pub use recording::{

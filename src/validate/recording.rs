@@ -220,14 +220,13 @@ impl RecordingsFile {
         if !(500.0..=3000.0).contains(&density) {
             return number("fluid_density_kgpm3", density, "between 500 and 3000 kg/m3");
         }
-        if let Some(&value) =
-            self.center_of_mass_from_marker_m.iter().find(|v| v.abs().is_nan() || v.abs() > 10.0)
-        {
+        let far = |value: &&f64| !(-10.0..=10.0).contains(*value);
+        if let Some(&value) = self.center_of_mass_from_marker_m.iter().find(far) {
             return number("center_of_mass_from_marker_m", value, "within 10 m");
         }
         for (name, entry) in &self.recording {
             let level = entry.water_level_m;
-            if !(level.abs() <= FARTHEST) {
+            if !(-FARTHEST..=FARTHEST).contains(&level) {
                 return number(&format!("recording.{name}.water_level_m"), level, "an altitude in meters");
             }
             if let Some(depth) = entry.depth_m.filter(|depth| !(*depth > 0.0 && *depth < 20.0)) {
