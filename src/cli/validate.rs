@@ -110,13 +110,14 @@ impl Validate {
 
     fn summary(&self, report: &Report) -> String {
         let mut text = format!(
-            "{}, bundle version {}, weights: {}; {} planar sections of {} trials{}\n",
+            "{}, bundle version {}, weights: {}; {} planar sections of {} trials{}, {:.0} % of the samples in domain\n",
             report.subject.vehicle,
             report.subject.version,
             report.subject.weights,
             report.data.planar_sections,
             report.data.trials,
             if report.data.generated.is_some() { ", generated" } else { "" },
+            100.0 * report.data.in_domain,
         );
         text.push_str("depth [m]  sections  C_D,eff      R2    C_D     F0 [N]  mesh at rest [N]\n");
         for (drag, fz) in report.drag_scaling.depths.iter().zip(&report.vertical_force.depths) {

@@ -7,6 +7,12 @@ use crate::signal::{SavitzkyGolay, UniformGrid, interpolate, median_step, pieces
 const WINDOW: usize = 9;
 const ORDER: usize = 2;
 
+/// Acceleration in an inertial frame, in the axes of the body: `dv/dt + omega x v` [m/s2].
+pub(super) fn acceleration(times: &[f64], velocity: &[Vec3], angular_velocity: &[Vec3]) -> Vec<Vec3> {
+    let rates = derivative(times, velocity).into_iter();
+    rates.zip(angular_velocity.iter().zip(velocity)).map(|(rate, (omega, v))| rate + omega.cross(v)).collect()
+}
+
 /// Time derivative of each component, by a Savitzky-Golay filter (9 samples, order 2) on a uniform grid at the median
 /// rate. Pieces between holes in time are differentiated apart; a shorter piece has a shorter window, and a lone sample,
 /// of which nothing is known, has 0.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::acceleration::derivative;
+use super::acceleration::{acceleration, derivative};
 use super::manifest::Manifest;
 use super::table::Table;
 use super::units::{check_accelerometer, check_angles, check_limits};
@@ -80,64 +80,59 @@ pub struct Trial {
 impl Trial {
     /// Reads and checks one file.
     pub(super) fn read(path: &Path, manifest: &Manifest) -> Result<Self, TrialError> {
-        let other_forces = &manifest.measured.other_forces;
-        let optional: Vec<&str> = OPTIONAL
-            .into_iter()
-            .chain(WHEELS)
-            .chain(WRENCH)
-            .chain(SIMULATED)
-            .chain(other_forces.iter().map(String::as_str))
-            .collect();
+        let other_forces = manifest.measured.other_forces.iter().map(String::as_str);
+        let optional: Vec<&str> =
+            OPTIONAL.into_iter().chain(WHEELS).chain(WRENCH).chain(SIMULATED).chain(other_forces).collect();
         let table = Table::read(path, &REQUIRED, &optional)?;
         check_presence(&table, manifest)?;
         table.check_time(2)?;
         // what contradicts another column is told more precisely than what lies beyond a limit
         check_angles(&table)?;
         check_limits(&table)?;
+        let trial = Self::from_table(&table, manifest);
+        match vectors(&table, ["ax", "ay", "az"]) {
+            Some(measured) => {
+                check_accelerometer(&table, &trial.acceleration)?;
+                Ok(Self { acceleration: measured, acceleration_is_measured: true, ..trial })
+            }
+            None => Ok(trial),
+        }
+    }
+
+    /// The trial of a table that was checked, accelerating as its velocity says.
+    fn from_table(table: &Table, manifest: &Manifest) -> Self {
         let t = table.column("t").to_vec();
-        let velocity = vectors(&table, ["vx", "vy", "vz"]).unwrap_or_default();
-        let angular_velocity = vectors(&table, ["wx", "wy", "wz"]).unwrap_or_default();
-        let derived: Vec<Vec3> = derivative(&t, &velocity)
-            .iter()
-            .zip(angular_velocity.iter().zip(&velocity))
-            .map(|(rate, (omega, v))| rate + omega.cross(v))
-            .collect();
-        check_accelerometer(&table, &derived)?;
-        let acceleration = vectors(&table, ["ax", "ay", "az"]);
-        let acceleration_is_measured = acceleration.is_some();
-        let angular_acceleration =
-            vectors(&table, ["alx", "aly", "alz"]).unwrap_or_else(|| derivative(&t, &angular_velocity));
-        let constant = |value: f64| vec![value; t.len()];
-        let or_constant = |name: &str, value: f64| match table.has(name) {
-            true => table.column(name).to_vec(),
-            false => constant(value),
-        };
+        let column = |name: &str| table.columns.get(name).cloned();
+        let or_constant = |name: &str, value: f64| column(name).unwrap_or_else(|| vec![value; t.len()]);
         let listed = |name: &str| {
             let columns = manifest.measured.columns.as_ref();
             columns.is_none_or(|columns| columns.iter().any(|column| column == name))
         };
-        let column = |name: &str| table.columns.get(name).cloned();
-        Ok(Self {
-            name: stem(path),
+        let velocity = vectors(table, ["vx", "vy", "vz"]).unwrap_or_default();
+        let angular_velocity = vectors(table, ["wx", "wy", "wz"]).unwrap_or_default();
+        let angular_acceleration = vectors(table, ["alx", "aly", "alz"]);
+        let other_forces = manifest.measured.other_forces.iter();
+        Self {
+            name: stem(&table.path),
+            acceleration: acceleration(&t, &velocity, &angular_velocity),
+            acceleration_is_measured: false,
+            angular_acceleration: angular_acceleration.unwrap_or_else(|| derivative(&t, &angular_velocity)),
             velocity,
             angular_velocity,
             roll: or_constant("roll", 0.0),
             pitch: or_constant("pitch", 0.0),
             yaw: or_constant("yaw", 0.0),
             depth: table.column("depth").to_vec(),
-            acceleration: acceleration.unwrap_or(derived),
-            angular_acceleration,
-            acceleration_is_measured,
             density: or_constant("rho", manifest.fluid_density.unwrap_or(FRESH_WATER)),
             wheel_speeds: WHEELS.map(column),
             measured: WRENCH.map(|name| column(name).filter(|_| listed(name))),
             simulated: SIMULATED.map(column),
-            other_forces: other_forces.iter().filter_map(|n| Some((n.clone(), column(n)?))).collect(),
+            other_forces: other_forces.filter_map(|name| Some((name.clone(), column(name)?))).collect(),
             unknown_columns: table.unknown_columns.clone(),
-            gaps: gaps(&table),
-            rows: table.rows,
+            gaps: gaps(table),
+            rows: table.rows.clone(),
             t,
-        })
+        }
     }
 
     /// Number of samples.

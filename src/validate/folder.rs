@@ -105,7 +105,7 @@ impl OutFolder {
             if let Some(parent) = self.place.parent() {
                 fs::create_dir_all(parent).map_err(io(parent))?;
             }
-            fs::rename(self.staged.keep(), &self.place).map_err(io(&self.place))
+            fs::rename(self.staged.path(), &self.place).map_err(io(&self.place))
         }
     }
 }

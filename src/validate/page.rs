@@ -62,12 +62,13 @@ fn summary(report: &Report) -> String {
     let contact = format!("{:?}", report.config.ground_contact).to_lowercase();
     format!(
         "<p class=\"small\">bundle version {} · weights: {} · ground contact: {contact} · {} trials from {source}, {} \
-         planar sections. No force was measured: the model's own forces, along the motion of the trials, are held against \
-         known laws.</p>",
+         planar sections, {:.0} % of whose samples lie in the ranges that the weights were learnt in. No force was \
+         measured: the model's own forces, along the motion of the trials, are held against known laws.</p>",
         subject.version,
         escape(&subject.weights),
         data.trials,
         data.planar_sections,
+        100.0 * data.in_domain,
     )
 }
 
@@ -279,15 +280,16 @@ fn drag_figure(report: &Report) -> Result<String, PlotError> {
         let reach = points.iter().map(|point| point.0).fold(0.0, f64::max);
         let line = |slope: f64| vec![(0.0, 0.0), (reach, slope * reach)];
         series.push(Series { name: format!("{:.4} m", at.depth_m), mark: Mark::Circle, color, points });
-        if let Some(slope) = at.c_d_eff {
-            series.push(Series { name: "fit".into(), mark: Mark::Line, color, points: line(slope) });
-        }
-        if let Some(paper) = at.paper {
-            let points = line(paper.c_d_eff);
-            series.push(Series { name: LABEL.into(), mark: Mark::Dashes, color, points });
+        let slopes = [(Mark::Line, at.c_d_eff), (Mark::Dashes, at.paper.map(|paper| paper.c_d_eff))];
+        for (mark, slope) in slopes {
+            let points = slope.map(line).unwrap_or_default();
+            series.push(Series { name: String::new(), mark, color, points });
         }
     }
-    figure(&format!("mean v² [m²/s²]{}", origin(report)), "mean |Fx| [N]", &series)
+    let svg = figure(&format!("mean v² [m²/s²]{}", origin(report)), "mean |Fx| [N]", &series)?;
+    Ok(format!(
+        "{svg}<p class=\"small\">Points: trials. Lines: fits. Dashed: the paper's fits ({LABEL}).</p>"
+    ))
 }
 
 fn vertical_figure(report: &Report) -> Result<String, PlotError> {
@@ -300,27 +302,26 @@ fn vertical_figure(report: &Report) -> Result<String, PlotError> {
         if let (Some(f0), Some(c_l)) = (at.f0_n, at.c_l) {
             let points = vec![(0.0, f0), (reach, f0 + c_l * reach)];
             series.push(Series { name: String::new(), mark: Mark::Line, color, points });
-            series.push(Series { name: "F0".into(), mark: Mark::Diamond, color, points: vec![(0.0, f0)] });
+            series.push(Series { name: String::new(), mark: Mark::Diamond, color, points: vec![(0.0, f0)] });
         }
     }
-    figure(&format!("mean v² [m²/s²]{}", origin(report)), "mean Fz [N]", &series)
+    let svg = figure(&format!("mean v² [m²/s²]{}", origin(report)), "mean Fz [N]", &series)?;
+    Ok(svg + "<p class=\"small\">Points: trials. Lines: fits. Diamonds: their intercepts F<sub>0</sub>.</p>")
 }
 
 fn depth_figure(report: &Report) -> Result<String, PlotError> {
-    let depths = &report.vertical_force.depths;
-    let of = |name: &str, mark, color, value: &dyn Fn(&super::VerticalAtDepth) -> Option<f64>| Series {
-        name: name.into(),
-        mark,
-        color,
-        points: depths.iter().filter_map(|at| Some((at.depth_m, value(at)?))).collect(),
-    };
+    let vertical = &report.vertical_force;
+    let series = |name: &str, mark, color, points| Series { name: name.into(), mark, color, points };
+    let curve = |of: fn(&(f64, f64, f64)) -> f64| vertical.mesh_curve.iter().map(|p| (p.0, of(p))).collect();
+    let ours = vertical.depths.iter().filter_map(|at| Some((at.depth_m, at.f0_n?)));
+    let papers = vertical.depths.iter().filter_map(|at| Some((at.depth_m, at.paper?.f0_n)));
     let series = [
-        of("mesh, wetted", Mark::Line, BLACK, &|at| Some(at.mesh_wetted_n)),
-        of("mesh, dry", Mark::Dashes, BLACK, &|at| Some(at.mesh_dry_n)),
-        of("F0", Mark::Diamond, color(0), &|at| at.f0_n),
-        of(LABEL, Mark::Cross, BROWN, &|at| at.paper.map(|paper| paper.f0_n)),
+        series("mesh at rest, wetted", Mark::Line, BLACK, curve(|p| p.1)),
+        series("mesh at rest, dry", Mark::Dashes, BLACK, curve(|p| p.2)),
+        series("F0", Mark::Diamond, color(0), ours.collect()),
+        series(&format!("F0, {LABEL}"), Mark::Cross, BROWN, papers.collect()),
     ];
-    figure(&format!("depth [m]{}", origin(report)), "force at rest [N]", &series)
+    figure(&format!("depth [m]{}", origin(report)), "vertical force at rest [N]", &series)
 }
 
 fn section_tables(report: &Report) -> String {

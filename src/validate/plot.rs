@@ -82,6 +82,8 @@ fn draw(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotE
             .light_line_style(WHITE)
             .bold_line_style(RGBColor(0xe3, 0xe6, 0xea))
             .x_labels(11)
+            .x_label_formatter(&label)
+            .y_label_formatter(&label)
             .y_labels(8)
             .x_desc(x_title)
             .y_desc(y_title)
@@ -110,6 +112,11 @@ fn draw(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotE
         area.present()?;
     }
     Ok(svg)
+}
+
+/// A number without the digits that rounding leaves.
+fn label(value: &f64) -> String {
+    ((value * 1e6).round() / 1e6).to_string()
 }
 
 /// Everything shown, with room above; zero is always in sight.

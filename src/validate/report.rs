@@ -89,6 +89,9 @@ pub struct Data {
     pub trials: usize,
     /// Trials with a planar section.
     pub planar_sections: usize,
+    /// Share of the samples of the sections within the ranges that the weights were learnt in: outside them the verdict
+    /// is about an extrapolation.
+    pub in_domain: f64,
     /// What one should know about the files.
     pub remarks: Vec<String>,
 }
@@ -108,6 +111,9 @@ impl Report {
             checks.map(|check| check.finding.clone()).collect::<Vec<_>>()
         };
         let failures = findings(Some(false));
+        let samples = tests.sections.iter().map(|section| section.samples as f64).sum::<f64>();
+        let inside =
+            tests.sections.iter().map(|section| section.in_domain * section.samples as f64).sum::<f64>();
         Self {
             passed: failures.is_empty(),
             failures,
@@ -118,6 +124,7 @@ impl Report {
                 generated: trials.manifest.generated.clone(),
                 trials: trials.trials.len(),
                 planar_sections: tests.sections.len(),
+                in_domain: inside / samples,
                 remarks: trials.remarks().iter().map(ToString::to_string).collect(),
             },
             checks: tests.checks,

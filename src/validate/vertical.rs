@@ -11,6 +11,9 @@ use crate::frame::{Vec3, WaterPlane};
 use crate::geometry::hydrostatics::hydrostatics;
 use crate::vehicle::Vehicle;
 
+/// Steps from dry to the deepest trials in the mesh's curve.
+const CURVE_STEPS: u32 = 50;
+
 /// What the test found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerticalForce {
@@ -20,6 +23,9 @@ pub struct VerticalForce {
     pub f0_against_depth: Option<F0AgainstDepth>,
     /// Mean Fz at matched speeds.
     pub speed_bins: Vec<SpeedBin>,
+    /// What the mesh feels at rest over the depths of the trials, for the figure: depth, wetted, dry [m, N, N].
+    #[serde(skip)]
+    pub mesh_curve: Vec<(f64, f64, f64)>,
 }
 
 /// The fit `Fz = F0 + C_L v^2` at one depth.
@@ -89,8 +95,19 @@ pub fn vertical_force(groups: &[DepthGroup<'_>], vehicle: &Vehicle, bin_mps: f64
     VerticalForce {
         f0_against_depth: f0_against_depth(&depths, vehicle),
         speed_bins: speed_bins(groups, bin_mps),
+        mesh_curve: mesh_curve(groups, vehicle),
         depths,
     }
+}
+
+fn mesh_curve(groups: &[DepthGroup<'_>], vehicle: &Vehicle) -> Vec<(f64, f64, f64)> {
+    let Some(deepest) = groups.last() else { return Vec::new() };
+    let point = |step: u32| {
+        let depth = deepest.depth_m * f64::from(step) / f64::from(CURVE_STEPS);
+        let (wetted, dry) = at_rest(vehicle, depth, deepest.density_kgpm3);
+        (depth, wetted, dry)
+    };
+    (0..=CURVE_STEPS).map(point).collect()
 }
 
 fn at_depth(group: &DepthGroup<'_>, vehicle: &Vehicle) -> VerticalAtDepth {

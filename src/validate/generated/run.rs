@@ -19,9 +19,9 @@ const ANGLE: f64 = 0.35;
 const ACCELERATION: f64 = 3.0;
 /// Largest slope of a smooth step over its mean slope.
 const STEEPEST: f64 = 1.875;
-/// How long water takes to slow a vehicle that drives in [s]: chosen.
-const SLOWING: f64 = 0.8;
-/// Command minus speed, over speed squared and depth [s/m / m]: takes the fastest command of 4.952 m/s at 4 inches to the
+/// How long water takes to slow a vehicle that drives in [s]: chosen, 800 N on 280 kg.
+const SLOWING: f64 = 0.5;
+/// Command minus speed, over speed squared and depth [s/m2]: takes the fastest command of 4.952 m/s at 4 inches to the
 /// paper's fastest section of 3.78 m/s.
 const DROOP: f64 = 0.082 / 0.1016;
 /// Shortest and longest flat piece that the cameras see [m]: chosen so that some trials show too little.

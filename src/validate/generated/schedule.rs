@@ -54,8 +54,8 @@ pub const PAPER_TABLE: [TableRow; 7] = {
     ]
 };
 
-/// Slowest command [m/s]: the paper's 0.5, rounded so that its slowest section of 0.52 m/s is met.
-const SLOWEST: f64 = 0.54;
+/// Slowest command [m/s]: the paper's.
+const SLOWEST: f64 = 0.5;
 
 /// Meters in an inch.
 const INCH: f64 = 0.0254;
