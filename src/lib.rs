@@ -6,15 +6,17 @@
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:
-//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`]), the body ([`geometry`], [`vehicle`]), its
+//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`signal`]), the body ([`geometry`], [`vehicle`]), its
 //! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
-//! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), the doors ([`service`], [`client`], [`soak`]), what
-//! learns it ([`train`]), the settings ([`config`]) and the server as a whole ([`server`]).
+//! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), measured data ([`trials`]), the doors ([`service`],
+//! [`client`], [`soak`]), what learns it ([`train`]) and holds it against measured motion ([`validate`]), the settings
+//! ([`config`]) and the server as a whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
 pub mod forces;
 pub mod frame;
+pub mod signal;
 pub mod wrench;
 
 pub mod geometry;
@@ -29,6 +31,7 @@ pub mod model;
 
 pub mod engine;
 pub mod metrics;
+pub mod trials;
 
 pub mod client;
 pub mod cores;
@@ -37,6 +40,7 @@ pub mod states;
 
 pub mod cfd;
 pub mod train;
+pub mod validate;
 
 pub mod config;
 pub mod server;

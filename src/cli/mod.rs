@@ -8,6 +8,7 @@ mod serve;
 mod soak;
 mod state;
 mod train;
+mod validate;
 mod vehicle;
 
 use std::io::Write;
@@ -46,6 +47,8 @@ enum Command {
     Campaign(campaign::CampaignCommand),
     /// Train a network for the vehicles of a folder
     Train(train::Train),
+    /// Hold a model against two laws of physics along the motion of trials
+    Validate(validate::Validate),
     /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
@@ -60,6 +63,7 @@ impl Cli {
             Command::Soak(command) => command.run(),
             Command::Campaign(command) => command.run(),
             Command::Train(command) => command.run(),
+            Command::Validate(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
     }

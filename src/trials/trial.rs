@@ -1,0 +1,206 @@
+//! One trial in the terms of the body frame.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::acceleration::{acceleration, derivative};
+use super::manifest::Manifest;
+use super::table::Table;
+use super::units::{check_accelerometer, check_angles, check_limits};
+use super::{Remark, TrialError, stem};
+use crate::condition::{Condition, FRESH_WATER, GroundContact};
+use crate::frame::{Vec3, up_from_roll_pitch};
+use crate::signal::{median_step, pieces};
+
+/// Components of a measured wrench; another simulator's have the prefix `sim_`.
+pub const WRENCH: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
+/// Wheel speeds.
+pub const WHEELS: [&str; 4] = ["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"];
+
+const SIMULATED: [&str; 6] = ["sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
+const REQUIRED: [&str; 8] = ["t", "vx", "vy", "vz", "wx", "wy", "wz", "depth"];
+const OPTIONAL: [&str; 10] = ["roll", "pitch", "yaw", "ax", "ay", "az", "alx", "aly", "alz", "rho"];
+
+/// A median step above this is no second's fraction any more [s].
+const LONG_STEP: f64 = 1.0;
+
+/// A hole in time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Line of the file after the hole.
+    pub row: u64,
+    /// Length [s].
+    pub seconds: f64,
+}
+
+/// One trial, a value a sample; body frame, SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// Name of the file without `.csv`.
+    pub name: String,
+    /// Line of the file of each sample.
+    pub rows: Vec<u64>,
+    /// Time [s], increasing, not always uniform.
+    pub t: Vec<f64>,
+    /// Velocity over ground [m/s].
+    pub velocity: Vec<Vec3>,
+    /// Angular velocity [rad/s].
+    pub angular_velocity: Vec<Vec3>,
+    /// Roll [rad]; positive lowers the right side.
+    pub roll: Vec<f64>,
+    /// Pitch [rad]; positive lowers the nose.
+    pub pitch: Vec<f64>,
+    /// Yaw [rad].
+    pub yaw: Vec<f64>,
+    /// Undisturbed water surface above the ground-contact plane at the body origin [m]; negative on dry ground.
+    pub depth: Vec<f64>,
+    /// Acceleration without gravity [m/s2]: as measured, else the derivative of the velocity in an inertial frame,
+    /// `dv/dt + omega x v`.
+    pub acceleration: Vec<Vec3>,
+    /// Angular acceleration [rad/s2]: as measured, else the derivative of the angular velocity.
+    pub angular_acceleration: Vec<Vec3>,
+    /// True where the file has accelerations.
+    pub acceleration_is_measured: bool,
+    /// Density [kg/m3].
+    pub density: Vec<f64>,
+    /// Wheel speeds [rad/s] in the order of [`WHEELS`].
+    pub wheel_speeds: [Option<Vec<f64>>; 4],
+    /// Measured wrench about the center of mass [N, N m] in the order of [`WRENCH`].
+    pub measured: [Option<Vec<f64>>; 6],
+    /// Another simulator's wrench about the center of mass [N, N m].
+    pub simulated: [Option<Vec<f64>>; 6],
+    /// Known other forces by column.
+    pub other_forces: BTreeMap<String, Vec<f64>>,
+    /// Columns that no trial has.
+    pub unknown_columns: Vec<String>,
+    /// Holes in time.
+    pub gaps: Vec<Gap>,
+}
+
+impl Trial {
+    /// Reads and checks one file.
+    pub(super) fn read(path: &Path, manifest: &Manifest) -> Result<Self, TrialError> {
+        let other_forces = manifest.measured.other_forces.iter().map(String::as_str);
+        let optional: Vec<&str> =
+            OPTIONAL.into_iter().chain(WHEELS).chain(WRENCH).chain(SIMULATED).chain(other_forces).collect();
+        let table = Table::read(path, &REQUIRED, &optional)?;
+        check_presence(&table, manifest)?;
+        table.check_time(2)?;
+        // what contradicts another column is told more precisely than what lies beyond a limit
+        check_angles(&table)?;
+        check_limits(&table)?;
+        let trial = Self::from_table(&table, manifest);
+        match vectors(&table, ["ax", "ay", "az"]) {
+            Some(measured) => {
+                check_accelerometer(&table, &trial.acceleration)?;
+                Ok(Self { acceleration: measured, acceleration_is_measured: true, ..trial })
+            }
+            None => Ok(trial),
+        }
+    }
+
+    /// The trial of a table that was checked, accelerating as its velocity says.
+    fn from_table(table: &Table, manifest: &Manifest) -> Self {
+        let t = table.column("t").to_vec();
+        let column = |name: &str| table.columns.get(name).cloned();
+        let or_constant = |name: &str, value: f64| column(name).unwrap_or_else(|| vec![value; t.len()]);
+        let listed = |name: &str| {
+            let columns = manifest.measured.columns.as_ref();
+            columns.is_none_or(|columns| columns.iter().any(|column| column == name))
+        };
+        let velocity = vectors(table, ["vx", "vy", "vz"]).unwrap_or_default();
+        let angular_velocity = vectors(table, ["wx", "wy", "wz"]).unwrap_or_default();
+        let angular_acceleration = vectors(table, ["alx", "aly", "alz"]);
+        let other_forces = manifest.measured.other_forces.iter();
+        Self {
+            name: stem(&table.path),
+            acceleration: acceleration(&t, &velocity, &angular_velocity),
+            acceleration_is_measured: false,
+            angular_acceleration: angular_acceleration.unwrap_or_else(|| derivative(&t, &angular_velocity)),
+            velocity,
+            angular_velocity,
+            roll: or_constant("roll", 0.0),
+            pitch: or_constant("pitch", 0.0),
+            yaw: or_constant("yaw", 0.0),
+            depth: table.column("depth").to_vec(),
+            density: or_constant("rho", manifest.fluid_density.unwrap_or(FRESH_WATER)),
+            wheel_speeds: WHEELS.map(column),
+            measured: WRENCH.map(|name| column(name).filter(|_| listed(name))),
+            simulated: SIMULATED.map(column),
+            other_forces: other_forces.filter_map(|name| Some((name.clone(), column(name)?))).collect(),
+            unknown_columns: table.unknown_columns.clone(),
+            gaps: gaps(table),
+            rows: table.rows.clone(),
+            t,
+        }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// True where there is no sample; none that was read is.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// World up in the body frame at a sample.
+    pub fn up(&self, sample: usize) -> nalgebra::UnitVector3<f64> {
+        up_from_roll_pitch(self.roll[sample], self.pitch[sample])
+    }
+
+    /// The state at a sample, in still water.
+    pub fn condition(&self, sample: usize, ground_contact: GroundContact) -> Condition {
+        Condition {
+            velocity: self.velocity[sample],
+            ground_velocity: self.velocity[sample],
+            angular_velocity: self.angular_velocity[sample],
+            acceleration: self.acceleration[sample],
+            angular_acceleration: self.angular_acceleration[sample],
+            depth: self.depth[sample],
+            density: self.density[sample],
+            up: self.up(sample),
+            ground_contact,
+        }
+    }
+
+    pub(super) fn remarks(&self) -> Vec<Remark> {
+        let trial = || self.name.clone();
+        let unknown = self.unknown_columns.iter();
+        let unknown = unknown.map(|column| Remark::UnknownColumn { trial: trial(), column: column.clone() });
+        let gaps = self.gaps.iter();
+        let gaps = gaps.map(|gap| Remark::Gap { trial: trial(), row: gap.row, seconds: gap.seconds });
+        let step = median_step(&self.t).filter(|&step| step > LONG_STEP);
+        unknown.chain(gaps).chain(step.map(|step| Remark::Clock { trial: trial(), step })).collect()
+    }
+}
+
+/// Columns that come together, or that the manifest promises.
+fn check_presence(table: &Table, manifest: &Manifest) -> Result<(), TrialError> {
+    for group in [["ax", "ay", "az"], ["alx", "aly", "alz"]] {
+        let missing = group.into_iter().find(|name| !table.has(name));
+        if let Some(missing) = missing.filter(|_| group.iter().any(|name| table.has(name))) {
+            return Err(table.missing(missing));
+        }
+    }
+    let promised = manifest.measured.columns.iter().flatten().chain(&manifest.measured.other_forces);
+    match promised.into_iter().find(|name| !table.has(name)) {
+        Some(missing) => Err(table.missing(missing)),
+        None => Ok(()),
+    }
+}
+
+fn vectors(table: &Table, names: [&str; 3]) -> Option<Vec<Vec3>> {
+    if !table.has(names[0]) {
+        return None;
+    }
+    let [x, y, z] = names.map(|name| table.column(name));
+    Some(x.iter().zip(y).zip(z).map(|((x, y), z)| Vec3::new(*x, *y, *z)).collect())
+}
+
+fn gaps(table: &Table) -> Vec<Gap> {
+    let t = table.column("t");
+    let starts = pieces(t).into_iter().skip(1).map(|piece| piece.start);
+    starts.map(|start| Gap { row: table.rows[start], seconds: t[start] - t[start - 1] }).collect()
+}

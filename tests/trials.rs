@@ -1,0 +1,288 @@
+//! Promise: a folder of trials is read as it is described, and what is wrong with it is named with file, row and column.
+
+use std::path::Path;
+
+use tempfile::TempDir;
+use wade::condition::GroundContact;
+use wade::trials::{Fault, Method, Trial, TrialError, Trials};
+
+const MANIFEST: &str = "vehicle = \"warthog\"\n";
+
+fn folder(manifest: &str, files: &[(&str, &str)]) -> TempDir {
+    let folder = TempDir::new().expect("a folder");
+    std::fs::write(folder.path().join("trials.toml"), manifest).expect("written");
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    }
+    folder
+}
+
+fn read(manifest: &str, files: &[(&str, &str)]) -> Result<Trials, TrialError> {
+    Trials::read(folder(manifest, files).path())
+}
+
+/// A CSV of the required columns and more, of which each is a function of time, at 100 Hz.
+fn table(more: &[(&str, &dyn Fn(f64) -> f64)], rows: usize) -> String {
+    let mut columns: Vec<(&str, &dyn Fn(f64) -> f64)> = vec![
+        ("t", &|t| t),
+        ("vx", &|_| 1.0),
+        ("vy", &|_| 0.0),
+        ("vz", &|_| 0.0),
+        ("wx", &|_| 0.0),
+        ("wy", &|_| 0.0),
+        ("wz", &|_| 0.0),
+        ("depth", &|_| 0.2),
+    ];
+    for (name, of) in more {
+        match columns.iter_mut().find(|(known, _)| known == name) {
+            Some(known) => known.1 = *of,
+            None => columns.push((name, *of)),
+        }
+    }
+    let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
+    let mut text = names.join(",") + "\n";
+    for row in 0..rows {
+        let values: Vec<String> = columns.iter().map(|(_, of)| of(row as f64 * 0.01).to_string()).collect();
+        text += &(values.join(",") + "\n");
+    }
+    text
+}
+
+fn trial(more: &[(&str, &dyn Fn(f64) -> f64)]) -> Trial {
+    read(MANIFEST, &[("run.csv", &table(more, 200))]).expect("sound").trials.remove(0)
+}
+
+fn fault(more: &[(&str, &dyn Fn(f64) -> f64)]) -> (Fault, String) {
+    let error = read(MANIFEST, &[("run.csv", &table(more, 200))]).expect_err("refused");
+    let message = error.to_string();
+    assert!(message.contains("run.csv"), "{message}");
+    (error.fault, message)
+}
+
+#[test]
+fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
+    let manifest = r#"
+        vehicle = "warthog"
+        fluid_density = 1025.0
+        channel_width = 6.0
+        mass = 280.0
+        [nominal_depth]
+        a = 0.2032
+        [measured]
+        columns = ["fx", "my"]
+        method = "load_cell"
+        repeats = [["a", "b"]]
+        dry_twins = { a = "b" }
+        other_forces = ["drive_fx"]
+        [sensor_noise]
+        fx = 4.0
+        [trial_offset]
+        fx = 2.0
+        [body]
+        length = 1.5
+        width = 1.4
+        draft = 0.2
+        mass = 280.0
+        displaced_volume = 0.07
+        center_of_mass = [0.0, 0.0, -0.06]
+    "#;
+    let text = "# a comment\n\
+        depth, vz,vy,vx,t,wx,wy,wz,roll,pitch,fx,fz,my,drive_fx,sim_fx,wheel_fl,temperature\n\
+        0.2,0,0.1,1.5,10,0,0,0.3,0.01,-0.02,-50,9,1,70,-48,4.5,20\n\
+        0.21,0,0.1,1.6,10.1,0,0,0.3,0.01,-0.02,-51,9,2,71,-49,4.6,20\n";
+    let read =
+        read(manifest, &[("b.csv", text), ("a.csv", text), ("notes.txt", "not a trial")]).expect("sound");
+    let names: Vec<&str> = read.trials.iter().map(|trial| trial.name.as_str()).collect();
+    assert_eq!(names, ["a", "b"]);
+    assert_eq!(read.manifest.measured.method, Some(Method::LoadCell));
+    assert_eq!(read.manifest.nominal_depth["a"], 0.2032);
+    let trial = &read.trials[0];
+    assert_eq!((trial.len(), &trial.rows[..]), (2, &[3, 4][..]));
+    assert_eq!(trial.measured[0].as_deref(), Some(&[-50.0, -51.0][..]));
+    assert_eq!(trial.measured[2], None, "fz is there but not among the measured columns");
+    assert_eq!(trial.measured[4].as_deref(), Some(&[1.0, 2.0][..]));
+    assert_eq!(trial.simulated[0].as_deref(), Some(&[-48.0, -49.0][..]));
+    assert_eq!(trial.other_forces["drive_fx"], [70.0, 71.0]);
+    assert_eq!(trial.wheel_speeds[0].as_deref(), Some(&[4.5, 4.6][..]));
+    assert_eq!(trial.wheel_speeds[1], None);
+    let condition = trial.condition(1, GroundContact::Dry);
+    assert_eq!((condition.velocity.x, condition.velocity.y, condition.depth), (1.6, 0.1, 0.21));
+    assert_eq!((condition.density, condition.ground_contact), (1025.0, GroundContact::Dry));
+    assert!((condition.up.x - 0.02_f64.sin()).abs() < 1e-12, "a negative pitch raises the nose");
+    let remarks: Vec<String> = read.remarks().iter().map(ToString::to_string).collect();
+    assert_eq!(remarks, ["a: column temperature is not used", "b: column temperature is not used"]);
+}
+
+#[test]
+fn missing_optional_columns_have_their_defaults_and_acceleration_is_that_of_the_vehicle() {
+    // a steady turn: the velocity in the body frame is constant, and yet the vehicle accelerates to the left
+    let trial = trial(&[("wz", &|_| 0.5)]);
+    assert!(!trial.acceleration_is_measured);
+    assert!(trial.acceleration.iter().all(|a| (a - wade::frame::Vec3::new(0.0, 0.5, 0.0)).norm() < 1e-9));
+    assert!(trial.measured.iter().chain(&trial.simulated).all(Option::is_none));
+    assert!(trial.density.iter().all(|density| *density == 1000.0));
+    assert!(trial.roll.iter().chain(&trial.pitch).chain(&trial.yaw).all(|angle| *angle == 0.0));
+}
+
+#[test]
+fn measured_accelerations_are_kept() {
+    let omega = 6.0;
+    let trial = trial_with_accelerometer(omega, 1.0, 0.0).expect("sound");
+    assert!(trial.acceleration_is_measured);
+    assert!((trial.acceleration[10].x - omega * (omega * 0.1).cos()).abs() < 1e-12);
+}
+
+/// The vehicle sways by sin(omega t); its accelerometer has a scale and an offset along z.
+fn trial_with_accelerometer(omega: f64, scale: f64, offset: f64) -> Result<Trial, TrialError> {
+    let more: [(&str, &dyn Fn(f64) -> f64); 4] = [
+        ("vx", &|t| (omega * t).sin()),
+        ("ax", &|t| scale * omega * (omega * t).cos()),
+        ("ay", &|_| 0.0),
+        ("az", &|_| offset),
+    ];
+    read(MANIFEST, &[("run.csv", &table(&more, 200))]).map(|mut trials| trials.trials.remove(0))
+}
+
+#[test]
+fn an_accelerometer_in_g_or_with_gravity_is_named() {
+    let message = |scale: f64, offset: f64| {
+        let error = trial_with_accelerometer(6.0, scale, offset).expect_err("refused");
+        error.to_string()
+    };
+    let in_g = message(1.0 / 9.81, 0.0);
+    assert!(in_g.contains("column ax") && in_g.contains("in g") && in_g.contains("row "), "{in_g}");
+    let with_gravity = message(1.0, 9.81);
+    assert!(with_gravity.contains("column az") && with_gravity.contains("gravity"), "{with_gravity}");
+    // at rest an accelerometer in g shows nothing but its one g
+    let still = fault(&[("vx", &|_| 0.0), ("ax", &|_| 0.0), ("ay", &|_| 0.0), ("az", &|_| 1.0)]).1;
+    assert!(still.contains("column az") && still.contains("gravity in g"), "{still}");
+}
+
+#[test]
+fn angles_in_degrees_are_told_from_the_angular_velocity() {
+    let rate = |t: f64| 0.06 * (2.0 * t).cos();
+    let angle = |t: f64| 0.03 * (2.0 * t).sin();
+    trial(&[("pitch", &angle), ("wy", &rate)]);
+    let degrees = |t: f64| angle(t).to_degrees();
+    let (found, message) = fault(&[("pitch", &degrees), ("wy", &rate)]);
+    assert!(matches!(found, Fault::Degrees { column: "pitch", rate_column: "wy", .. }), "{message}");
+    let (found, message) = fault(&[("yaw", &angle), ("wz", &|t| rate(t).to_degrees())]);
+    assert!(matches!(found, Fault::DegreesPerSecond { rate_column: "wz", .. }), "{message}");
+    // a heading that crosses north is no jump
+    let heading = |t: f64| {
+        let turned = 0.5 * t + 5.9;
+        if turned > std::f64::consts::TAU { turned - std::f64::consts::TAU } else { turned }
+    };
+    trial(&[("yaw", &heading), ("wz", &|_| 0.5)]);
+}
+
+#[test]
+fn values_in_other_units_are_named_with_row_and_column() {
+    for (column, value, unit) in
+        [("depth", 203.0, "m"), ("rho", 1.0, "kg/m3"), ("roll", 3.0, "rad"), ("vx", 1500.0, "m/s")]
+    {
+        let (found, message) = fault(&[(column, &move |t| if t == 0.05 { value } else { 0.0 })]);
+        // rho of 0 is out of range from the first row on
+        let row = if column == "rho" { 2 } else { 7 };
+        assert!(
+            matches!(&found, Fault::Implausible { row: r, column: c, unit: u, .. } if (*r, c.as_str(), *u) == (row, column, unit)),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn bad_cells_and_bad_time_are_named_with_row_and_column() {
+    let good = table(&[], 5);
+    for bad in ["NaN", "inf", "", "fast"] {
+        let mut lines: Vec<String> = good.lines().map(str::to_owned).collect();
+        lines[3] = lines[3].replacen(",1,", &format!(",{bad},"), 1);
+        let error = read(MANIFEST, &[("run.csv", &lines.join("\n"))]).expect_err("refused");
+        assert!(
+            matches!(&error.fault, Fault::NotANumber { row: 4, column, value } if column == "vx" && value == bad),
+            "{error}"
+        );
+    }
+    for (row, t) in [(4, "0.01"), (3, "-1")] {
+        let mut lines: Vec<String> = good.lines().map(str::to_owned).collect();
+        let rest = lines[row - 1].split_once(',').expect("columns").1.to_owned();
+        lines[row - 1] = format!("{t},{rest}");
+        let error = read(MANIFEST, &[("run.csv", &lines.join("\n"))]).expect_err("refused");
+        assert!(matches!(error.fault, Fault::Time { row: r, .. } if r == row as u64), "{error}");
+    }
+    let cut = good.trim_end().rsplit_once(',').expect("columns").0;
+    let error = read(MANIFEST, &[("run.csv", cut)]).expect_err("refused");
+    assert!(error.to_string().contains("line: 6"), "{error}");
+    let error = read(MANIFEST, &[("run.csv", &table(&[], 1))]).expect_err("refused");
+    assert!(matches!(error.fault, Fault::TooShort { rows: 1, least: 2 }), "{error}");
+}
+
+#[test]
+fn missing_and_doubled_columns_are_named() {
+    let missing = read(MANIFEST, &[("run.csv", "t,vx,vy,vz,wx,wy,depth\n")]).expect_err("refused");
+    assert!(missing.to_string().contains("column wz is missing; there are: t, vx"), "{missing}");
+    let twice = read(MANIFEST, &[("run.csv", "t,vx,vx\n")]).expect_err("refused");
+    assert!(matches!(twice.fault, Fault::DuplicateColumn { .. }), "{twice}");
+    let (half, message) = fault(&[("ax", &|_| 0.0)]);
+    assert!(matches!(half, Fault::MissingColumn { column, .. } if column == "ay"), "{message}");
+    let promised = format!("{MANIFEST}[measured]\ncolumns = [\"fz\"]\n");
+    let error = read(&promised, &[("run.csv", &table(&[], 5))]).expect_err("refused");
+    assert!(matches!(error.fault, Fault::MissingColumn { column, .. } if column == "fz"));
+}
+
+#[test]
+fn a_hole_in_time_is_remarked_and_not_differentiated_across() {
+    // at 1 m/s before the hole and at 3 m/s after it, never accelerating
+    let text: String = table(&[("vx", &|t| if t < 0.5 { 1.0 } else { 3.0 })], 100)
+        .lines()
+        .enumerate()
+        .map(|(line, text)| match (line, text.split_once(',')) {
+            (51.., Some((t, rest))) => format!("{},{rest}\n", t.parse::<f64>().expect("a number") + 4.0),
+            _ => format!("{text}\n"),
+        })
+        .collect();
+    let trials = read(MANIFEST, &[("run.csv", &text)]).expect("sound");
+    assert_eq!(trials.trials[0].gaps.len(), 1);
+    assert!(trials.trials[0].acceleration.iter().all(|a| a.norm() < 1e-9));
+    let remark = trials.remarks()[0].to_string();
+    assert_eq!(remark, "run: a gap of 4.010 s before row 52");
+}
+
+#[test]
+fn a_clock_in_milliseconds_is_remarked() {
+    let seconds = table(&[], 20);
+    let text = seconds.lines().enumerate().map(|(line, text)| match text.split_once(',') {
+        Some((_, rest)) if line > 0 => format!("{},{rest}\n", line * 9),
+        _ => format!("{text}\n"),
+    });
+    let trials = read(MANIFEST, &[("run.csv", &text.collect::<String>())]).expect("sound");
+    assert!(trials.remarks()[0].to_string().contains("is t in another unit"));
+}
+
+#[test]
+fn a_folder_that_is_none_says_what_it_lacks() {
+    let empty = TempDir::new().expect("a folder");
+    let error = Trials::read(empty.path()).expect_err("refused");
+    assert!(matches!(error.fault, Fault::NoManifest), "{error}");
+    let error = read(MANIFEST, &[]).expect_err("refused");
+    assert!(matches!(error.fault, Fault::NoTrial), "{error}");
+    let error = Trials::read(Path::new("/nowhere/at/all")).expect_err("refused");
+    assert!(error.to_string().contains("/nowhere/at/all"), "{error}");
+}
+
+#[test]
+fn a_manifest_with_unknown_names_or_numbers_is_refused() {
+    let run = table(&[], 5);
+    for (manifest, expected) in [
+        ("vehicel = \"warthog\"", "vehicel"),
+        ("vehicle = \"w\"\nmass = -1.0", "mass = -1 must be positive"),
+        ("vehicle = \"w\"\n[nominal_depth]\nrun2 = 0.1", "nominal_depth names \"run2\""),
+        ("vehicle = \"w\"\n[measured]\nrepeats = [[\"run\", \"again\"]]", "measured.repeats names \"again\""),
+        ("vehicle = \"w\"\n[measured]\nmethod = \"guess\"", "guess"),
+        ("vehicle = \"w\"\n[sensor_noise]\nfw = 1.0", "sensor_noise names \"fw\""),
+        ("vehicle = \"w\"\n[trial_offset]\nfx = -1.0", "trial_offset.fx = -1"),
+    ] {
+        let error = read(manifest, &[("run.csv", &run)]).expect_err("refused");
+        assert!(error.to_string().contains("trials.toml") && error.to_string().contains(expected), "{error}");
+    }
+}
