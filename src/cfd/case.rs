@@ -163,7 +163,10 @@ impl Inputs<'_> {
             )
         };
         let inlet = if case.is_unsteady() { surge() } else { uniform };
-        let outlet = if case.speed_mps > 0.0 {
+        let outlet = if case.is_unsteady() {
+            // the mean velocity of the other condition is a constant
+            inlet.clone()
+        } else if case.speed_mps > 0.0 {
             let speed = number(case.speed_mps);
             format!(
                 "type outletPhaseMeanVelocity; alpha alpha.water; Umean {speed}; value uniform ({flow} 0 0);"

@@ -15,4 +15,5 @@ pub mod placement;
 pub mod plan;
 pub mod poly_mesh;
 pub mod run;
+pub mod slurm;
 pub mod solve;

@@ -12,6 +12,7 @@ use wade::cfd::case::Settings;
 use wade::cfd::openfoam::OpenFoam;
 use wade::cfd::plan::{self, Campaign, Plan, Set};
 use wade::cfd::run::{Event, Machine, Work};
+use wade::cfd::slurm;
 use wade::geometry::hydrostatics::float_depth;
 use wade::train;
 
@@ -94,9 +95,17 @@ struct PlanCommand {
     /// Settings of every case, TOML; only when the plan is begun
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// Also write what another engine needs to run the plan: `slurm`, a job array
+    #[arg(long, value_enum)]
+    target: Option<Target>,
     /// Folder of the campaign
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Target {
+    Slurm,
 }
 
 impl PlanCommand {
@@ -118,6 +127,9 @@ impl PlanCommand {
             plan.cases.len(),
             plan.cases.len() - before
         );
+        if let Some(Target::Slurm) = self.target {
+            println!("{}: one task a case", slurm::write(&self.out, &plan)?.display());
+        }
         Ok(ExitCode::SUCCESS)
     }
 
