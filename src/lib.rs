@@ -6,15 +6,17 @@
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:
-//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`]), the body ([`geometry`], [`vehicle`]), its
-//! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
-//! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), the doors ([`service`], [`client`], [`soak`]), what
-//! learns it ([`train`]), the settings ([`config`]) and the server as a whole ([`server`]).
+//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`random`]), the body ([`geometry`],
+//! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network
+//! ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from ([`dataset`]), the
+//! doors ([`service`], [`client`], [`soak`]), what learns it ([`train`]), the settings ([`config`]) and the server as a
+//! whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
 pub mod forces;
 pub mod frame;
+pub mod random;
 pub mod wrench;
 
 pub mod geometry;
@@ -27,6 +29,7 @@ pub mod features;
 pub mod bundle;
 pub mod model;
 
+pub mod dataset;
 pub mod engine;
 pub mod metrics;
 

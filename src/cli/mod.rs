@@ -1,5 +1,6 @@
 //! Arguments in, one function a subcommand, exit codes out: 0 success, 1 what was asked for does not hold, 2 usage.
 
+mod dataset;
 mod predict;
 mod progress;
 mod query;
@@ -41,6 +42,8 @@ enum Command {
     Predict(predict::Predict),
     /// Load a server at a steady rate for a stated time and report its latency
     Soak(soak::Soak),
+    /// Import CFD results, augment, split and describe data sets
+    Dataset(dataset::Dataset),
     /// Train a network for the vehicles of a folder
     Train(train::Train),
     /// Build, check and show vehicle bundles
@@ -55,6 +58,7 @@ impl Cli {
             Command::Query(command) => command.run(),
             Command::Predict(command) => command.run(),
             Command::Soak(command) => command.run(),
+            Command::Dataset(command) => command.run(),
             Command::Train(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }

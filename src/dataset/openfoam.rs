@@ -1,0 +1,255 @@
+//! What OpenFOAM's function object `forces` writes: `<name>/<start time>/force.dat` and `moment.dat`.
+//!
+//! Three forms. Up to v2112 vectors stand in parentheses; from v2206 on they are plain columns with the same header
+//! names; the Foundation's versions write one `forces.dat` with pressure and viscous parts of forces and moments and no
+//! totals. In all of them a run that was started again adds a folder named by its start time, and a file that is there
+//! already is not overwritten but joined by `force_<start time>.dat`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::history::{History, HistoryError};
+use super::lines::{CutOff, LineError, Lines};
+use crate::frame::Vec3;
+
+/// The loads on one surface over time, in the axes of the solver.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceHistory {
+    /// Pressure and viscous force [N].
+    pub force: History<3>,
+    /// The viscous part [N].
+    pub viscous: History<3>,
+    /// Moment about `about` [N m].
+    pub moment: Option<History<3>>,
+    /// The point that the moment is taken about [m].
+    pub about: Vec3,
+}
+
+/// Why the output of a function object was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenFoamError {
+    /// A file or folder that cannot be read.
+    #[error("{}: {source}", .path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// No folder with forces.
+    #[error("{}: no folder in it, named by a time, holds force.dat or forces.dat", .path.display())]
+    NoForces {
+        /// The folder of the function object.
+        path: PathBuf,
+    },
+    /// Forces of a start time without the moments that other start times have.
+    #[error("{}: moments start at {found} s and forces at {expected} s", .path.display())]
+    NoMoments {
+        /// The folder of the function object.
+        path: PathBuf,
+        /// First start time with moments [s].
+        found: f64,
+        /// First start time with forces [s].
+        expected: f64,
+    },
+    /// A file without the header that names its columns.
+    #[error("{}: no header line in it names the columns total or pressure, and viscous", .path.display())]
+    NoHeader {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A line that is no row.
+    #[error("{}, {source}", .path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line and what is wrong with it.
+        source: LineError,
+    },
+    /// Rows that are no history.
+    #[error("{}: {source}", .path.display())]
+    History {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: HistoryError,
+    },
+    /// A moment center that moves.
+    #[error("{}: the moment center (CofR) differs from that of the files before", .path.display())]
+    MomentCenter {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// Reads the folder of one function object, `postProcessing/<name>`, over all its start times; where two overlap the
+/// later one counts.
+pub fn read(folder: &Path, cut_off: CutOff) -> Result<SurfaceHistory, OpenFoamError> {
+    let mut forces: Option<Loads> = None;
+    let mut moments: Option<Loads> = None;
+    for (start, path) in starts(folder)? {
+        for part in parts(&path, start, "forces", cut_off)? {
+            // force and moment stand side by side in one file
+            let [force, moment] = part.both()?;
+            join(&mut forces, force, start)?;
+            join(&mut moments, moment, start)?;
+        }
+        for part in parts(&path, start, "force", cut_off)? {
+            join(&mut forces, part.one()?, start)?;
+        }
+        for part in parts(&path, start, "moment", cut_off)? {
+            join(&mut moments, part.one()?, start)?;
+        }
+    }
+    let forces = forces.ok_or_else(|| OpenFoamError::NoForces { path: folder.to_owned() })?;
+    if let Some(moments) = &moments
+        && moments.start != forces.start
+    {
+        let (found, expected) = (moments.start, forces.start);
+        return Err(OpenFoamError::NoMoments { path: folder.to_owned(), found, expected });
+    }
+    Ok(SurfaceHistory {
+        about: moments.as_ref().map_or(forces.about, |moments| moments.about),
+        force: forces.total,
+        viscous: forces.viscous,
+        moment: moments.map(|moments| moments.total),
+    })
+}
+
+/// Force or moment of a run, or of several joined.
+struct Loads {
+    path: PathBuf,
+    start: f64,
+    total: History<3>,
+    viscous: History<3>,
+    about: Vec3,
+}
+
+fn join(to: &mut Option<Loads>, later: Loads, since: f64) -> Result<(), OpenFoamError> {
+    match to {
+        None => *to = Some(later),
+        Some(loads) if loads.about != later.about => {
+            return Err(OpenFoamError::MomentCenter { path: later.path });
+        }
+        Some(loads) => {
+            loads.total.overlay(later.total, since);
+            loads.viscous.overlay(later.viscous, since);
+        }
+    }
+    Ok(())
+}
+
+/// The folders named by a time, in the order of time.
+fn starts(folder: &Path) -> Result<Vec<(f64, PathBuf)>, OpenFoamError> {
+    let io = |source| OpenFoamError::Io { path: folder.to_owned(), source };
+    let mut starts = Vec::new();
+    for entry in fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let time = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.parse::<f64>().ok());
+        starts.extend(time.filter(|time| time.is_finite()).map(|time| (time, path)));
+    }
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(starts)
+}
+
+/// A file of a start time, and the one of a second run from the same time.
+fn parts(folder: &Path, start: f64, stem: &str, cut_off: CutOff) -> Result<Vec<Part>, OpenFoamError> {
+    let again = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let paths = [format!("{stem}.dat"), format!("{stem}_{again}.dat")].map(|name| folder.join(name));
+    paths.into_iter().filter(|path| path.exists()).map(|path| Part::read(path, start, cut_off)).collect()
+}
+
+/// One file: the groups of three columns by their names, and the rows.
+struct Part {
+    path: PathBuf,
+    start: f64,
+    about: Vec3,
+    groups: Vec<String>,
+    rows: Vec<(f64, Vec<f64>)>,
+}
+
+impl Part {
+    fn read(path: PathBuf, start: f64, cut_off: CutOff) -> Result<Self, OpenFoamError> {
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text.replace(['(', ')'], " "),
+            Err(source) => return Err(OpenFoamError::Io { path, source }),
+        };
+        let mut part = Self { path, start, about: Vec3::zeros(), groups: Vec::new(), rows: Vec::new() };
+        let lines = Lines::new(&text, cut_off);
+        for (number, line) in lines.iter() {
+            if let Some(comment) = line.strip_prefix('#') {
+                part.header(comment);
+                continue;
+            }
+            if part.groups.is_empty() {
+                return Err(OpenFoamError::NoHeader { path: part.path });
+            }
+            match lines.row(number, line, 1 + 3 * part.groups.len()) {
+                Ok(row) => part.rows.extend(row.map(|row| (row[0], row[1..].to_vec()))),
+                Err(source) => return Err(OpenFoamError::Line { path: part.path, source }),
+            }
+        }
+        Ok(part)
+    }
+
+    /// Takes the moment center and the names of the columns. The parentheses are gone by now.
+    fn header(&mut self, comment: &str) {
+        let words: Vec<&str> = comment.split_whitespace().collect();
+        match words[..] {
+            ["CofR", ":", x, y, z] => {
+                if let [Ok(x), Ok(y), Ok(z)] = [x, y, z].map(str::parse) {
+                    self.about = Vec3::new(x, y, z);
+                }
+            }
+            // one file for both, without totals
+            ["Time", "forces", ref rest @ ..] => {
+                let rest = rest.iter().map(|word| if word.starts_with("moment") { "moment" } else { word });
+                self.groups = ["forces"].into_iter().chain(rest).map(str::to_owned).collect();
+                self.groups.retain(|group| !["forces", "moment"].contains(&group.as_str()));
+            }
+            ["Time", ref rest @ ..] => {
+                let group = |word: &&str| word.strip_suffix("_x").map(str::to_owned);
+                self.groups = rest.iter().filter_map(group).collect();
+            }
+            _ => {}
+        }
+    }
+
+    /// The only quantity of the file.
+    fn one(self) -> Result<Loads, OpenFoamError> {
+        let at = |name: &str| self.groups.iter().position(|group| group == name);
+        match (at("total"), at("viscous")) {
+            (Some(total), Some(viscous)) => self.loads(&[total], viscous),
+            _ => Err(OpenFoamError::NoHeader { path: self.path }),
+        }
+    }
+
+    /// The two quantities of the file, each the sum of its parts.
+    fn both(self) -> Result<[Loads; 2], OpenFoamError> {
+        let half = self.groups.len() / 2;
+        let viscous = self.groups[..half].iter().position(|group| group == "viscous");
+        let Some(viscous) = viscous.filter(|_| self.groups[..half] == self.groups[half..]) else {
+            return Err(OpenFoamError::NoHeader { path: self.path });
+        };
+        let all = |from: usize| (from..from + half).collect::<Vec<_>>();
+        Ok([self.loads(&all(0), viscous)?, self.loads(&all(half), half + viscous)?])
+    }
+
+    fn loads(&self, parts: &[usize], viscous: usize) -> Result<Loads, OpenFoamError> {
+        let sum = |row: &[f64], groups: &[usize]| {
+            std::array::from_fn(|axis| groups.iter().map(|group| row[3 * group + axis]).sum())
+        };
+        let history = |groups: &[usize]| {
+            let rows = self.rows.iter().map(|(time, row)| (*time, sum(row, groups)));
+            let history = History::new(rows);
+            history.map_err(|source| OpenFoamError::History { path: self.path.clone(), source })
+        };
+        Ok(Loads {
+            path: self.path.clone(),
+            start: self.start,
+            total: history(parts)?,
+            viscous: history(&[viscous])?,
+            about: self.about,
+        })
+    }
+}
