@@ -36,14 +36,14 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Rotation3, UnitVector3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::condition::{Condition, GroundContact};
 use crate::frame::Vec3;
 use crate::vehicle::spec::{Axis, BodyFromStl};
 
 /// What the file holds, as it is written.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CaseFile {
     /// Name of the vehicle.
@@ -88,7 +88,7 @@ fn cfd() -> String {
 }
 
 /// What the bed does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Bed {
     /// The vehicle is parked in a current.
@@ -98,7 +98,7 @@ pub enum Bed {
 }
 
 /// From the axes of the CFD to the body frame.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
     /// The axis of the CFD that points forward when yaw, pitch and roll are zero.
@@ -121,7 +121,7 @@ pub struct Frame {
 }
 
 /// Names of columns, in which `{surface}` and `{axis}` stand for a surface and for x, y or z.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Report {
     /// Pressure and viscous force.
@@ -378,6 +378,14 @@ mod tests {
         let state = tilted.condition().unwrap();
         assert!((state.up.into_inner() - expected.into_inner()).norm() < 1e-12);
         assert!(state.velocity.dot(&state.up).abs() < 1e-12, "the water moves horizontally");
+    }
+
+    #[test]
+    fn a_description_that_a_program_writes_reads_the_same() {
+        let file =
+            case("speed_mps = 2.0\nflow_angle_deg = 60.0\ndomain_m = [6.0, 5.0, 1.5]", "yaw_deg = 3.0")
+                .unwrap();
+        assert_eq!(CaseFile::parse(&toml::to_string(&file).unwrap()).unwrap(), file);
     }
 
     #[test]

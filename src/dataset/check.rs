@@ -152,7 +152,7 @@ impl Dataset {
                 .into_iter()
                 .flatten()
                 .chain(rest.into_iter().flatten());
-            if let Some(value) = parts.flat_map(|v| <[f64; 3]>::from(v)).find(|x| !x.is_finite()) {
+            if let Some(value) = parts.flat_map(<[f64; 3]>::from).find(|x| !x.is_finite()) {
                 return Err(number(format!("a load on `{surface}`"), value, "finite"));
             }
         }

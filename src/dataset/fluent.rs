@@ -28,12 +28,12 @@ struct Column {
 #[derive(Debug, thiserror::Error)]
 pub enum FluentError {
     /// A file or folder that cannot be read.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {fault}", .path.display())]
     Io {
         /// Which.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        fault: std::io::Error,
     },
     /// No report file.
     #[error("{}: no report file (.out) in it", .path.display())]
@@ -56,20 +56,20 @@ pub enum FluentError {
         path: PathBuf,
     },
     /// A line that is no row.
-    #[error("{}, {source}", .path.display())]
+    #[error("{}, {fault}", .path.display())]
     Line {
         /// The file.
         path: PathBuf,
         /// The line and what is wrong with it.
-        source: LineError,
+        fault: LineError,
     },
     /// Rows that are no history.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {fault}", .path.display())]
     History {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: HistoryError,
+        fault: HistoryError,
     },
     /// The same column in two files that begin at the same time and differ.
     #[error("column {column} is in {} and in {}, from the same time on: remove the outdated file", .paths[0].display(), .paths[1].display())]
@@ -94,7 +94,7 @@ pub enum FluentError {
 impl Reports {
     /// Reads every `.out` file of a folder; where two hold the same column, the one that begins later counts from there.
     pub fn read(folder: &Path, cut_off: CutOff) -> Result<Self, FluentError> {
-        let io = |source| FluentError::Io { path: folder.to_owned(), source };
+        let io = |fault| FluentError::Io { path: folder.to_owned(), fault };
         let mut paths = Vec::new();
         for entry in fs::read_dir(folder).map_err(io)? {
             let path = entry.map_err(io)?.path();
@@ -144,7 +144,7 @@ impl Reports {
 
 fn read_file(path: &Path, cut_off: CutOff) -> Result<Vec<(String, Column)>, FluentError> {
     let at = || path.to_owned();
-    let bytes = fs::read(path).map_err(|source| FluentError::Io { path: at(), source })?;
+    let bytes = fs::read(path).map_err(|fault| FluentError::Io { path: at(), fault })?;
     // names of zones may be in any encoding, the numbers are ASCII
     let text = String::from_utf8_lossy(&bytes);
     let lines = Lines::new(&text, cut_off);
@@ -171,7 +171,7 @@ fn read_file(path: &Path, cut_off: CutOff) -> Result<Vec<(String, Column)>, Flue
             return Err(FluentError::Header { path: at(), line });
         }
         let row = lines.row(line, text, names.len());
-        if let Some(row) = row.map_err(|source| FluentError::Line { path: at(), source })? {
+        if let Some(row) = row.map_err(|fault| FluentError::Line { path: at(), fault })? {
             // a run that was started again from an earlier time may go on in the same file
             rows.truncate(rows.partition_point(|before| before[time] < row[time]));
             rows.push(row);
@@ -179,7 +179,7 @@ fn read_file(path: &Path, cut_off: CutOff) -> Result<Vec<(String, Column)>, Flue
     }
     let column = |(index, name): (usize, String)| {
         let history = History::new(rows.iter().map(|row| (row[time], [row[index]])));
-        let history = history.map_err(|source| FluentError::History { path: at(), source })?;
+        let history = history.map_err(|fault| FluentError::History { path: at(), fault })?;
         Ok((name, Column { path: at(), history }))
     };
     names.into_iter().enumerate().filter(|(index, _)| *index != time).map(column).collect()

@@ -31,7 +31,7 @@ pub enum HistoryError {
         time: f64,
     },
     /// The window reaches beyond the history.
-    #[error("{from} s to {to} s is wanted and the history covers {first} s to {last} s")]
+    #[error("{from:.4} s to {to:.4} s is wanted and the history covers {first:.4} s to {last:.4} s")]
     NotCovered {
         /// Start of the window [s].
         from: f64,
@@ -43,7 +43,9 @@ pub enum HistoryError {
         last: f64,
     },
     /// The steps are longer than the window.
-    #[error("between {from} s and {to} s the history has no value: its steps are too long for such a window")]
+    #[error(
+        "between {from:.4} s and {to:.4} s the history has no value: its steps are too long for such a window"
+    )]
     TooCoarse {
         /// Start of the window [s].
         from: f64,

@@ -43,12 +43,12 @@ pub struct Import {
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// A file or folder that cannot be read.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {fault}", .path.display())]
     Io {
         /// Which.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        fault: std::io::Error,
     },
     /// No sub-folder.
     #[error("{}: no case in it; a case is a folder with a {CASE_FILE}", .path.display())]
@@ -63,12 +63,12 @@ pub enum ImportError {
         path: PathBuf,
     },
     /// A description that describes nothing.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {fault}", .path.display())]
     Description {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: CaseError,
+        fault: CaseError,
     },
     /// A vehicle that was not asked for.
     #[error("{}: vehicle `{vehicle}` is none of those asked for: {}", .path.display(), .known.join(", "))]
@@ -97,25 +97,25 @@ pub enum ImportError {
         path: PathBuf,
     },
     /// Forces that OpenFOAM wrote.
-    #[error("surface `{surface}`: {source}")]
+    #[error("surface `{surface}`: {fault}")]
     OpenFoam {
         /// The surface.
         surface: String,
         /// What is wrong.
-        source: OpenFoamError,
+        fault: OpenFoamError,
     },
     /// Report files.
     #[error(transparent)]
     Fluent(#[from] FluentError),
     /// A history without the sections asked for.
-    #[error("{}, surface `{surface}`: {source}", .path.display())]
+    #[error("{}, surface `{surface}`: {fault}", .path.display())]
     Sections {
         /// The folder of the case.
         path: PathBuf,
         /// The surface.
         surface: String,
         /// What is wrong.
-        source: HistoryError,
+        fault: HistoryError,
     },
     /// Loads at rest need moments.
     #[error("{}, surface `{surface}`: the loads at rest have no moments", .path.display())]
@@ -194,11 +194,11 @@ impl Import {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Err(ImportError::NoDescription { path: folder.to_owned() });
             }
-            Err(source) => return Err(ImportError::Io { path, source }),
+            Err(fault) => return Err(ImportError::Io { path, fault }),
         };
         let case = match CaseFile::parse(&text) {
             Ok(case) => case,
-            Err(source) => return Err(ImportError::Description { path, source }),
+            Err(fault) => return Err(ImportError::Description { path, fault }),
         };
         let Some(surfaces) = self.vehicles.get(&case.vehicle) else {
             let known = self.vehicles.keys().cloned().collect();
@@ -212,7 +212,7 @@ impl Import {
 
     /// The samples of one case, from its folder and its description. The folder's name is the name of the case.
     pub fn case(&self, folder: &Path, case: &CaseFile) -> Result<Vec<Sample>, ImportError> {
-        let described = |source| ImportError::Description { path: folder.join(CASE_FILE), source };
+        let described = |fault| ImportError::Description { path: folder.join(CASE_FILE), fault };
         let condition = case.condition().map_err(described)?;
         let placement = case.placement();
         let loads = self.loads(folder, case, Take::Sections(self.sections))?;
@@ -285,9 +285,9 @@ impl Import {
     ) -> Result<Taken, ImportError> {
         let output = folder.join("postProcessing").join(case.name_in_solver(surface));
         let history = openfoam::read(&output, self.cut_off)
-            .map_err(|source| ImportError::OpenFoam { surface: surface.to_owned(), source })?;
+            .map_err(|fault| ImportError::OpenFoam { surface: surface.to_owned(), fault })?;
         let means = |history: &History<3>| {
-            let means = take.from(history).map_err(|source| sections_error(folder, surface, source))?;
+            let means = take.from(history).map_err(|fault| sections_error(folder, surface, fault))?;
             Ok::<_, ImportError>(means.into_iter().map(Vec3::from).collect::<Vec<_>>())
         };
         Ok(Taken {
@@ -314,7 +314,7 @@ fn fluent(
         let mut components = Vec::new();
         for axis in ["x", "y", "z"] {
             let history = reports.column(&pattern.replace("{axis}", axis))?;
-            components.push(take.from(history).map_err(|source| sections_error(folder, surface, source))?);
+            components.push(take.from(history).map_err(|fault| sections_error(folder, surface, fault))?);
         }
         let vector = |i: usize| Vec3::new(components[0][i][0], components[1][i][0], components[2][i][0]);
         Ok::<_, ImportError>((0..components[0].len()).map(vector).collect::<Vec<_>>())
@@ -327,13 +327,13 @@ fn fluent(
     })
 }
 
-fn sections_error(folder: &Path, surface: &str, source: HistoryError) -> ImportError {
-    ImportError::Sections { path: folder.to_owned(), surface: surface.to_owned(), source }
+fn sections_error(folder: &Path, surface: &str, fault: HistoryError) -> ImportError {
+    ImportError::Sections { path: folder.to_owned(), surface: surface.to_owned(), fault }
 }
 
 /// The sub-folders by name; files and hidden folders beside them are no cases.
 fn case_folders(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
-    let io = |source| ImportError::Io { path: folder.to_owned(), source };
+    let io = |fault| ImportError::Io { path: folder.to_owned(), fault };
     let mut folders = Vec::new();
     for entry in fs::read_dir(folder).map_err(io)? {
         let entry = entry.map_err(io)?;

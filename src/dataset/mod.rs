@@ -1,13 +1,15 @@
 //! Data sets: loads on each surface of a vehicle with the state that they belong to, from CFD or by formula.
 //!
 //! Body frame FLU, SI units. A *case* is one run of a solver; a *sample* is the average over one section of its
-//! history, or a mirror image of that. Reading order: `check` (what holds for every data set), `schema` and `file`
-//! (Parquet), `history` and `sections` (force histories and their averages), `openfoam` and `fluent` (the solvers'
+//! history, or a mirror image of that. Reading order: `check` (what holds for every data set), `schema`, `file`, `encode`
+//! and `decode` (Parquet), `history` and `sections` (force histories and their averages), `openfoam` and `fluent` (the solvers'
 //! files), `case` and `import` (a folder of cases), `mirror` (augmentation), `split`, `merge`, `analytic`, `summary`, `page`.
 
 pub mod analytic;
 pub mod case;
 mod check;
+mod decode;
+mod encode;
 mod file;
 pub mod fluent;
 pub mod history;
@@ -36,6 +38,9 @@ pub use merge::MergeError;
 
 use crate::condition::{Condition, GroundContact};
 use crate::frame::Vec3;
+
+/// Below this speed the motion has no direction [m/s].
+const DIRECTION_SPEED: f64 = 1e-6;
 
 /// Samples and what holds for all of them.
 #[derive(Debug, Clone, PartialEq)]
@@ -150,6 +155,13 @@ impl Sample {
     /// Sum of the forces on all surfaces, body frame [N].
     pub fn net_force(&self) -> Vec3 {
         self.surfaces.iter().map(|load| load.force).sum()
+    }
+
+    /// Angle of the motion through the water from the lateral axis [degrees]: 90 ahead or astern, 0 to either side, the
+    /// same for every mirror image; `None` at rest.
+    pub fn flow_angle_deg(&self) -> Option<f64> {
+        let v = &self.condition.velocity;
+        (v.x.hypot(v.y) > DIRECTION_SPEED).then(|| v.x.abs().atan2(v.y.abs()).to_degrees())
     }
 }
 

@@ -29,12 +29,12 @@ pub struct SurfaceHistory {
 #[derive(Debug, thiserror::Error)]
 pub enum OpenFoamError {
     /// A file or folder that cannot be read.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {fault}", .path.display())]
     Io {
         /// Which.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        fault: std::io::Error,
     },
     /// No folder with forces.
     #[error("{}: no folder in it, named by a time, holds force.dat or forces.dat", .path.display())]
@@ -59,20 +59,20 @@ pub enum OpenFoamError {
         path: PathBuf,
     },
     /// A line that is no row.
-    #[error("{}, {source}", .path.display())]
+    #[error("{}, {fault}", .path.display())]
     Line {
         /// The file.
         path: PathBuf,
         /// The line and what is wrong with it.
-        source: LineError,
+        fault: LineError,
     },
     /// Rows that are no history.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {fault}", .path.display())]
     History {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: HistoryError,
+        fault: HistoryError,
     },
     /// A moment center that moves.
     #[error("{}: the moment center (CofR) differs from that of the files before", .path.display())]
@@ -141,7 +141,7 @@ fn join(to: &mut Option<Loads>, later: Loads, since: f64) -> Result<(), OpenFoam
 
 /// The folders named by a time, in the order of time.
 fn starts(folder: &Path) -> Result<Vec<(f64, PathBuf)>, OpenFoamError> {
-    let io = |source| OpenFoamError::Io { path: folder.to_owned(), source };
+    let io = |fault| OpenFoamError::Io { path: folder.to_owned(), fault };
     let mut starts = Vec::new();
     for entry in fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
@@ -172,7 +172,7 @@ impl Part {
     fn read(path: PathBuf, start: f64, cut_off: CutOff) -> Result<Self, OpenFoamError> {
         let text = match fs::read_to_string(&path) {
             Ok(text) => text.replace(['(', ')'], " "),
-            Err(source) => return Err(OpenFoamError::Io { path, source }),
+            Err(fault) => return Err(OpenFoamError::Io { path, fault }),
         };
         let mut part = Self { path, start, about: Vec3::zeros(), groups: Vec::new(), rows: Vec::new() };
         let lines = Lines::new(&text, cut_off);
@@ -186,7 +186,7 @@ impl Part {
             }
             match lines.row(number, line, 1 + 3 * part.groups.len()) {
                 Ok(row) => part.rows.extend(row.map(|row| (row[0], row[1..].to_vec()))),
-                Err(source) => return Err(OpenFoamError::Line { path: part.path, source }),
+                Err(fault) => return Err(OpenFoamError::Line { path: part.path, fault }),
             }
         }
         Ok(part)
@@ -242,7 +242,7 @@ impl Part {
         let history = |groups: &[usize]| {
             let rows = self.rows.iter().map(|(time, row)| (*time, sum(row, groups)));
             let history = History::new(rows);
-            history.map_err(|source| OpenFoamError::History { path: self.path.clone(), source })
+            history.map_err(|fault| OpenFoamError::History { path: self.path.clone(), fault })
         };
         Ok(Loads {
             path: self.path.clone(),

@@ -10,9 +10,6 @@ use serde::Serialize;
 use super::{Dataset, Sample};
 use crate::random::Random;
 
-/// Below this speed the flow has no direction [m/s].
-const DIRECTION_SPEED: f64 = 1e-6;
-
 /// What is held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum By {
@@ -143,7 +140,7 @@ pub fn split(dataset: &Dataset, by: By, seed: u64) -> Result<Vec<Split>, SplitEr
             ranges(dataset, bins, &Quantity { name: "depth [m]", of: &depth })
         }
         By::Heading { bins } => {
-            ranges(dataset, bins, &Quantity { name: "flow angle [deg]", of: &flow_angle })
+            ranges(dataset, bins, &Quantity { name: "flow angle [deg]", of: &Sample::flow_angle_deg })
         }
         By::Vehicle => by_vehicle(dataset),
     }
@@ -232,12 +229,6 @@ fn by_vehicle(dataset: &Dataset) -> Result<Vec<Split>, SplitError> {
 struct Quantity<'a> {
     name: &'static str,
     of: &'a dyn Fn(&Sample) -> Option<f64>,
-}
-
-/// Angle of the flow from the lateral axis [degrees], 0 to 90; `None` at rest.
-fn flow_angle(sample: &Sample) -> Option<f64> {
-    let v = &sample.condition.velocity;
-    (v.x.hypot(v.y) > DIRECTION_SPEED).then(|| v.x.abs().atan2(v.y.abs()).to_degrees())
 }
 
 /// Equal parts of the range of a quantity, each held out in turn. A case that has no value of it is never held out.

@@ -4,13 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{Dataset, Image, Sample};
+use super::{DIRECTION_SPEED, Dataset, Image, Sample};
 use crate::condition::GroundContact;
 use crate::domain::Range;
 use crate::frame::{GRAVITY, Vec3};
-
-/// Below this speed the flow has no direction [m/s].
-const DIRECTION_SPEED: f64 = 1e-6;
 
 /// Parts of the range of speed and of depth in the table of coverage.
 pub const COVERAGE: usize = 5;
@@ -228,10 +225,7 @@ fn ranges(samples: &[&Sample]) -> BTreeMap<&'static str, Range> {
         let values = [
             ("speed_mps", Some(speed)),
             ("ground_speed_mps", Some(c.ground_velocity.norm())),
-            (
-                "flow_angle_deg",
-                (speed > DIRECTION_SPEED).then(|| c.velocity.x.abs().atan2(c.velocity.y.abs()).to_degrees()),
-            ),
+            ("flow_angle_deg", sample.flow_angle_deg()),
             ("depth_m", Some(c.depth)),
             ("density_kgpm3", Some(c.density)),
             ("froude_depth", (c.depth > 0.0).then(|| speed / (GRAVITY * c.depth).sqrt())),
