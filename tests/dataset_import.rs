@@ -312,6 +312,10 @@ fn from_cases_to_two_sides_of_a_split_on_the_command_line() {
     let training = dataset::read(&split.join("1/train.parquet")).unwrap();
     assert!(training.samples.iter().all(|sample| sample.vehicle == "warthog"));
 
+    let again = wade(&["split", text(&augmented), "--by", "case", "--out", text(&split)]);
+    let error = String::from_utf8(again.stderr).unwrap();
+    assert!(again.status.code() == Some(1) && error.contains("is not empty"), "{error}");
+
     let page = at("page.html");
     let described = done(&["describe", text(&augmented), "--json", "--html", text(&page)]);
     let described: Value = serde_json::from_str(&described).unwrap();

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -154,7 +156,7 @@ struct ImportCases {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Solver {
-    /// Function object forces, of OpenFOAM v1706 and later or of the Foundation's versions
+    /// Function object forces: force.dat and moment.dat, or forces.dat of the Foundation's versions
     Openfoam,
     /// Report files
     Fluent,
@@ -194,7 +196,7 @@ struct SplitFile {
     /// Seed
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder for train.parquet and held-out.parquet, or for folders 1, 2 and so on with both
+    /// New folder for train.parquet and held-out.parquet, or for folders 1, 2 and so on with both
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Print JSON
@@ -303,7 +305,7 @@ impl Analytic {
 }
 
 impl SplitFile {
-    fn run(self) -> Result<()> {
+    fn by(&self) -> By {
         let shared = matches!(self.by, Rule::Case | Rule::Sample);
         if self.share.is_some() && !shared {
             usage_error("--share goes with --by case or --by sample");
@@ -312,37 +314,48 @@ impl SplitFile {
             usage_error("--parts goes with --by folds, --by depth or --by heading");
         }
         let (share, parts) = (self.share.unwrap_or(0.2), self.parts.unwrap_or(5));
-        let by = match self.by {
+        match self.by {
             Rule::Case => By::Case { share },
             Rule::Sample => By::Sample { share },
             Rule::Folds => By::Folds { count: parts },
             Rule::Depth => By::Depth { bins: parts },
             Rule::Heading => By::Heading { bins: parts },
             Rule::Vehicle => By::Vehicle,
-        };
+        }
+    }
+
+    /// All sides appear together: one side beside an older other one would be a leak.
+    fn run(self) -> Result<()> {
+        let by = self.by();
+        if std::fs::read_dir(&self.out).is_ok_and(|mut entries| entries.next().is_some()) {
+            bail!("{} is not empty: a split does not mix with what is there", self.out.display());
+        }
         let data = dataset::read(&self.file)?;
         let splits = split::split(&data, by, self.seed).with_context(|| self.file.display().to_string())?;
+        let parent = self.out.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let parent = parent.unwrap_or(Path::new("."));
+        std::fs::create_dir_all(parent).with_context(|| parent.display().to_string())?;
+        let staged =
+            tempfile::Builder::new().permissions(Permissions::from_mode(0o777)).tempdir_in(parent)?;
         let (mut text, mut documents) = (String::new(), Vec::new());
         for (index, split) in splits.iter().enumerate() {
-            let folder =
-                if splits.len() == 1 { self.out.clone() } else { self.out.join((index + 1).to_string()) };
-            std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+            let place = if splits.len() == 1 { String::new() } else { (index + 1).to_string() };
             let (training, held_out) = split.parts(&data);
+            let folder = staged.path().join(&place);
+            std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
             dataset::write(&folder.join("train.parquet"), &training)?;
             dataset::write(&folder.join("held-out.parquet"), &held_out)?;
-            let leaks = split.leaks(&data).len();
-            let (folder, training, held_out) = (folder.display(), split.training.len(), split.held_out.len());
-            writeln!(
-                text,
-                "{folder}: {training} samples to learn from, {held_out} held out: {}",
-                split.name
-            )?;
+            let folder = self.out.join(place).display().to_string();
+            let (training, held_out) = (training.samples.len(), held_out.samples.len());
+            let (name, leaks) = (&split.name, split.leaks(&data).len());
+            writeln!(text, "{folder}: {training} samples to learn from, {held_out} held out: {name}")?;
             if leaks > 0 {
                 writeln!(text, "  {leaks} cases are on both sides")?;
             }
-            documents.push(json!({"folder": folder.to_string(), "name": split.name, "training": training,
+            documents.push(json!({"folder": folder, "name": name, "training": training,
                                   "held_out": held_out, "cases_on_both_sides": leaks}));
         }
+        std::fs::rename(staged.path(), &self.out).with_context(|| self.out.display().to_string())?;
         if self.json { emit(&format!("{:#}\n", json!(documents))) } else { emit(&text) }
     }
 }

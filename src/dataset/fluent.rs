@@ -15,7 +15,7 @@ const TIME: &str = "flow-time";
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reports {
     folder: PathBuf,
-    columns: BTreeMap<String, Column>,
+    columns: BTreeMap<String, Vec<Column>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -92,7 +92,7 @@ pub enum FluentError {
 }
 
 impl Reports {
-    /// Reads every `.out` file of a folder; where two hold the same column, the one that begins later counts from there.
+    /// Reads every `.out` file of a folder.
     pub fn read(folder: &Path, cut_off: CutOff) -> Result<Self, FluentError> {
         let io = |fault| FluentError::Io { path: folder.to_owned(), fault };
         let mut paths = Vec::new();
@@ -105,40 +105,33 @@ impl Reports {
         if paths.is_empty() {
             return Err(FluentError::NoFile { path: folder.to_owned() });
         }
-        let mut found = Vec::new();
+        let mut columns: BTreeMap<String, Vec<Column>> = BTreeMap::new();
         for path in paths {
-            found.extend(read_file(&path, cut_off)?);
+            for (name, column) in read_file(&path, cut_off)? {
+                columns.entry(name).or_default().push(column);
+            }
         }
-        found.sort_by(|(_, a), (_, b)| a.history.times()[0].total_cmp(&b.history.times()[0]));
-        let mut reports = Self { folder: folder.to_owned(), columns: BTreeMap::new() };
-        for (name, column) in found {
-            reports.add(name, column)?;
-        }
-        Ok(reports)
+        let start = |column: &Column| column.history.times()[0];
+        columns.values_mut().for_each(|parts| parts.sort_by(|a, b| start(a).total_cmp(&start(b))));
+        Ok(Self { folder: folder.to_owned(), columns })
     }
 
-    fn add(&mut self, name: String, later: Column) -> Result<(), FluentError> {
-        let Some(column) = self.columns.get_mut(&name) else {
-            self.columns.insert(name, later);
-            return Ok(());
+    /// The history of a column; where several files hold it, the one that begins later counts from there on.
+    pub fn column(&self, name: &str) -> Result<History<1>, FluentError> {
+        let Some([first, later @ ..]) = self.columns.get(name).map(Vec::as_slice) else {
+            let (path, found) = (self.folder.clone(), self.columns.keys().cloned().collect());
+            return Err(FluentError::MissingColumn { path, column: name.to_owned(), found });
         };
-        let start = later.history.times()[0];
-        if column.history.times()[0] == start && column.history != later.history {
-            let paths = [column.path.clone(), later.path];
-            return Err(FluentError::Ambiguous { column: name, paths });
+        let mut history = first.history.clone();
+        for (before, part) in [first].into_iter().chain(later).zip(later) {
+            let start = part.history.times()[0];
+            if before.history.times()[0] == start && before.history != part.history {
+                let paths = [before.path.clone(), part.path.clone()];
+                return Err(FluentError::Ambiguous { column: name.to_owned(), paths });
+            }
+            history.overlay(part.history.clone(), start);
         }
-        column.history.overlay(later.history, start);
-        Ok(())
-    }
-
-    /// The history of a column.
-    pub fn column(&self, name: &str) -> Result<&History<1>, FluentError> {
-        let column = self.columns.get(name).map(|column| &column.history);
-        column.ok_or_else(|| FluentError::MissingColumn {
-            path: self.folder.clone(),
-            column: name.to_owned(),
-            found: self.columns.keys().cloned().collect(),
-        })
+        Ok(history)
     }
 }
 
@@ -188,4 +181,60 @@ fn read_file(path: &Path, cut_off: CutOff) -> Result<Vec<(String, Column)>, Flue
 /// What stands between quotes.
 fn quoted(line: &str) -> Vec<String> {
     line.split('"').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    /// Reports of the given files, named a.out, b.out and so on.
+    fn reports(files: &[&str]) -> Result<Reports, FluentError> {
+        let folder = tempfile::TempDir::new().unwrap();
+        for (name, text) in ["a.out", "b.out", "c.out"].iter().zip(files) {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        Reports::read(folder.path(), CutOff::Refuse)
+    }
+
+    fn file(name: &str, rows: &str) -> String {
+        format!("\"rfile\"\n\"Time Step\" \"{name}\"\n(\"Time Step\" \"{name}\" \"flow-time\")\n{rows}")
+    }
+
+    #[test]
+    fn columns_are_found_by_name_across_files() {
+        let found =
+            reports(&[&file("front drag", "1 -5 0.1\n2 -6 0.2\n"), &file("lift", "1 7 0.1\n")]).unwrap();
+        let drag = found.column("front drag").unwrap();
+        assert_eq!((drag.times(), drag.values()), (&[0.1, 0.2][..], &[[-5.0], [-6.0]][..]));
+        let error = found.column("side").unwrap_err().to_string();
+        assert!(error.contains("column side") && error.contains("front drag, lift"), "{error}");
+    }
+
+    #[test]
+    fn a_run_started_again_goes_on_in_the_same_file_or_in_another() {
+        let again = file("drag", "1 1 0.1\n2 2 0.2\n3 3 0.3\n2 20 0.2\n3 30 0.3\n");
+        assert_eq!(reports(&[&again]).unwrap().column("drag").unwrap().values(), [[1.0], [20.0], [30.0]]);
+        let (first, second) = (file("drag", "2 20 0.2\n3 30 0.3\n"), file("drag", "1 1 0.1\n2 2 0.2\n"));
+        let joined = reports(&[&first, &second]).unwrap();
+        assert_eq!(joined.column("drag").unwrap().values(), [[1.0], [20.0], [30.0]]);
+    }
+
+    #[test]
+    fn two_files_that_contradict_each_other_are_refused() {
+        let (one, other) = (file("drag", "1 1 0.1\n"), file("drag", "1 2 0.1\n"));
+        let drag = |files: &[&str]| reports(files).unwrap().column("drag");
+        assert!(drag(&[&one, &one]).is_ok(), "the same column in two report files");
+        assert!(matches!(drag(&[&one, &other]), Err(FluentError::Ambiguous { .. })));
+    }
+
+    #[test]
+    fn what_is_no_report_is_refused() {
+        assert!(matches!(reports(&[]), Err(FluentError::NoFile { .. })));
+        assert!(matches!(reports(&["1 2 3\n"]), Err(FluentError::Header { line: 1, .. })));
+        assert!(matches!(reports(&[&file("drag", "")]), Err(FluentError::History { .. })));
+        let changed = format!("{}(\"Time Step\" \"lift\" \"flow-time\")\n", file("drag", "1 1 0.1\n"));
+        assert!(matches!(reports(&[&changed]), Err(FluentError::Header { line: 5, .. })));
+    }
 }

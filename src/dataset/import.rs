@@ -161,8 +161,8 @@ impl Import {
         let (mut samples, mut contacts, mut domains) = (Vec::new(), Vec::new(), BTreeSet::new());
         for (done, path) in folders.iter().enumerate() {
             progress(done, folders.len());
-            let case = self.description(path)?;
-            samples.extend(self.case(path, &case)?);
+            let (case, of_case) = self.case(path)?;
+            samples.extend(of_case);
             contacts.push(case.ground_contact);
             domains.extend(case.domain_m.map(|[x, y, z]| format!("{x} x {y} x {z} ({})", case.vehicle)));
         }
@@ -210,8 +210,14 @@ impl Import {
         Ok(case)
     }
 
-    /// The samples of one case, from its folder and its description. The folder's name is the name of the case.
-    pub fn case(&self, folder: &Path, case: &CaseFile) -> Result<Vec<Sample>, ImportError> {
+    /// The description and the samples of one case, whose name is that of its folder.
+    pub fn case(&self, folder: &Path) -> Result<(CaseFile, Vec<Sample>), ImportError> {
+        let case = self.description(folder)?;
+        let samples = self.samples(folder, &case)?;
+        Ok((case, samples))
+    }
+
+    fn samples(&self, folder: &Path, case: &CaseFile) -> Result<Vec<Sample>, ImportError> {
         let described = |fault| ImportError::Description { path: folder.join(CASE_FILE), fault };
         let condition = case.condition().map_err(described)?;
         let placement = case.placement();
@@ -314,7 +320,7 @@ fn fluent(
         let mut components = Vec::new();
         for axis in ["x", "y", "z"] {
             let history = reports.column(&pattern.replace("{axis}", axis))?;
-            components.push(take.from(history).map_err(|fault| sections_error(folder, surface, fault))?);
+            components.push(take.from(&history).map_err(|fault| sections_error(folder, surface, fault))?);
         }
         let vector = |i: usize| Vec3::new(components[0][i][0], components[1][i][0], components[2][i][0]);
         Ok::<_, ImportError>((0..components[0].len()).map(vector).collect::<Vec<_>>())

@@ -1,9 +1,9 @@
 //! What OpenFOAM's function object `forces` writes: `<name>/<start time>/force.dat` and `moment.dat`.
 //!
-//! Three forms. Up to v2112 vectors stand in parentheses; from v2206 on they are plain columns with the same header
-//! names; the Foundation's versions write one `forces.dat` with pressure and viscous parts of forces and moments and no
-//! totals. In all of them a run that was started again adds a folder named by its start time, and a file that is there
-//! already is not overwritten but joined by `force_<start time>.dat`.
+//! Three forms: vectors in parentheses (v1912), plain columns with the same names (v2212), and the Foundation's one
+//! `forces.dat` with the pressure and viscous parts of forces and moments and no totals. In all of them a run that was
+//! started again adds a folder named by its start time, and a file that is there already is not overwritten but joined by
+//! `force_<start time>.dat`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -251,5 +251,73 @@ impl Part {
             viscous: history(&[viscous])?,
             about: self.about,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    const PLAIN: &str =
+        "# Time total_x total_y total_z pressure_x pressure_y pressure_z viscous_x viscous_y viscous_z\n";
+
+    /// Reads a function object of these files.
+    fn output(files: &[(&str, &str)]) -> Result<SurfaceHistory, OpenFoamError> {
+        let folder = tempfile::TempDir::new().unwrap();
+        for (path, text) in files {
+            let path = folder.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        read(folder.path(), CutOff::Refuse)
+    }
+
+    fn plain(center: &str, rows: &[f64]) -> String {
+        let rows = rows.iter().map(|time| format!("{time} 1 2 3 0.9 1.9 2.9 0.1 0.1 0.1\n"));
+        format!("# CofR : ({center})\n{PLAIN}{}", rows.collect::<String>())
+    }
+
+    #[test]
+    fn porous_parts_count_in_the_total() {
+        let text = "# Time forces(pressure viscous porous) moment(pressure viscous porous)\n\
+                    0.5 ((1 2 3) (10 20 30) (100 200 300)) ((1 1 1) (2 2 2) (3 3 3))\n";
+        let load = output(&[("0/forces.dat", text)]).unwrap();
+        assert_eq!(
+            (load.force.values(), load.viscous.values()),
+            (&[[111.0, 222.0, 333.0]][..], &[[10.0, 20.0, 30.0]][..])
+        );
+        assert_eq!(load.moment.unwrap().values(), [[6.0, 6.0, 6.0]]);
+    }
+
+    #[test]
+    fn start_times_are_joined_in_the_order_of_time_not_of_names() {
+        let (first, second, third) =
+            (plain("0 0 0", &[1.0, 9.0]), plain("0 0 0", &[9.5]), plain("0 0 0", &[10.5]));
+        let files = [("10/force.dat", &*third), ("0/force.dat", &*first), ("9/force.dat", &*second)];
+        assert_eq!(output(&files).unwrap().force.times(), [1.0, 9.0, 9.5, 10.5]);
+    }
+
+    #[test]
+    fn a_moment_center_that_moves_is_refused() {
+        let (force, moved) = (plain("0 0 0", &[1.0]), plain("0 0 1", &[2.0]));
+        let files = [("0/force.dat", &*force), ("1/force.dat", &*moved)];
+        assert!(matches!(output(&files), Err(OpenFoamError::MomentCenter { .. })));
+    }
+
+    #[test]
+    fn moments_that_begin_later_than_forces_are_refused() {
+        let load = plain("0 0 0", &[1.5]);
+        let files = [("0/force.dat", &*load), ("1/force.dat", &*load), ("1/moment.dat", &*load)];
+        assert!(matches!(output(&files), Err(OpenFoamError::NoMoments { found: 1.0, expected: 0.0, .. })));
+        assert!(output(&files[..2]).unwrap().moment.is_none(), "a force without moments is a force");
+    }
+
+    #[test]
+    fn what_is_no_output_is_refused() {
+        assert!(matches!(output(&[("0/coefficient.dat", "1 2")]), Err(OpenFoamError::NoForces { .. })));
+        assert!(matches!(output(&[("0/force.dat", "1 2 3\n")]), Err(OpenFoamError::NoHeader { .. })));
+        assert!(matches!(output(&[("0/force.dat", PLAIN)]), Err(OpenFoamError::History { .. })));
     }
 }
