@@ -116,48 +116,46 @@ impl Dataset {
         if found != expected {
             return Err(Flaw::GroundContact { case, found, expected });
         }
-        let number = |quantity: String, value, expected| Flaw::Number {
-            case: case.clone(),
-            section,
-            quantity,
-            value,
-            expected,
-        };
-        for (quantity, value, least, expected) in ranges(sample) {
-            if !(value >= least && value.is_finite()) {
-                return Err(number(quantity.to_owned(), value, expected));
+        match bad_number(sample, surfaces) {
+            Some((quantity, value, expected)) => {
+                Err(Flaw::Number { case, section, quantity, value, expected })
             }
+            None => Ok(()),
         }
-        let c = &sample.condition;
-        let vectors = [
-            ("velocity", c.velocity),
-            ("velocity over ground", c.ground_velocity),
-            ("angular velocity", c.angular_velocity),
-            ("acceleration", c.acceleration),
-            ("angular acceleration", c.angular_acceleration),
-        ];
-        for (quantity, vector) in vectors {
-            if let Some(&value) = vector.iter().find(|x| !x.is_finite()) {
-                return Err(number(quantity.to_owned(), value, "finite"));
-            }
-        }
-        let length = c.up.norm();
-        // NaN is neither near nor far
-        if (length - 1.0).abs() > 1e-6 || length.is_nan() {
-            return Err(number("length of the up vector".to_owned(), length, "1"));
-        }
-        for (load, surface) in sample.surfaces.iter().zip(surfaces) {
-            let rest = load.rest.map(|Rest { force, moment }| [force, moment]);
-            let parts = [Some(load.force), load.moment, load.viscous]
-                .into_iter()
-                .flatten()
-                .chain(rest.into_iter().flatten());
-            if let Some(value) = parts.flat_map(<[f64; 3]>::from).find(|x| !x.is_finite()) {
-                return Err(number(format!("a load on `{surface}`"), value, "finite"));
-            }
-        }
-        Ok(())
     }
+}
+
+/// The first number that is not what it must be: which, its value, and what it must be.
+fn bad_number(sample: &Sample, surfaces: &[String]) -> Option<(String, f64, &'static str)> {
+    for (quantity, value, least, expected) in ranges(sample) {
+        if !(value >= least && value.is_finite()) {
+            return Some((quantity.to_owned(), value, expected));
+        }
+    }
+    let c = &sample.condition;
+    let vectors = [
+        ("velocity", c.velocity),
+        ("velocity over ground", c.ground_velocity),
+        ("angular velocity", c.angular_velocity),
+        ("acceleration", c.acceleration),
+        ("angular acceleration", c.angular_acceleration),
+    ];
+    for (quantity, vector) in vectors {
+        if let Some(&value) = vector.iter().find(|x| !x.is_finite()) {
+            return Some((quantity.to_owned(), value, "finite"));
+        }
+    }
+    let length = c.up.norm();
+    // NaN is neither near nor far
+    if (length - 1.0).abs() > 1e-6 || length.is_nan() {
+        return Some(("length of the up vector".to_owned(), length, "1"));
+    }
+    sample.surfaces.iter().zip(surfaces).find_map(|(load, surface)| {
+        let rest = load.rest.map(|Rest { force, moment }| [force, moment]).into_iter().flatten();
+        let parts = [Some(load.force), load.moment, load.viscous].into_iter().flatten().chain(rest);
+        let value = parts.flat_map(<[f64; 3]>::from).find(|x| !x.is_finite())?;
+        Some((format!("a load on `{surface}`"), value, "finite"))
+    })
 }
 
 fn same_run(first: &Sample, sample: &Sample) -> Result<(), Flaw> {

@@ -118,7 +118,7 @@ impl<const N: usize> History<N> {
         Ok(sum.map(|x| x / (to - from)))
     }
 
-    /// The value at a time, by the line between its neighbours; that of the nearest end beyond them.
+    /// The value at a time, by the line between its neighbors; that of the nearest end beyond them.
     fn at(&self, time: f64) -> [f64; N] {
         let after = self.times.partition_point(|&t| t < time);
         if after == 0 || after == self.times.len() {
