@@ -6,16 +6,18 @@
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:
-//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`signal`]), the body ([`geometry`], [`vehicle`]), its
-//! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
-//! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), measured data ([`trials`]), the doors ([`service`],
-//! [`client`], [`soak`]), what learns it ([`train`]) and holds it against measured motion ([`validate`]), the settings
-//! ([`config`]) and the server as a whole ([`server`]).
+//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`random`], [`signal`]), the body ([`geometry`],
+//! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network
+//! ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and held against
+//! ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from ([`cfd`]), what
+//! learns it ([`train`]) and holds it against measured motion ([`validate`]), the settings ([`config`]) and the server as
+//! a whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
 pub mod forces;
 pub mod frame;
+pub mod random;
 pub mod signal;
 pub mod wrench;
 
@@ -29,6 +31,7 @@ pub mod features;
 pub mod bundle;
 pub mod model;
 
+pub mod dataset;
 pub mod engine;
 pub mod metrics;
 pub mod trials;

@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 use wade::features::INPUTS;
+use wade::random::Random;
 use wade::train::layers::{Layers, ranges};
 use wade::train::loss::{Batch, LossConfig, TargetScale, loss};
-use wade::train::random::Random;
 
 const WIDTH: usize = 16;
 const SURFACES: usize = 5;

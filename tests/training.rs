@@ -5,8 +5,8 @@
 use std::cell::RefCell;
 
 use wade::features;
+use wade::random::Random;
 use wade::train::plan::Table;
-use wade::train::random::Random;
 use wade::train::samples::Dataset;
 use wade::train::{Config, TrainError, Trained, train};
 use wade::vehicle::{Vehicle, shipped};

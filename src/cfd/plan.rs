@@ -12,8 +12,8 @@ use super::case::Settings;
 use crate::condition::{Condition, GroundContact};
 use crate::domain::Range;
 use crate::frame::{Vec3, up_from_roll_pitch};
+use crate::random::Random;
 use crate::train::plan::Table;
-use crate::train::random::Random;
 use crate::vehicle::Vehicle;
 
 /// File of the settings.
@@ -138,14 +138,14 @@ impl Case {
             Bed::Parked => Vec3::zeros(),
             Bed::Driving => velocity,
         };
-        let ground_contact = if self.is_level() { GroundContact::Dry } else { GroundContact::Wetted };
         Condition {
             velocity,
             ground_velocity,
             acceleration: forward * acceleration,
             density: self.density_kgpm3,
             up: self.up(),
-            ground_contact,
+            // no water reaches under what stands on the bed of a mesh
+            ground_contact: GroundContact::Dry,
             ..Condition::level(velocity, self.depth_m)
         }
     }

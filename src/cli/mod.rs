@@ -1,6 +1,7 @@
 //! Arguments in, one function a subcommand, exit codes out: 0 success, 1 what was asked for does not hold, 2 usage.
 
 mod campaign;
+mod dataset;
 mod predict;
 mod progress;
 mod query;
@@ -45,6 +46,8 @@ enum Command {
     Soak(soak::Soak),
     /// Plan, run and collect a CFD campaign
     Campaign(campaign::CampaignCommand),
+    /// Import CFD results, augment, split and describe data sets
+    Dataset(dataset::Dataset),
     /// Train a network for the vehicles of a folder
     Train(train::Train),
     /// Hold a model against two laws of physics along the motion of trials
@@ -62,6 +65,7 @@ impl Cli {
             Command::Predict(command) => command.run(),
             Command::Soak(command) => command.run(),
             Command::Campaign(command) => command.run(),
+            Command::Dataset(command) => command.run(),
             Command::Train(command) => command.run(),
             Command::Validate(command) => command.run(),
             Command::Vehicle(command) => command.run(),

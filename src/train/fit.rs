@@ -5,11 +5,11 @@ use nalgebra::DMatrix;
 use super::adam::{Adam, Plateau};
 use super::layers::Layers;
 use super::loss::{Batch, TargetScale, loss};
-use super::random::Random;
 use super::samples::{Dataset, Sample};
 use super::{Config, TrainError};
 use crate::features::{GLOBAL, INPUTS};
 use crate::model::network::{Network, OUTPUTS, Scaling, WIDTH};
+use crate::random::Random;
 
 /// Samples a batch when only the loss is wanted; the paper's figure.
 const HELD_OUT_BATCH: usize = 64;

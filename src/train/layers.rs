@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, RealField};
 
-use super::random::Random;
 use crate::features::INPUTS;
 use crate::model::network::{Network, OUTPUTS, WIDTH};
+use crate::random::Random;
 
 /// f32 to train, f64 to check the gradient.
 pub trait Real: RealField + Copy {}

@@ -9,7 +9,6 @@ pub mod fit;
 pub mod layers;
 pub mod loss;
 pub mod plan;
-pub mod random;
 pub mod samples;
 pub mod score;
 
@@ -19,11 +18,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::Domain;
 use crate::model::network::{Network, OUTPUTS, Scaling};
+use crate::random::Random;
 use crate::vehicle::Vehicle;
 use fit::{Epoch, Fit};
 use loss::LossConfig;
 use plan::Table;
-use random::Random;
 use samples::Dataset;
 use score::Score;
 

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::random::Random;
 use crate::condition::Condition;
 use crate::domain::{Domain, Range};
 use crate::frame::Vec3;
+use crate::random::Random;
 
 /// The parameter table of one vehicle; level, planar motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -2,11 +2,11 @@
 
 use super::TrainError;
 use super::plan::{Table, mirrored, split};
-use super::random::Random;
 use crate::analytic;
 use crate::condition::Condition;
 use crate::features::{self, DYNAMIC, GLOBAL, STATIC};
 use crate::model::network::{OUTPUTS, Scaling};
+use crate::random::Random;
 use crate::vehicle::Vehicle;
 
 /// Features of one surface.
