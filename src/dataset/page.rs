@@ -16,10 +16,20 @@ td.none{background:#fdf0f0}.small{color:#57606a;font-size:13px}svg{max-width:100
 
 /// The page.
 pub fn page(title: &str, summary: &Summary) -> Result<String, PlotError> {
+    page_with(title, "", summary)
+}
+
+/// Text that keeps its lines, as HTML.
+pub fn preformatted(text: &str) -> String {
+    format!("<pre>{}</pre>\n", escape(text))
+}
+
+/// The page with `foreword`, which is HTML, under its title.
+pub fn page_with(title: &str, foreword: &str, summary: &Summary) -> Result<String, PlotError> {
     let title = escape(title);
     let mut text = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\
-         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n\
+         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n{foreword}\
          <p>{} cases, {} samples. Loads: {}. Ground contact: {}.</p>\n",
         summary.cases,
         summary.samples,
