@@ -173,13 +173,15 @@ fn a_plan_for_another_hull_a_twisted_table_and_a_missing_solver_are_refused() {
     assert!(stderr(&output).contains("another hull"), "{}", stderr(&output));
     std::fs::write(&path, text).expect("written");
 
-    let output = command(&["campaign", "run", &campaign]).env("WM_PROJECT_DIR", "/nowhere").output().expect("runs");
+    let output =
+        command(&["campaign", "run", &campaign]).env("WM_PROJECT_DIR", "/nowhere").output().expect("runs");
     assert!(!output.status.success() && stderr(&output).contains("/nowhere"), "{}", stderr(&output));
     assert!(!Path::new(&campaign).join("work").exists(), "nothing was begun");
 
     let table = folder.path().join("table.toml");
     let range = "{ min = 1.0, max = 0.5 }";
-    let twisted = ["speed_mps", "angle_deg", "density_kgpm3", "depth_m"].map(|key| format!("{key} = {range}\n"));
+    let twisted =
+        ["speed_mps", "angle_deg", "density_kgpm3", "depth_m"].map(|key| format!("{key} = {range}\n"));
     std::fs::write(&table, twisted.concat()).expect("written");
     let (table, out) = (table.display().to_string(), folder.path().join("other").display().to_string());
     let plan = ["campaign", "plan", "--vehicle", "husky", "--set", "paper"];

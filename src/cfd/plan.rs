@@ -398,8 +398,16 @@ impl Plan {
         let speeds = [0.0, 0.25 * speed_mps.max, 0.5 * speed_mps.max];
         let states = depths.iter().flat_map(|&depth| speeds.map(|speed| (speed, depth, 1.0)));
         let meshes = [0.72, 0.5].map(|scale| (speeds[2], depths[1], scale));
-        states
-            .chain(meshes)
+        let mut all: Vec<(f64, f64, f64)> = states.chain(meshes).collect();
+        // a table of one depth asks for each state three times
+        let mut seen = Vec::new();
+        all.retain(|state| {
+            !seen.contains(state) && {
+                seen.push(*state);
+                true
+            }
+        });
+        all.into_iter()
             .enumerate()
             .map(|(i, (speed, depth, cell_scale))| Case {
                 cell_scale,
