@@ -7,7 +7,7 @@
 //!
 //! Modules in reading order; each uses only those above it:
 //! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`random`], [`signal`]), the body ([`geometry`],
-//! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network
+//! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]), the network
 //! ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and held against
 //! ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from ([`cfd`]), what
 //! learns it ([`train`]) and holds it against measured motion ([`validate`]), the settings ([`config`]) and the server as
@@ -25,6 +25,7 @@ pub mod geometry;
 pub mod vehicle;
 
 pub mod analytic;
+pub mod anchor;
 pub mod effects;
 pub mod features;
 

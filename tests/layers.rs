@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&[&str]; 8] = [
     &["frame", "wrench", "condition", "domain", "forces", "random", "signal"],
     &["geometry", "vehicle"],
-    &["features", "effects", "analytic"],
+    &["features", "effects", "analytic", "anchor"],
     &["model", "bundle"],
     &["engine", "metrics", "dataset", "trials"],
     &["cores", "service", "states", "client", "soak", "train", "cfd", "validate"],
