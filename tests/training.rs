@@ -279,7 +279,8 @@ fn refuses_what_it_cannot_train() {
 fn front_and_rear_are_mirrored_on_request_alone() {
     let count = |front_rear| {
         let source = Source::new(analytic(3), &vehicles(), front_rear).unwrap();
-        let of = |image| source.data.samples.iter().filter(|s| s.vehicle == "warthog" && s.image == image).count();
+        let of =
+            |image| source.data.samples.iter().filter(|s| s.vehicle == "warthog" && s.image == image).count();
         [Image::LeftRight, Image::FrontRear].map(of)
     };
     assert_eq!((count(false), count(true)), ([6, 0], [6, 6]));
@@ -351,12 +352,14 @@ fn a_run_that_was_killed_ends_as_one_that_was_not() {
     let state = folder.path().join("state");
     let out = folder.path().join("report");
     let arguments = |vehicles: &Path, more: &[&str]| {
-        let fixed = ["train", "--data", &data, "--epochs", "60", "--out", text(&out), "--vehicles", text(vehicles)];
+        let fixed =
+            ["train", "--data", &data, "--epochs", "60", "--out", text(&out), "--vehicles", text(vehicles)];
         fixed.iter().chain(more).map(|s| (*s).to_owned()).collect::<Vec<String>>()
     };
     let (killed, whole) = (common::copy_of_vehicles(), common::copy_of_vehicles());
     let checkpoint = ["--checkpoint", text(&state)];
-    let mut child = wade(&[]).args(arguments(killed.path(), &checkpoint)).stderr(Stdio::null()).spawn().unwrap();
+    let mut child =
+        wade(&[]).args(arguments(killed.path(), &checkpoint)).stderr(Stdio::null()).spawn().unwrap();
     let begun = Instant::now();
     while !state.exists() && begun.elapsed() < Duration::from_secs(120) {
         std::thread::sleep(Duration::from_millis(2));
@@ -398,7 +401,10 @@ fn bad_input_names_the_file_and_leaves_everything_as_it_was() {
     let settings = folder.path().join("train.toml");
     std::fs::write(&settings, "epochs = 2\npatiense = 3\n").unwrap();
     let error = refused(&data, &["--config", text(&settings)]);
-    assert!(error.contains("train.toml") && error.contains("patiense") && error.contains("line 2"), "{error}");
+    assert!(
+        error.contains("train.toml") && error.contains("patiense") && error.contains("line 2"),
+        "{error}"
+    );
     std::fs::write(&settings, "held_out_share = 1.0").unwrap();
     let error = refused(&data, &["--config", text(&settings)]);
     assert!(error.contains("data.parquet") && error.contains("a share of 1 is held out"), "{error}");

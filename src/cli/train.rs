@@ -198,7 +198,8 @@ impl Data {
 impl Loaded {
     /// The samples with their mirror images.
     pub fn source(&self, config: &Config) -> Result<Source> {
-        let vehicles = self.bundles.iter().map(|(name, bundle)| (name.clone(), bundle.vehicle.clone())).collect();
+        let vehicles =
+            self.bundles.iter().map(|(name, bundle)| (name.clone(), bundle.vehicle.clone())).collect();
         let source = Source::new(self.data.clone(), &vehicles, config.front_rear);
         source.with_context(|| self.file.name.clone())
     }
@@ -237,10 +238,9 @@ impl Train {
         let checkpoint =
             self.checkpoint.as_ref().map(|path| Checkpoint { path: path.clone(), resume: self.resume });
         let progress = Progress::new(config.epochs)?;
-        let trained =
-            train::train(&source, sides, Variant::Paper, &config, checkpoint.as_ref(), &|epoch| {
-                progress.epoch(epoch);
-            })?;
+        let trained = train::train(&source, sides, Variant::Paper, &config, checkpoint.as_ref(), &|epoch| {
+            progress.epoch(epoch);
+        })?;
         progress.bar.finish_and_clear();
 
         let program = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
@@ -293,8 +293,7 @@ impl Progress {
     /// Takes note of an epoch.
     pub fn epoch(&self, epoch: &Epoch) {
         let (loss, rate) = (epoch.held_out_loss, epoch.learning_rate);
-        let text =
-            format!("loss {:.3e}, held out {loss:.3e}, learning rate {rate:.1e}", epoch.training_loss);
+        let text = format!("loss {:.3e}, held out {loss:.3e}, learning rate {rate:.1e}", epoch.training_loss);
         // a run that goes on from a checkpoint has not spent the time of the epochs before
         let first = self.first.get().unwrap_or_else(|| {
             self.bar.set_position(u64::from(epoch.number - 1));

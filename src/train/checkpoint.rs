@@ -45,7 +45,9 @@ pub enum Fault {
         expected: usize,
     },
     /// Of another training.
-    #[error("belongs to a training with other data, another split or other settings: give another --checkpoint")]
+    #[error(
+        "belongs to a training with other data, another split or other settings: give another --checkpoint"
+    )]
     OtherTask,
     /// There already, and not asked to go on.
     #[error("is there already: give --resume to go on from it, or remove it")]
@@ -112,7 +114,9 @@ fn write(path: &Path, state: &State, task: &str) -> Result<(), Fault> {
     let size = |dtype| if dtype == Dtype::F32 { 4 } else { 8 };
     let views = tensors
         .iter()
-        .map(|(name, dtype, bytes)| Ok((*name, TensorView::new(*dtype, vec![bytes.len() / size(*dtype)], bytes)?)))
+        .map(|(name, dtype, bytes)| {
+            Ok((*name, TensorView::new(*dtype, vec![bytes.len() / size(*dtype)], bytes)?))
+        })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
     let metadata = HashMap::from([(KEY.to_owned(), serde_json::to_string(&metadata)?)]);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -149,7 +153,8 @@ fn read(path: &Path, sizes: Sizes, task: &str) -> Result<State, Fault> {
     let &[rate, best] = plateau.as_slice() else {
         return Err(Fault::Length { name: "plateau", found: plateau.len(), expected: 2 });
     };
-    let best_weights = metadata.best_epoch.map(|epoch| Ok::<_, Fault>((weights("best")?, epoch))).transpose()?;
+    let best_weights =
+        metadata.best_epoch.map(|epoch| Ok::<_, Fault>((weights("best")?, epoch))).transpose()?;
     let epoch = |(index, row): (usize, &[f64; 3])| Epoch {
         number: index as u32 + 1,
         training_loss: row[0],

@@ -18,10 +18,8 @@ pub fn of<'a>(samples: impl Iterator<Item = &'a Sample> + Clone) -> Option<Domai
             None => Some(Range { min: x, max: x }),
         })
     };
-    let with_room = |range: Range, least: f64, most: f64| Range {
-        min: range.min.min(least),
-        max: range.max.max(most),
-    };
+    let with_room =
+        |range: Range, least: f64, most: f64| Range { min: range.min.min(least), max: range.max.max(most) };
     let speed = |c: &Condition| c.velocity.x.hypot(c.velocity.y);
     Some(Domain {
         speed_mps: range(&|c| Some(speed(c)))?,

@@ -222,9 +222,11 @@ mod tests {
     #[test]
     fn the_shares_of_the_parts_add_up_to_the_whole() {
         let (one, scale, output) = worked();
-        let twice = |m: &DMatrix<f64>| DMatrix::from_fn(3, 4, |r, c| m[(r, c % 2)] * if c < 2 { 1.0 } else { 0.3 });
+        let twice =
+            |m: &DMatrix<f64>| DMatrix::from_fn(3, 4, |r, c| m[(r, c % 2)] * if c < 2 { 1.0 } else { 0.3 });
         let dry = vec![false, true, true, true];
-        let whole = Batch { targets: twice(&one.targets), dry: dry.clone(), inputs: DMatrix::zeros(0, 4), ..one };
+        let whole =
+            Batch { targets: twice(&one.targets), dry: dry.clone(), inputs: DMatrix::zeros(0, 4), ..one };
         let output = twice(&output);
         let config = LossConfig::default();
         let (terms, gradient) = loss(&config, &scale, &whole, &whole.counts(), &output);

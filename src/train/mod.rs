@@ -28,6 +28,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 pub use config::{Analytic, Config, Keep};
+pub(crate) use page::style as page_style;
 pub use variant::Variant;
 
 use crate::dataset::Dataset;

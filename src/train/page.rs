@@ -5,8 +5,7 @@ use std::fmt::Write;
 use super::plot::{PlotError, Series, curves, escape};
 use super::report::Record;
 
-/// The look of our pages.
-pub(crate) const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;margin:24px auto;padding:0 10px;color:#1f2328}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;margin:24px auto;padding:0 10px;color:#1f2328}\
 h1{font-size:22px;margin:0 0 4px}h2{font-size:18px;margin:32px 0 4px}h3{font-size:15px;margin:18px 0 2px}\
 .wide{overflow-x:auto}table{border-collapse:collapse;margin:6px 0}\
 th,td{padding:3px 11px;border-bottom:1px solid #e3e6ea;text-align:right;white-space:nowrap}\
@@ -15,6 +14,11 @@ figure{display:inline-block;margin:0 6px 6px 0}.legend span{margin-right:16px}\
 .legend i{display:inline-block;width:9px;height:9px;border-radius:5px;margin-right:5px}\
 .notice{padding:10px 14px;border-left:6px solid #d97a06;background:#fdf6ec;margin:12px 0}\
 .small{color:#57606a;font-size:13px}svg{max-width:100%;height:auto;display:block}pre{font-size:13px;overflow-x:auto}";
+
+/// The look of this page, and of that of an evaluation.
+pub(crate) fn style() -> &'static str {
+    STYLE
+}
 
 /// The page.
 pub(super) fn page(record: &Record) -> Result<String, PlotError> {
@@ -64,9 +68,10 @@ fn summary(record: &Record) -> String {
 }
 
 fn table(record: &Record) -> String {
-    let mut text = "<table><tr><th>held-out net force</th><th>samples</th><th></th><th>MAE [N]</th><th>RMSE [N]</th>\
+    let mut text =
+        "<table><tr><th>held-out net force</th><th>samples</th><th></th><th>MAE [N]</th><th>RMSE [N]</th>\
                     <th>spread of the target [N]</th></tr>"
-        .to_owned();
+            .to_owned();
     for vehicle in record.vehicles.iter().filter(|vehicle| vehicle.score.samples > 0) {
         for (c, axis) in ["Fx", "Fy", "Fz"].into_iter().enumerate() {
             let score = &vehicle.score;

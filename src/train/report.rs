@@ -195,7 +195,8 @@ impl Record {
     /// Reads the record of a folder.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(RECORD);
-        let text = fs::read_to_string(&path).map_err(|source| RecordError::Io { path: path.clone(), source })?;
+        let text =
+            fs::read_to_string(&path).map_err(|source| RecordError::Io { path: path.clone(), source })?;
         serde_json::from_str(&text).map_err(|source| RecordError::Json { path, source })
     }
 }

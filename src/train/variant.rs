@@ -146,7 +146,8 @@ pub(crate) fn plates(surfaces: &[SurfaceRow]) -> Vec<Vec<usize>> {
     let mut plates: Vec<Vec<usize>> = Vec::new();
     for (index, row) in surfaces.iter().enumerate() {
         let kind = [SurfaceKind::Front, SurfaceKind::Rear].into_iter().find(|k| row[*k as usize] == 1.0);
-        let partner = plates.iter_mut().find(|plate| kind.is_some_and(|k| surfaces[plate[0]][k as usize] == 1.0));
+        let partner =
+            plates.iter_mut().find(|plate| kind.is_some_and(|k| surfaces[plate[0]][k as usize] == 1.0));
         match partner {
             Some(plate) => plate.push(index),
             None => plates.push(vec![index]),
