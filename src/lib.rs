@@ -10,8 +10,8 @@
 //! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]), the network
 //! ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and held against
 //! ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from ([`cfd`]), what
-//! learns it ([`train`]) and holds it against measured motion ([`validate`]), the settings ([`config`]) and the server as
-//! a whole ([`server`]).
+//! learns it ([`train`]), judges it by held-out cases ([`evaluate`]) and holds it against measured motion ([`validate`]), the
+//! settings ([`config`]) and the server as a whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
@@ -43,6 +43,7 @@ pub mod soak;
 pub mod states;
 
 pub mod cfd;
+pub mod evaluate;
 pub mod train;
 pub mod validate;
 

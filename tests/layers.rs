@@ -10,7 +10,7 @@ const LAYERS: [&[&str]; 8] = [
     &["features", "effects", "analytic", "anchor"],
     &["model", "bundle"],
     &["engine", "metrics", "dataset", "trials"],
-    &["cores", "service", "states", "client", "soak", "train", "cfd", "validate"],
+    &["cores", "service", "states", "client", "soak", "train", "cfd", "validate", "evaluate"],
     &["config"],
     &["server"],
 ];
@@ -78,8 +78,8 @@ fn learning_and_serving_do_not_import_each_other() {
     for (module, path, text) in modules() {
         let forbidden: &[&str] = match module.as_str() {
             "train" | "cfd" | "analytic" | "effects" | "trials" | "dataset" => &["service", "client", "soak"],
-            "validate" => &["service", "client", "soak", "engine"],
-            "service" | "client" | "soak" => &["train", "cfd", "validate", "dataset"],
+            "validate" | "evaluate" => &["service", "client", "soak", "engine"],
+            "service" | "client" | "soak" => &["train", "cfd", "validate", "evaluate", "dataset"],
             _ => continue,
         };
         let imports = imports(&text);

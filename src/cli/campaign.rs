@@ -144,7 +144,7 @@ impl PlanCommand {
     fn begin(&self, vehicle: &wade::vehicle::Vehicle) -> Result<Plan> {
         let table = match &self.table {
             Some(path) => read_toml(path)?,
-            None => *train::Config::default().tables.get(&self.vehicle).with_context(|| {
+            None => *train::Config::default().analytic.tables.get(&self.vehicle).with_context(|| {
                 format!("no ranges are known for `{}`: give them with --table", self.vehicle)
             })?,
         };

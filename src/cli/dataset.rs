@@ -280,7 +280,7 @@ impl ImportCases {
 impl Analytic {
     fn run(self) -> Result<()> {
         let mut random = Random::new(self.seed);
-        let tables = Config::default().tables;
+        let tables = Config::default().analytic.tables;
         let mut data = dataset::Dataset {
             meta: Meta {
                 provenance: PROVENANCE.to_owned(),

@@ -2,6 +2,7 @@
 
 mod campaign;
 mod dataset;
+mod eval;
 mod predict;
 mod progress;
 mod query;
@@ -50,6 +51,8 @@ enum Command {
     Dataset(dataset::Dataset),
     /// Train a network for the vehicles of a folder
     Train(train::Train),
+    /// Judge the weights of the bundles by the states that their training held out
+    Eval(eval::Eval),
     /// Hold a model against two laws of physics along the motion of trials
     Validate(validate::Validate),
     /// Build, check and show vehicle bundles
@@ -67,6 +70,7 @@ impl Cli {
             Command::Campaign(command) => command.run(),
             Command::Dataset(command) => command.run(),
             Command::Train(command) => command.run(),
+            Command::Eval(command) => command.run(),
             Command::Validate(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
