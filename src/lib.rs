@@ -9,8 +9,8 @@
 //! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`signal`]), the body ([`geometry`], [`vehicle`]), its
 //! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
 //! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), measured data ([`trials`]), the doors ([`service`],
-//! [`client`], [`soak`]), what learns it ([`train`]) and holds it against measured motion ([`validate`]), the settings
-//! ([`config`]) and the server as a whole ([`server`]).
+//! [`client`], [`soak`]), what learns it ([`train`]), holds it against measured motion ([`validate`]) and scores tools that
+//! name what it lacks ([`gap_bench`]), the settings ([`config`]) and the server as a whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
@@ -39,6 +39,7 @@ pub mod soak;
 pub mod states;
 
 pub mod cfd;
+pub mod gap_bench;
 pub mod train;
 pub mod validate;
 

@@ -1,6 +1,7 @@
 //! Arguments in, one function a subcommand, exit codes out: 0 success, 1 what was asked for does not hold, 2 usage.
 
 mod campaign;
+mod gap_bench;
 mod predict;
 mod progress;
 mod query;
@@ -49,6 +50,9 @@ enum Command {
     Train(train::Train),
     /// Hold a model against two laws of physics along the motion of trials
     Validate(validate::Validate),
+    /// Hide effects in generated trials and score what is said of them
+    #[command(hide = true)]
+    GapBench(gap_bench::GapBench),
     /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
@@ -64,6 +68,7 @@ impl Cli {
             Command::Campaign(command) => command.run(),
             Command::Train(command) => command.run(),
             Command::Validate(command) => command.run(),
+            Command::GapBench(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
     }
