@@ -1,11 +1,14 @@
 //! Promise: the gap benchmark repeats by seed, hides what it says at the strength it says, and tells nothing of it.
 #![allow(clippy::unwrap_used)]
 
+use std::path::PathBuf;
+
 use wade::gap_bench::answer::Answer;
 use wade::gap_bench::baselines::Method;
 use wade::gap_bench::case::{Case, Family, cases};
 use wade::gap_bench::generate::{gap, generate, predicted};
 use wade::gap_bench::hidden::{Effect, Hidden};
+use wade::gap_bench::real::{kvlcc2, rm2_rotor};
 use wade::gap_bench::score::rows;
 use wade::gap_bench::{Hull, NoiseKind, Prediction, Schedule, Simulator, Tool, folder, run};
 use wade::trials::Trials;
@@ -129,7 +132,8 @@ fn the_warthog_s_own_model_can_be_the_prediction() {
         wade::wrench::Wrench { force, moment: wade::frame::Vec3::zeros() }
     };
     let simulator = Simulator { hull: &hull, prediction: Prediction::Model(&model), vehicle: "warthog" };
-    let coarse = Schedule { rate: 10.0, ..schedule() };
+    let mut coarse = schedule();
+    coarse.rate = 10.0;
     let generated = generate(&single(Effect::Current, 3.0), &coarse, simulator);
     assert!((generated.truth.strengths[0] / 3.0 - 1.0).abs() < 1e-3);
     assert!(generated.trials.manifest.body.is_none());
@@ -157,4 +161,50 @@ fn a_slice_of_the_benchmark_scores_an_oracle_and_the_baselines() {
     assert!(outcomes.iter().all(|o| o.judged.iter().all(|case| case.error.is_none())));
     // shuffled trials keep their names, and so their order in the session
     assert_eq!(outcomes[1].same_when_shuffled, [3, 3]);
+}
+
+/// Folder of the published measurements, which are not part of the repository.
+fn published(source: &str) -> PathBuf {
+    let folder = std::env::var_os("WADE_PUBLISHED_DATA").expect(
+        "WADE_PUBLISHED_DATA names the folder of published measurements, which are not part of the repository",
+    );
+    PathBuf::from(folder).join(source)
+}
+
+fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+    f64::sqrt(sum / count)
+}
+
+#[test]
+#[ignore = "needs published measurements: set WADE_PUBLISHED_DATA"]
+fn a_ship_model_rolls_with_more_damping_than_an_inviscid_simulation() {
+    let place = tempfile::tempdir().unwrap();
+    kvlcc2::import(&published("kvlcc2_roll_decay"), place.path()).unwrap();
+    let trials = Trials::read(place.path()).unwrap();
+    assert_eq!(trials.trials.len(), 3);
+    for trial in &trials.trials {
+        let (measured, simulated) =
+            (trial.measured[3].as_ref().unwrap(), trial.simulated[3].as_ref().unwrap());
+        let gap: Vec<f64> = measured.iter().zip(simulated).map(|(m, s)| m - s).collect();
+        let rates = trial.angular_velocity.iter().map(|omega| omega.x);
+        let work: f64 = gap.iter().zip(rates).map(|(gap, rate)| gap * rate).sum();
+        assert!(work < 0.0, "{}: what the simulation lacks takes energy out", trial.name);
+        let share = root_mean_square(gap.into_iter()) / root_mean_square(measured.iter().copied());
+        assert!((0.005..0.3).contains(&share), "{}: {share}", trial.name);
+    }
+}
+
+#[test]
+#[ignore = "needs published measurements: set WADE_PUBLISHED_DATA"]
+fn a_rotor_with_blades_has_more_drag_the_faster_it_turns() {
+    let place = tempfile::tempdir().unwrap();
+    rm2_rotor::import(&published("unh_rm2_rotor"), place.path()).unwrap();
+    let trials = Trials::read(place.path()).unwrap();
+    assert_eq!(trials.trials.len(), 12);
+    let curve = trials.trials.iter().find(|trial| trial.name == "perf-1-0").unwrap();
+    let (measured, simulated) = (curve.measured[0].as_ref().unwrap(), curve.simulated[0].as_ref().unwrap());
+    assert!(measured.iter().zip(simulated).all(|(m, s)| m < s), "the blades drag");
+    let last = measured.len() - 1;
+    assert!(measured[last] - simulated[last] < measured[0] - simulated[0]);
 }

@@ -11,6 +11,7 @@ use wade::gap_bench::answer::Answer;
 use wade::gap_bench::baselines::Method;
 use wade::gap_bench::case::{Case, Family, cases};
 use wade::gap_bench::generate::generate;
+use wade::gap_bench::real::{falling_balls, kvlcc2, rm2_rotor};
 use wade::gap_bench::score::{Row, rows, table};
 use wade::gap_bench::{
     Hull, Outcome, Prediction, Progress, Schedule, Simulator, Tool, ToolError, command_tool, folder, run,
@@ -32,13 +33,51 @@ use super::emit;
 All trials are generated and labelled so. OUT/results.json holds the table and every case.")]
 pub struct GapBench {
     #[command(subcommand)]
-    import: Option<Import>,
+    command: Option<Command>,
     #[command(flatten)]
     bench: Bench,
 }
 
 #[derive(Debug, Subcommand)]
-enum Import {}
+enum Command {
+    /// Make a folder of trials from published measurements
+    Import(Import),
+}
+
+#[derive(Debug, Args)]
+struct Import {
+    #[arg(value_enum)]
+    source: Source,
+    /// Folder of the published files
+    #[arg(long, value_name = "DIR")]
+    from: PathBuf,
+    /// Folder for the trials
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Source {
+    /// Roll decay of a ship model beside inviscid simulations
+    Kvlcc2,
+    /// A towed rotor against the same without blades
+    Rm2Rotor,
+    /// Falling balls, a folder of trials each
+    FallingBalls,
+}
+
+impl Import {
+    fn run(self) -> Result<ExitCode> {
+        let import = match self.source {
+            Source::Kvlcc2 => kvlcc2::import,
+            Source::Rm2Rotor => rm2_rotor::import,
+            Source::FallingBalls => falling_balls::import,
+        };
+        import(&self.from, &self.out)?;
+        emit(&format!("{}\n", self.out.display()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
 
 #[derive(Debug, Args)]
 struct Bench {
@@ -112,8 +151,8 @@ enum Size {
 impl GapBench {
     /// Prints the table, or the JSON.
     pub fn run(self) -> Result<ExitCode> {
-        match self.import {
-            Some(import) => match import {},
+        match self.command {
+            Some(Command::Import(import)) => import.run(),
             None => self.bench.run(),
         }
     }

@@ -8,7 +8,7 @@ use super::noise::{CELL, QUANTUM, SmoothError, left_by_dropouts, of_wrench, reco
 use super::track::DENSITY;
 use super::{NoiseKind, Region, Schedule, Simulator, State, Track, Wrench6};
 use crate::frame::Vec3;
-use crate::signal::{SavitzkyGolay, pieces};
+use crate::signal::{SavitzkyGolay, UniformGrid, interpolate, pieces};
 use crate::train::random::Random;
 use crate::trials::{Body, Gap, Manifest, Measured, Method, Trial, Trials, WRENCH};
 
@@ -38,7 +38,7 @@ pub struct Truth {
     pub states: Vec<Vec<State>>,
     /// Rate of the depth, by trial and sample [m/s].
     pub depth_rate: Vec<Vec<f64>>,
-    /// Share of the gap above the floor that the true change, scaled to fit half the trials, closes in the other half;
+    /// Share of the gap above the floor that the true change, scaled to fit half the samples, closes in the other half;
     /// `None` where nothing is hidden.
     pub closure: Option<f64>,
 }
@@ -288,7 +288,8 @@ impl Scene<'_> {
         let of = |value: &dyn Fn(&State) -> f64| -> Vec<f64> {
             kept.iter().map(|&i| value(&track.states[i])).collect()
         };
-        let t = of(&|state| state.t);
+        // as the file will have it
+        let t = of(&|state| (state.t * 1e7).round() / 1e7);
         let velocity: Vec<Vec3> = kept.iter().map(|&i| track.states[i].velocity).collect();
         let angular_velocity: Vec<Vec3> = kept.iter().map(|&i| track.states[i].angular_velocity).collect();
         let rows: Vec<u64> = (2..).take(kept.len()).collect();
@@ -344,18 +345,27 @@ fn depth_rate(track: &Track) -> Vec<f64> {
     (0..states.len()).map(rate).collect()
 }
 
-/// Time derivative of even samples with holes: what reading the file would give.
+/// Time derivative as reading the file gives it: a piece between holes on even instants, filtered, and back.
 fn derivative(t: &[f64], values: &[Vec3], step: f64) -> Vec<Vec3> {
     let of_piece = |piece: std::ops::Range<usize>| {
-        let odd = (piece.len() - 1) / 2 * 2 + 1;
-        let filter = SavitzkyGolay::new(9.min(odd), 2.min(odd.saturating_sub(1)));
+        let (t, values) = (&t[piece.clone()], &values[piece]);
         let axes = [0, 1, 2].map(|axis| {
-            let samples: Vec<f64> = values[piece.clone()].iter().map(|value| value[axis]).collect();
-            let slope = (samples[samples.len() - 1] - samples[0]) / step;
-            let filtered = filter.as_ref().ok().and_then(|f| f.derivative(&samples, 1, step).ok());
-            filtered.unwrap_or_else(|| vec![slope; samples.len()])
+            let samples: Vec<f64> = values.iter().map(|value| value[axis]).collect();
+            let grid = UniformGrid {
+                start: t[0],
+                step,
+                count: ((t[t.len() - 1] - t[0]) / step).round() as usize + 1,
+            };
+            let instants = grid.times();
+            let even = interpolate(t, &samples, &instants);
+            let odd = (even.len() - 1) / 2 * 2 + 1;
+            let slope = (even[even.len() - 1] - even[0]) / step;
+            let filtered = SavitzkyGolay::new(9.min(odd), 2.min(odd - 1))
+                .and_then(|filter| filter.derivative(&even, 1, step))
+                .unwrap_or_else(|_| vec![slope; even.len()]);
+            interpolate(&instants, &filtered, t)
         });
-        (0..piece.len()).map(|i| Vec3::new(axes[0][i], axes[1][i], axes[2][i])).collect::<Vec<_>>()
+        (0..t.len()).map(|i| Vec3::new(axes[0][i], axes[1][i], axes[2][i])).collect::<Vec<_>>()
     };
     pieces(t).into_iter().flat_map(of_piece).collect()
 }
@@ -383,21 +393,20 @@ pub fn predicted(trial: &Trial, sample: usize, simulator: &Simulator) -> Wrench6
     simulator.predict(&state)
 }
 
-/// Closure by the true change: scaled to fit the even trials, judged on the odd ones, in floors.
+/// Closure by the true change: scaled to fit every other second, judged on the rest, in floors. Halves of the trials would
+/// leave nothing to fit of an effect that one trial excites.
 fn closure(trials: &[Trial], truth: &Truth, simulator: &Simulator) -> Option<f64> {
     if truth.effects.is_empty() {
         return None;
     }
     let standardized = |parity: usize| {
-        let chosen = trials.iter().zip(&truth.change).enumerate().filter(move |(i, _)| i % 2 == parity);
-        chosen.flat_map(|(_, (trial, change))| {
-            change.iter().enumerate().flat_map(|(i, change)| {
+        trials.iter().zip(&truth.change).flat_map(move |(trial, change)| {
+            let chosen = (0..trial.len()).filter(move |&i| trial.t[i] as usize % 2 == parity);
+            chosen.flat_map(move |i| {
                 let gap = gap(trial, i, &predicted(trial, i, simulator));
                 let on = |c: &usize| trial.measured[*c].is_some() && truth.floor[*c] > 0.0;
-                (0..6)
-                    .filter(on)
-                    .map(|c| [gap[c] / truth.floor[c], change[c] / truth.floor[c]])
-                    .collect::<Vec<_>>()
+                let pair = |c: usize| [gap[c] / truth.floor[c], change[i][c] / truth.floor[c]];
+                (0..6).filter(on).map(pair).collect::<Vec<_>>()
             })
         })
     };

@@ -23,7 +23,7 @@ mod hull;
 mod invariance;
 mod noise;
 mod profile;
-// pub mod real;
+pub mod real;
 mod region;
 mod run;
 mod schedule;

@@ -251,8 +251,9 @@ mod tests {
     fn all_of_the_paper_s_trials_and_the_others_are_there_and_move_as_they_say() {
         let vehicle = shipped::warthog().unwrap().vehicle().unwrap();
         let schedule = Schedule::full(&vehicle, 1);
-        let coarse = Schedule { rate: 60.0, ..schedule };
-        let tracks = coarse.tracks(&Plan::RICH, 0.3, &mut Random::new(2));
+        // a vehicle is over a bend of the ground in a fifth of a second
+        let fine = Schedule { rate: 240.0, ..schedule };
+        let tracks = fine.tracks(&Plan::RICH, 0.3, &mut Random::new(2));
         assert_eq!(tracks.len(), 71 + 18);
         assert!(tracks.iter().all(|track| track.name.starts_with("generated-")));
         let fastest = tracks.iter().flat_map(|t| &t.states).map(|s| s.velocity.norm()).fold(0.0, f64::max);
@@ -262,7 +263,7 @@ mod tests {
             for window in track.states.windows(3) {
                 let difference = (window[2].velocity - window[0].velocity) / (2.0 * h);
                 let exact = window[1].acceleration - window[1].angular_velocity.cross(&window[1].velocity);
-                assert!((difference - exact).norm() < 0.8, "{}: {difference} {exact}", track.name);
+                assert!((difference - exact).norm() < 0.2, "{}: {difference} {exact}", track.name);
                 let turned = (window[2].attitude[1] - window[0].attitude[1]) / (2.0 * h);
                 assert!((turned - window[1].angular_velocity.y).abs() < 0.05, "{}", track.name);
             }
