@@ -7,11 +7,12 @@
 //!
 //! Modules in reading order; each uses only those above it:
 //! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`random`], [`signal`]), the body ([`geometry`],
-//! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]), the network
-//! ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and held against
-//! ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from ([`cfd`]), what
-//! learns it ([`train`]), judges it by held-out cases ([`evaluate`]) and holds it against measured motion ([`validate`]), the
-//! settings ([`config`]) and the server as a whole ([`server`]).
+//! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]),
+//! the network ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and
+//! held against ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from
+//! ([`cfd`]), what learns it ([`train`]), judges it by held-out cases ([`evaluate`]), holds it against measured motion
+//! ([`validate`]) and scores tools that name what is missing ([`gap_bench`]), the settings ([`config`]) and the server
+//! as a whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
@@ -44,6 +45,7 @@ pub mod states;
 
 pub mod cfd;
 pub mod evaluate;
+pub mod gap_bench;
 pub mod train;
 pub mod validate;
 

@@ -3,6 +3,7 @@
 mod campaign;
 mod dataset;
 mod eval;
+mod gap_bench;
 mod predict;
 mod progress;
 mod query;
@@ -55,6 +56,9 @@ enum Command {
     Eval(eval::Eval),
     /// Hold a model against two laws of physics along the motion of trials
     Validate(validate::Validate),
+    /// Hide effects in generated trials and score what is said of them
+    #[command(hide = true)]
+    GapBench(gap_bench::GapBench),
     /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
@@ -72,6 +76,7 @@ impl Cli {
             Command::Train(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Validate(command) => command.run(),
+            Command::GapBench(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
     }
