@@ -40,6 +40,7 @@ pub mod states;
 
 pub mod cfd;
 pub mod train;
+pub mod gap;
 pub mod validate;
 
 pub mod config;
