@@ -16,9 +16,10 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
     let ground = ground - up * ground.dot(&up);
     let speed = ground.norm();
     for (index, panel) in input.body.panels.iter().enumerate() {
+        let part = &input.immersion.panels[index];
         let facing = if shape[0] > 0.5 { panel.facing_minus.z } else { panel.windward(&ground).x };
-        let load = input.half_density() * facing * input.immersion.panels[index] * speed;
-        emit(0, Part::Panel(index), input.at(ground * -load, &panel.centroid));
-        emit(1, Part::Panel(index), input.at(up * (load * speed), &panel.centroid));
+        let load = input.half_density() * facing * part.fraction * speed;
+        emit(0, Part::Panel(index), input.at(ground * -load, &part.point));
+        emit(1, Part::Panel(index), input.at(up * (load * speed), &part.point));
     }
 }

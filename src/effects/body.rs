@@ -1,7 +1,7 @@
 //! What an effect needs to know of a hull.
 
 use super::hydrotable::Hydrotable;
-use super::immersion::Immersion;
+use super::immersion::{Immersion, WetPanel};
 use crate::condition::Condition;
 use crate::frame::{Vec3, WaterPlane};
 use crate::vehicle::{SurfaceKind, Vehicle};
@@ -24,11 +24,12 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// Four points of equal weight with the first and second moments of the panel.
-    pub fn points(&self) -> [Vec3; 4] {
-        let s = &self.spread;
+    /// Four points of equal weight with the first and second moments of the wet part of the panel, which is as wide as
+    /// the panel and as high as its share.
+    pub fn points(&self, wet: &WetPanel) -> [Vec3; 4] {
+        let s = Vec3::new(self.spread.x, self.spread.y, self.spread.z * wet.fraction);
         [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]
-            .map(|(x, y, z)| self.centroid + Vec3::new(x * s.x, y * s.y, z * s.z))
+            .map(|(x, y, z)| wet.point + Vec3::new(x * s.x, y * s.y, z * s.z))
     }
 
     /// Area that meets the flow along each axis [m2]: the side that looks ahead, and always the bottom, since the top of
@@ -88,9 +89,9 @@ enum Hull {
 
 /// Height of a box over its draft: a level above it wets no more.
 const BOX_HEIGHT: f64 = 2.0;
-/// Wheels of a box over its length: radius, width, half the wheelbase; half the track over its width. Those of the
-/// Husky and the Warthog lie within a tenth.
-const BOX_WHEELS: [f64; 4] = [0.2, 0.15, 0.32, 0.42];
+/// Wheels of a box: radius and half the wheelbase over its length, half the track over its width; about those of the
+/// Husky and the Warthog.
+const BOX_WHEELS: [f64; 3] = [0.2, 0.32, 0.42];
 
 impl Body {
     /// A vehicle with its mesh. Tabulates the hydrostatics over level and tilt, which takes a tenth of a second.
@@ -138,12 +139,15 @@ impl Body {
         out.panels.clear();
         match &self.hull {
             Hull::Mesh { table, samples } => {
-                out.panels.extend(samples.surfaces.iter().map(|surface| surface.submergence(&plane).fraction));
+                out.panels.extend(samples.surfaces.iter().zip(&self.panels).map(|(surface, panel)| {
+                    let wet = surface.submergence(&plane);
+                    let point = if wet.fraction > 0.0 { wet.wet_centroid } else { panel.centroid };
+                    WetPanel { fraction: wet.fraction, point }
+                }));
                 table.immerse(&plane, out);
             }
             Hull::Block { block, height } => {
-                let fraction = |panel: &Panel| wet_share(&plane, panel, self.z0, *height);
-                out.panels.extend(self.panels.iter().map(fraction));
+                out.panels.extend(self.panels.iter().map(|panel| wet_part(&plane, panel, self.z0, *height)));
                 immerse_box(block, *height, self.z0, &plane, out);
             }
         }
@@ -217,7 +221,7 @@ fn box_panels(block: &Block, height: f64) -> Vec<Panel> {
         let bottom = Vec3::z() * (strip * width);
         panels.push(panel("bottom", Vec3::new(x, 0.0, z0), spread, zero(), bottom));
     }
-    let [radius, tire, base, track] = BOX_WHEELS;
+    let [radius, base, track] = BOX_WHEELS;
     for (front, left) in [(true, true), (true, false), (false, true), (false, false)] {
         let sign = |positive: bool| if positive { 1.0 } else { -1.0 };
         let center = Vec3::new(sign(front) * base * length, sign(left) * track * width, z0 + radius * length);
@@ -225,22 +229,24 @@ fn box_panels(block: &Block, height: f64) -> Vec<Panel> {
         let mut wheel = panel("wheel", center, zero(), zero(), zero());
         wheel.wheel = Some(wheel_at(front, left));
         wheel.spread = Vec3::z() * (radius * length);
-        let _ = tire;
         panels.push(wheel);
     }
     panels
 }
 
-/// Wet share of a panel of a box, from the level above its centroid.
-fn wet_share(plane: &WaterPlane, panel: &Panel, z0: f64, height: f64) -> f64 {
+/// Wet part of a panel of a box, from the level above its foot.
+fn wet_part(plane: &WaterPlane, panel: &Panel, z0: f64, height: f64) -> WetPanel {
     let foot = Vec3::new(panel.centroid.x, panel.centroid.y, z0);
     let level = plane.depth_below(&foot) / plane.normal.z.max(0.1);
-    if panel.wheel.is_some() {
-        return (level / (2.0 * panel.spread.z)).clamp(0.0, 1.0);
-    }
-    let flat = panel.facing_minus.z > 0.0;
     // a millimeter of water wets the bottom
-    if flat { (level / 0.001).clamp(0.0, 1.0) } else { (level / height).clamp(0.0, 1.0) }
+    let tall = match panel.wheel {
+        Some(_) => 2.0 * panel.spread.z,
+        None if panel.facing_minus.z > 0.0 => 0.001,
+        None => height,
+    };
+    let fraction = (level / tall).clamp(0.0, 1.0);
+    let point = if fraction > 0.0 { foot + Vec3::z() * (0.5 * fraction * tall) } else { panel.centroid };
+    WetPanel { fraction, point }
 }
 
 fn immerse_box(block: &Block, height: f64, z0: f64, plane: &WaterPlane, out: &mut Immersion) {

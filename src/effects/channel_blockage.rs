@@ -13,13 +13,14 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let Some(width) = input.channel_width.filter(|_| immersion.depth > 1e-3) else { return };
     let velocity = state.velocity;
     let wet = input.body.panels.iter().zip(&immersion.panels);
-    let front: f64 = wet.map(|(panel, wet)| panel.windward(&velocity).x * wet).sum();
+    let front: f64 = wet.map(|(panel, wet)| panel.windward(&velocity).x * wet.fraction).sum();
     let blockage = (front / (width * immersion.depth)).min(0.8);
     let factor = (1.0 - blockage).powi(-2) - 1.0;
     let pressure = input.half_density() * velocity.norm() * factor;
     for (index, panel) in input.body.panels.iter().enumerate() {
-        let area = panel.windward(&velocity).component_mul(&input.base_drag) * immersion.panels[index];
+        let part = &immersion.panels[index];
+        let area = panel.windward(&velocity).component_mul(&input.base_drag) * part.fraction;
         let force: Vec3 = area.component_mul(&velocity) * -pressure;
-        emit(0, Part::Panel(index), input.at(force, &panel.centroid));
+        emit(0, Part::Panel(index), input.at(force, &part.point));
     }
 }

@@ -19,14 +19,15 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
         let along = (velocity * 2.0 - estimate).dot(&w) / (fast + slow).max(1e-9);
         let change = w * fast + velocity * along;
         for (index, panel) in input.body.panels.iter().enumerate() {
-            let wet = input.immersion.panels[index];
+            let part = &input.immersion.panels[index];
+            let wet = part.fraction;
             if wet == 0.0 {
                 continue;
             }
             let facing = panel.windward(&through);
             let area = facing.component_mul(&input.base_drag) * (input.half_density() * wet);
             let force: Vec3 = area.component_mul(&change);
-            emit(number, Part::Panel(index), input.at(force, &panel.centroid));
+            emit(number, Part::Panel(index), input.at(force, &part.point));
         }
     }
 }

@@ -12,14 +12,15 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let velocity = input.condition.velocity;
     let pressure = input.half_density() * velocity.norm();
     for (index, panel) in input.body.panels.iter().enumerate() {
-        let wet = input.immersion.panels[index];
+        let part = &input.immersion.panels[index];
+        let wet = part.fraction;
         if wet == 0.0 {
             continue;
         }
         let area = panel.windward(&velocity) * wet;
         for axis in 0..3 {
             let force = Vec3::ith(axis, -pressure * area[axis] * velocity[axis]);
-            emit(axis, Part::Panel(index), input.at(force, &panel.centroid));
+            emit(axis, Part::Panel(index), input.at(force, &part.point));
         }
     }
 }

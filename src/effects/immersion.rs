@@ -2,11 +2,20 @@
 
 use crate::frame::Vec3;
 
+/// The wet part of a panel.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct WetPanel {
+    /// Share of the panel under water, 0 to 1.
+    pub fraction: f64,
+    /// Centroid of the wet part [m]; that of the panel when dry.
+    pub point: Vec3,
+}
+
 /// How far a body is under water; body frame. Reused from state to state: `panels` keeps its memory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Immersion {
-    /// Share of each panel under water, 0 to 1.
-    pub panels: Vec<f64>,
+    /// The wet part of each panel.
+    pub panels: Vec<WetPanel>,
     /// Volume under water [m3].
     pub volume: f64,
     /// Centroid of that volume [m]; the origin when dry.

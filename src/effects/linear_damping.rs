@@ -12,12 +12,13 @@ use crate::wrench::Wrench;
 pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let scale = input.condition.density * (GRAVITY * input.body.length).sqrt();
     for (index, panel) in input.body.panels.iter().enumerate() {
-        let wet = input.immersion.panels[index];
+        let part = &input.immersion.panels[index];
+        let wet = part.fraction;
         if wet == 0.0 {
             continue;
         }
         let area = (panel.facing_plus + panel.facing_minus) * (0.25 * wet * scale);
-        for point in panel.points() {
+        for point in panel.points(part) {
             let u = input.local_velocity(&point);
             for axis in 0..3 {
                 let force = Vec3::ith(axis, -area[axis] * u[axis]);

@@ -35,7 +35,7 @@ mod wheel_paddle_thrust;
 pub use added_mass::{coefficients as added_mass_coefficients, matrix as added_mass_matrix};
 pub use body::{Block, Body, Panel};
 pub use hull_flooding::level_after;
-pub use immersion::Immersion;
+pub use immersion::{Immersion, WetPanel};
 pub use input::{BaseDrag, Input, Memory, Part};
 pub use library::{Coefficient, Effect, Kind, MAX_COEFFICIENTS, Shape};
 

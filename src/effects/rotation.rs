@@ -10,13 +10,14 @@ use crate::wrench::Wrench;
 pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let velocity = input.condition.velocity;
     for (index, panel) in input.body.panels.iter().enumerate() {
-        let wet = input.immersion.panels[index];
+        let part = &input.immersion.panels[index];
+        let wet = part.fraction;
         if wet == 0.0 {
             continue;
         }
         let drag = |u: &Vec3| panel.windward(u).component_mul(u) * -u.norm();
         let scale = 0.25 * wet * input.half_density();
-        for point in panel.points() {
+        for point in panel.points(part) {
             let local = input.local_velocity(&point);
             let force = (drag(&local) - drag(&velocity)) * scale;
             emit(0, Part::Panel(index), input.at(force, &point));

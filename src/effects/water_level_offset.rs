@@ -13,12 +13,13 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     emit(0, Part::Hull, input.at(state.up.into_inner() * stiffness, &immersion.waterplane_center));
     let velocity = state.velocity;
     for (index, panel) in input.body.panels.iter().enumerate() {
-        let wet = immersion.panels[index];
+        let part = &immersion.panels[index];
+        let wet = part.fraction;
         // a panel that is wet in part grows with the level
         if wet > 0.0 && wet < 1.0 && immersion.depth > 1e-3 {
             let area = panel.windward(&velocity).component_mul(&input.base_drag) * (wet / immersion.depth);
             let force = area.component_mul(&velocity) * (-input.half_density() * velocity.norm());
-            emit(0, Part::Panel(index), input.at(force, &panel.centroid));
+            emit(0, Part::Panel(index), input.at(force, &part.point));
         }
     }
 }

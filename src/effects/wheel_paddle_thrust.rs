@@ -12,9 +12,10 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let disc = std::f64::consts::PI * radius * radius;
     for (index, panel) in input.body.panels.iter().enumerate() {
         let Some(speed) = panel.wheel.and_then(|wheel| input.wheel_speeds[wheel]) else { continue };
+        let part = &input.immersion.panels[index];
         let rim = speed * radius;
         let slip = rim - input.local_velocity(&panel.centroid).x;
-        let force = input.half_density() * disc * input.immersion.panels[index] * rim.abs() * slip;
-        emit(0, Part::Panel(index), input.at(Vec3::x() * force, &panel.centroid));
+        let force = input.half_density() * disc * part.fraction * rim.abs() * slip;
+        emit(0, Part::Panel(index), input.at(Vec3::x() * force, &part.point));
     }
 }

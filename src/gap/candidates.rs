@@ -60,12 +60,13 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
     match effect {
         Effect::HullFlooding => [3e-4, 1e-3, 3e-3, 1e-2, 3e-2].map(|ratio| [ratio, 0.0, 0.0]).into(),
         Effect::WaveMemory => {
+            // a memory shorter than the waves of the hull take to leave it is added mass
+            let period = (setting.body.length / GRAVITY).sqrt();
             let mut shapes = Vec::new();
             for form in [0.0, 1.0] {
-                for tau in [0.25, 0.6, 1.5, 4.0] {
-                    for frequency in [0.0, 2.0, 5.0] {
-                        // an undamped velocity memory is linear damping, delayed
-                        shapes.push([tau, frequency, form]);
+                for tau in [1.0, 2.5, 6.0, 15.0] {
+                    for frequency in [0.0, 1.0, 2.0] {
+                        shapes.push([tau * period, frequency / period, form]);
                     }
                 }
             }

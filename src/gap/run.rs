@@ -300,6 +300,8 @@ fn search(
     axes: &[usize],
 ) {
     let columns: Vec<usize> = member.columns.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
+    let memory = design.candidates[member.candidate].effect == Effect::WaveMemory;
+    let shortest = if memory { 0.8 * (setting.body.length / GRAVITY).sqrt() } else { 0.0 };
     let loss = |design: &Design| design.solve(&columns).map_or(f64::INFINITY, |(_, loss)| loss);
     let mut best = loss(design);
     for step in [1.5, 1.2, 1.08] {
@@ -312,6 +314,9 @@ fn search(
                     continue;
                 }
                 shape[axis] *= factor;
+                if axis == 0 && shape[0] < shortest {
+                    continue;
+                }
                 design.reshape(all, setting, member.candidate, shape);
                 let found = loss(design);
                 if found < best {

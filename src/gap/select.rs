@@ -435,7 +435,8 @@ impl Judge<'_> {
             let out = others.remove(index);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
                 let Some(judged) = self.passes(&others, effect) else { continue };
-                if judged.member.columns.len() > out.columns.len() + 1 {
+                // what needs more numbers to say the same is no rival
+                if self.numbers(&judged.member) > self.numbers(&out) {
                     continue;
                 }
                 let mut rival = others.clone();
@@ -449,6 +450,15 @@ impl Judge<'_> {
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found.into_iter().map(|(_, rival)| rival).collect()
+    }
+
+    /// Numbers that a member was fitted with, nonlinear ones included.
+    fn numbers(&self, member: &Member) -> usize {
+        let shape = match self.effect(member) {
+            Effect::SensorBiasStep => 1,
+            effect => effect.shape_names().len(),
+        };
+        member.columns.len() + shape
     }
 
     /// Cross-validated loss of one set over another, and its standard error from trial to trial.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::measurement::{measured, other_force};
+use super::statistics::white_variance;
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
@@ -16,7 +17,6 @@ use crate::wrench::Wrench;
 pub(super) struct Series {
     pub name: String,
     pub t: Vec<f64>,
-    pub rows: Vec<u64>,
     pub conditions: Vec<Condition>,
     pub immersions: Vec<Immersion>,
     pub yaw: Vec<f64>,
@@ -142,6 +142,7 @@ fn of_trial(
         immersions.push(immersion);
         conditions.push(condition);
     }
+    smooth_accelerations(&trial.t, &mut conditions);
     let other: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| other_force(trial, c));
     let gap = (0..count).map(|i| {
         std::array::from_fn(|c| match (&measured[c], present[c]) {
@@ -152,7 +153,6 @@ fn of_trial(
     let (bins, runs) = bins(&trial.t, config.bin_s);
     let series = Series {
         name: trial.name.clone(),
-        rows: trial.rows.clone(),
         gap: gap.collect(),
         other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
         wetting_rate: wetting_rate(&trial.t, &trial.depth),
@@ -170,6 +170,36 @@ fn of_trial(
         runs,
     };
     Ok((series, present))
+}
+
+/// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
+const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
+
+/// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
+fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
+    let pieces = pieces(t);
+    for (angular, axis) in [false, true].into_iter().flat_map(|angular| (0..3).map(move |axis| (angular, axis))) {
+        let read = |c: &Condition| if angular { c.angular_acceleration[axis] } else { c.acceleration[axis] };
+        let values: Vec<f64> = conditions.iter().map(read).collect();
+        let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
+        let share = white_variance(&values) / power.max(f64::MIN_POSITIVE);
+        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else { continue };
+        for piece in &pieces {
+            let span = t[piece.end - 1] - t[piece.start];
+            let step = span / (piece.len().max(2) - 1) as f64;
+            let odd = (piece.len() - 1) / 2 * 2 + 1;
+            let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
+            let smooth = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
+            for (sample, value) in piece.clone().zip(smooth.into_iter().flatten()) {
+                let condition = &mut conditions[sample];
+                if angular {
+                    condition.angular_acceleration[axis] = value;
+                } else {
+                    condition.acceleration[axis] = value;
+                }
+            }
+        }
+    }
 }
 
 /// Rate of the depth, smoothed over about a third of a second: noise must not look like entry.
