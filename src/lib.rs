@@ -47,6 +47,7 @@ pub mod cfd;
 pub mod evaluate;
 pub mod gap_bench;
 pub mod train;
+pub mod gap;
 pub mod validate;
 
 pub mod config;

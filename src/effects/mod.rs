@@ -1,7 +1,88 @@
 //! Physical effects, one a file: equation, source, validity, coefficients with their units.
 //!
-//! Each `add` puts its share onto the force of every surface [N], body frame, in the order of the vehicle's surfaces,
-//! and allocates nothing. Hydrostatics (E1) lies in `geometry::hydrostatics`, since it needs nothing but the mesh.
+//! Two families. `form_drag` and `skin_friction` are the loads from which the first weights were learnt: each `add` puts
+//! its share onto the force of every surface. The others are the library of [`Effect`]: what a model may lack, or what a
+//! measuring chain may add. A physical effect is linear in its coefficients once its shape (a time constant, a rate) is
+//! fixed, so the same function serves two ends: fitting takes the load of each coefficient at 1, serving the sum with the
+//! fitted values. Nothing here allocates once a [`Body`] is prepared. Hydrostatics (E1) lies in `geometry::hydrostatics`.
+//!
+//! Reading order: `library` (names, coefficients, bounds), `body` (what an effect needs to know of a hull), `immersion`
+//! (where the water reaches), `input` (a state), then the effects.
 
 pub mod form_drag;
 pub mod skin_friction;
+
+mod added_mass;
+mod bed_motion;
+mod body;
+mod channel_blockage;
+mod current;
+mod density_error;
+mod drag_coefficient_error;
+mod hull_flooding;
+mod hydrotable;
+mod immersion;
+mod input;
+mod library;
+mod linear_damping;
+mod rotation;
+mod squat;
+mod water_entry_slamming;
+mod water_level_offset;
+mod wave_memory;
+mod wheel_paddle_thrust;
+
+pub use added_mass::{coefficients as added_mass_coefficients, matrix as added_mass_matrix};
+pub use body::{Block, Body, Panel};
+pub use hull_flooding::level_after;
+pub use immersion::{Immersion, WetPanel};
+pub use input::{BaseDrag, Input, Memory, Part};
+pub use library::{Coefficient, Effect, Kind, MAX_COEFFICIENTS, Shape};
+
+use crate::wrench::Wrench;
+
+/// Emits the load of each coefficient of a physical effect at 1: number of the coefficient, the part of the hull that
+/// carries it, and the load about the center of mass, body frame [N, N m]. Effects of the measuring chain or the drive,
+/// which are no load of the water, emit nothing.
+pub fn basis(
+    effect: Effect,
+    shape: &Shape,
+    memory: &Memory,
+    input: &Input,
+    mut emit: impl FnMut(usize, Part, Wrench),
+) {
+    match effect {
+        Effect::AddedMass => added_mass::basis(input, &mut emit),
+        Effect::LinearDamping => linear_damping::basis(input, &mut emit),
+        Effect::DragCoefficientError => drag_coefficient_error::basis(input, &mut emit),
+        Effect::Rotation => rotation::basis(input, &mut emit),
+        Effect::Current => current::basis(shape, input, &mut emit),
+        Effect::WaterLevelOffset => water_level_offset::basis(input, &mut emit),
+        Effect::DensityError => density_error::basis(input, &mut emit),
+        Effect::HullFlooding => hull_flooding::basis(memory, input, &mut emit),
+        Effect::WaterEntrySlamming => water_entry_slamming::basis(input, &mut emit),
+        Effect::WaveMemory => wave_memory::basis(shape, memory, input, &mut emit),
+        Effect::ChannelBlockage => channel_blockage::basis(input, &mut emit),
+        Effect::Squat => squat::basis(shape, input, &mut emit),
+        Effect::WheelPaddleThrust => wheel_paddle_thrust::basis(input, &mut emit),
+        Effect::BedMotion => bed_motion::basis(shape, input, &mut emit),
+        Effect::SensorDelay
+        | Effect::SensorBias
+        | Effect::SensorBiasStep
+        | Effect::SensorDrift
+        | Effect::SensorGain
+        | Effect::AxisMisalignment
+        | Effect::RollingResistance
+        | Effect::DriveGain
+        | Effect::MassError => {}
+    }
+}
+
+/// Advances the state of an effect with memory by `dt` [s]; the others have none.
+pub fn advance(effect: Effect, shape: &Shape, memory: &mut Memory, input: &Input, dt: f64) {
+    match effect {
+        Effect::HullFlooding => hull_flooding::advance(shape, memory, input, dt),
+        Effect::WaveMemory => wave_memory::advance(shape, memory, input, dt),
+        _ => {}
+    }
+}

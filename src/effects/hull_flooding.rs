@@ -1,0 +1,55 @@
+//! E15, water runs into the hull, and the buoyancy of what it fills is lost.
+//!
+//! `W = -phi rho g V h_in / h_out` upwards: a share `phi` of the displaced volume fills to the level `h_in`, which follows
+//! the level outside through an orifice, `dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)` (Torricelli), with
+//! `r = C_d A_opening / A_floor`. The hull starts dry. The second coefficient is the arm along x of what is lost, times
+//! the share. With a constant level outside the root of the difference falls linearly, which the step uses.
+
+use super::input::{Input, Memory, Part};
+use super::library::Shape;
+use crate::frame::{GRAVITY, Vec3};
+use crate::wrench::Wrench;
+
+/// Level inside after `dt` [s] [m], for levels inside and outside [m] and the ratio of opening to floor [-].
+pub fn level_after(inner: f64, outer: f64, ratio: f64, dt: f64) -> f64 {
+    let root = (outer - inner).abs().sqrt();
+    let left = (root - ratio * (0.5 * GRAVITY).sqrt() * dt).max(0.0);
+    outer - (outer - inner).signum() * left * left
+}
+
+pub(super) fn advance(shape: &Shape, memory: &mut Memory, input: &Input, dt: f64) {
+    memory.inner_level = level_after(memory.inner_level, input.immersion.depth, shape[0], dt);
+}
+
+pub(super) fn basis(memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+    let (state, immersion) = (input.condition, input.immersion);
+    if immersion.depth <= 1e-6 {
+        return;
+    }
+    let share = (memory.inner_level / immersion.depth).min(1.0);
+    let weight = state.density * GRAVITY * immersion.volume * share;
+    let down = state.up.into_inner() * -weight;
+    emit(0, Part::Hull, input.at(down, &immersion.center_of_buoyancy));
+    emit(1, Part::Hull, Wrench { force: Vec3::zeros(), moment: Vec3::x().cross(&down) });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tank_fills_in_torricelli_s_time_and_stays_full() {
+        // from empty to full in sqrt(h) / (r sqrt(g / 2)) seconds
+        let (outer, ratio) = (0.2_f64, 0.01);
+        let time = outer.sqrt() / (ratio * (0.5 * GRAVITY).sqrt());
+        let half = level_after(0.0, outer, ratio, 0.5 * time);
+        assert!((half - 0.75 * outer).abs() < 1e-12, "three quarters at half the time: {half}");
+        let mut level = 0.0;
+        for _ in 0..1000 {
+            level = level_after(level, outer, ratio, 0.001 * time);
+        }
+        assert!((level - outer).abs() < 1e-6);
+        assert_eq!(level_after(level, outer, ratio, 1e6), outer);
+        assert!(level_after(outer, 0.0, ratio, 0.1 * time) < outer, "it runs out again");
+    }
+}

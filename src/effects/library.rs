@@ -1,0 +1,282 @@
+//! Names, kinds and coefficients of the library.
+
+use serde::{Deserialize, Serialize};
+
+/// Most coefficients of one effect.
+pub const MAX_COEFFICIENTS: usize = 6;
+
+/// Nonlinear parameters of an effect; those it has none for are 0.
+pub type Shape = [f64; 3];
+
+/// What an effect is: a load of the water, a fault of the measuring chain, or of the drive's model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A load of the water.
+    Physics,
+    /// A fault of the measuring chain.
+    Sensor,
+    /// A fault in what is known of mass, drive and ground.
+    Drive,
+}
+
+/// A named reason why a model and a measurement disagree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Effect {
+    /// Inertia of the water that moves with the hull.
+    AddedMass,
+    /// Drag in proportion to speed.
+    LinearDamping,
+    /// Quadratic drag with another coefficient.
+    DragCoefficientError,
+    /// Local velocity from the angular velocity.
+    Rotation,
+    /// Water that moves over ground.
+    Current,
+    /// The water stands higher than was said.
+    WaterLevelOffset,
+    /// The water is denser than was said.
+    DensityError,
+    /// Water runs into the hull.
+    HullFlooding,
+    /// The blow of entering the water.
+    WaterEntrySlamming,
+    /// Waves that the hull has made before.
+    WaveMemory,
+    /// The channel's walls speed the flow up.
+    ChannelBlockage,
+    /// The hull is drawn down by its own speed.
+    Squat,
+    /// Turning wheels throw water.
+    WheelPaddleThrust,
+    /// The hull drives over the bed instead of standing on it in a current.
+    BedMotion,
+    /// The wrench is stamped late.
+    SensorDelay,
+    /// A constant zero error.
+    SensorBias,
+    /// A zero that jumps.
+    SensorBiasStep,
+    /// A zero that drifts with time.
+    SensorDrift,
+    /// A wrong scale of a component.
+    SensorGain,
+    /// Sensor axes turned against the body's.
+    AxisMisalignment,
+    /// Rolling resistance that was not taken off.
+    RollingResistance,
+    /// A wrong scale of the known drive force.
+    DriveGain,
+    /// A wrong mass.
+    MassError,
+}
+
+/// A coefficient: name, unit, what it can physically be, and what the literature says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coefficient {
+    /// Name.
+    pub name: &'static str,
+    /// Unit; 1 where it has none.
+    pub unit: &'static str,
+    /// Least and largest value that is physically possible.
+    pub bounds: [f64; 2],
+    /// Band in which published values lie.
+    pub literature: Option<[f64; 2]>,
+}
+
+const fn c(name: &'static str, unit: &'static str, low: f64, high: f64) -> Coefficient {
+    Coefficient { name, unit, bounds: [low, high], literature: None }
+}
+
+const fn l(name: &'static str, low: f64, high: f64, band: [f64; 2]) -> Coefficient {
+    Coefficient { name, unit: "1", bounds: [low, high], literature: Some(band) }
+}
+
+const ANY: f64 = 1e9;
+
+impl Effect {
+    /// The library.
+    pub const ALL: [Self; 23] = [
+        Self::AddedMass,
+        Self::LinearDamping,
+        Self::DragCoefficientError,
+        Self::Rotation,
+        Self::Current,
+        Self::WaterLevelOffset,
+        Self::DensityError,
+        Self::HullFlooding,
+        Self::WaterEntrySlamming,
+        Self::WaveMemory,
+        Self::ChannelBlockage,
+        Self::Squat,
+        Self::WheelPaddleThrust,
+        Self::BedMotion,
+        Self::SensorDelay,
+        Self::SensorBias,
+        Self::SensorBiasStep,
+        Self::SensorDrift,
+        Self::SensorGain,
+        Self::AxisMisalignment,
+        Self::RollingResistance,
+        Self::DriveGain,
+        Self::MassError,
+    ];
+
+    /// The name in reports and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AddedMass => "added_mass",
+            Self::LinearDamping => "linear_damping",
+            Self::DragCoefficientError => "drag_coefficient_error",
+            Self::Rotation => "rotation",
+            Self::Current => "current",
+            Self::WaterLevelOffset => "water_level_offset",
+            Self::DensityError => "density_error",
+            Self::HullFlooding => "hull_flooding",
+            Self::WaterEntrySlamming => "water_entry_slamming",
+            Self::WaveMemory => "wave_memory",
+            Self::ChannelBlockage => "channel_blockage",
+            Self::Squat => "squat",
+            Self::WheelPaddleThrust => "wheel_paddle_thrust",
+            Self::BedMotion => "bed_motion",
+            Self::SensorDelay => "sensor_delay",
+            Self::SensorBias => "sensor_bias",
+            Self::SensorBiasStep => "sensor_bias_step",
+            Self::SensorDrift => "sensor_drift",
+            Self::SensorGain => "sensor_gain",
+            Self::AxisMisalignment => "axis_misalignment",
+            Self::RollingResistance => "rolling_resistance",
+            Self::DriveGain => "drive_gain",
+            Self::MassError => "mass_error",
+        }
+    }
+
+    /// Whose fault it is.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::SensorDelay
+            | Self::SensorBias
+            | Self::SensorBiasStep
+            | Self::SensorDrift
+            | Self::SensorGain
+            | Self::AxisMisalignment => Kind::Sensor,
+            Self::RollingResistance | Self::DriveGain | Self::MassError => Kind::Drive,
+            _ => Kind::Physics,
+        }
+    }
+
+    /// True where the load depends on the past, so that a server keeps a state.
+    pub fn has_memory(self) -> bool {
+        matches!(self, Self::HullFlooding | Self::WaveMemory)
+    }
+
+    /// The coefficients in which the effect is linear; sensor effects have one a wrench component.
+    pub fn coefficients(self) -> &'static [Coefficient] {
+        match self {
+            // surge, sway, heave and roll, pitch, yaw over the displaced water's mass and inertia; sway and heave in
+            // shallow water reach a few times the deep-water value (Zhou, Lo, Tan 2005)
+            Self::AddedMass => const { &[
+                l("surge", 0.0, 6.0, [0.05, 1.5]),
+                l("sway", 0.0, 8.0, [0.2, 2.5]),
+                l("heave", 0.0, 10.0, [0.3, 3.0]),
+                l("roll", 0.0, 10.0, [0.02, 2.0]),
+                l("pitch", 0.0, 10.0, [0.05, 2.0]),
+                l("yaw", 0.0, 10.0, [0.05, 2.0]),
+            ] },
+            Self::LinearDamping => const { &[
+                l("surge", 0.0, 5.0, [0.0, 0.5]),
+                l("sway", 0.0, 5.0, [0.0, 0.5]),
+                l("heave", 0.0, 5.0, [0.0, 0.5]),
+            ] },
+            // the difference of two coefficients that each lie in 0 to 4
+            Self::DragCoefficientError => const { &[
+                l("surge", -4.0, 4.0, [-1.0, 1.0]),
+                l("sway", -4.0, 4.0, [-1.0, 1.0]),
+                l("heave", -4.0, 4.0, [-1.0, 1.0]),
+            ] },
+            Self::Rotation => const { &[l("drag_coefficient", 0.0, 6.0, [0.4, 2.1])] },
+            Self::Current => const { &[c("east", "m/s", -3.0, 3.0), c("north", "m/s", -3.0, 3.0)] },
+            Self::WaterLevelOffset => const { &[c("offset", "m", -0.2, 0.2)] },
+            Self::DensityError => const { &[c("relative_error", "1", -0.3, 1.0)] },
+            Self::HullFlooding => const { &[c("flooded_share", "1", 0.0, 1.0), c("arm_x", "m", -2.0, 2.0)] },
+            // von Karman's blow has no reserve: Wagner's is pi/2 of it
+            Self::WaterEntrySlamming => const { &[
+                l("vertical", 0.0, 8.0, [0.3, 2.0]),
+                l("horizontal", 0.0, 8.0, [0.3, 2.0]),
+            ] },
+            Self::WaveMemory => const { &[
+                c("surge", "1", -10.0, 10.0),
+                c("sway", "1", -10.0, 10.0),
+                c("heave", "1", -10.0, 10.0),
+            ] },
+            Self::ChannelBlockage => const { &[l("strength", 0.0, 5.0, [0.5, 1.5])] },
+            Self::Squat => const { &[l("sinkage", 0.0, 4.0, [0.1, 1.5]), c("trim", "1", -2.0, 2.0)] },
+            Self::WheelPaddleThrust => const { &[l("thrust", 0.0, 6.0, [0.1, 2.0])] },
+            Self::BedMotion => const { &[c("drag", "1", -4.0, 4.0), c("lift", "1", -4.0, 4.0)] },
+            Self::SensorDelay => const { &[c("delay", "s", 0.0, 1.0)] },
+            Self::SensorBias | Self::SensorBiasStep => const { &[
+                c("fx", "N", -ANY, ANY),
+                c("fy", "N", -ANY, ANY),
+                c("fz", "N", -ANY, ANY),
+                c("mx", "N m", -ANY, ANY),
+                c("my", "N m", -ANY, ANY),
+                c("mz", "N m", -ANY, ANY),
+            ] },
+            Self::SensorDrift => const { &[
+                c("fx", "N/s", -ANY, ANY),
+                c("fy", "N/s", -ANY, ANY),
+                c("fz", "N/s", -ANY, ANY),
+                c("mx", "N m/s", -ANY, ANY),
+                c("my", "N m/s", -ANY, ANY),
+                c("mz", "N m/s", -ANY, ANY),
+            ] },
+            Self::SensorGain => const { &[
+                c("fx", "1", -0.9, 3.0),
+                c("fy", "1", -0.9, 3.0),
+                c("fz", "1", -0.9, 3.0),
+                c("mx", "1", -0.9, 3.0),
+                c("my", "1", -0.9, 3.0),
+                c("mz", "1", -0.9, 3.0),
+            ] },
+            Self::AxisMisalignment => const { &[
+                c("about_x", "rad", -0.5, 0.5),
+                c("about_y", "rad", -0.5, 0.5),
+                c("about_z", "rad", -0.5, 0.5),
+            ] },
+            Self::RollingResistance => const { &[l("coefficient", 0.0, 0.5, [0.01, 0.15])] },
+            Self::DriveGain => const { &[c("relative_error", "1", -0.9, 3.0)] },
+            Self::MassError => const { &[c("relative_error", "1", -0.5, 1.0)] },
+        }
+    }
+
+    /// Names and units of the nonlinear parameters that a report states.
+    pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Self::HullFlooding => &[("opening_ratio", "1")],
+            Self::WaveMemory => &[("time_constant", "s"), ("frequency", "rad/s")],
+            _ => &[],
+        }
+    }
+
+    /// The effect of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|effect| effect.name() == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_the_reports_and_coefficients_have_room() {
+        for effect in Effect::ALL {
+            assert_eq!(Effect::from_name(effect.name()), Some(effect));
+            assert_eq!(serde_json::to_value(effect).ok(), Some(effect.name().into()));
+            let coefficients = effect.coefficients();
+            assert!((1..=MAX_COEFFICIENTS).contains(&coefficients.len()));
+            assert!(coefficients.iter().all(|c| c.bounds[0] < c.bounds[1] && c.bounds[0] <= 0.0));
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! E16, the water stands higher than was said.
+//!
+//! `W = dF/dd` per meter: `rho g A_wp` upwards at the center of the waterplane (Archimedes), and the model's drag in
+//! proportion to the depth. Exact to first order in the offset; meant for offsets below a fifth of the depth.
+
+use super::input::{Input, Part};
+use crate::frame::GRAVITY;
+use crate::wrench::Wrench;
+
+pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+    let (state, immersion) = (input.condition, input.immersion);
+    let stiffness = state.density * GRAVITY * immersion.waterplane_area * state.up.z;
+    emit(0, Part::Hull, input.at(state.up.into_inner() * stiffness, &immersion.waterplane_center));
+    let velocity = state.velocity;
+    for (index, panel) in input.body.panels.iter().enumerate() {
+        let part = &immersion.panels[index];
+        let wet = part.fraction;
+        // a panel that is wet in part grows with the level
+        if wet > 0.0 && wet < 1.0 && immersion.depth > 1e-3 {
+            let area = panel.windward(&velocity).component_mul(&input.base_drag) * (wet / immersion.depth);
+            let force = area.component_mul(&velocity) * (-input.half_density() * velocity.norm());
+            emit(0, Part::Panel(index), input.at(force, &part.point));
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Every effect of the library as columns: the wrench of each coefficient at 1, sample by sample.
+
+use super::series::Series;
+use crate::effects::{self, Body, Effect, MAX_COEFFICIENTS, Memory, Shape};
+use crate::frame::{GRAVITY, Vec3};
+use crate::trials::{Manifest, Method};
+
+/// Half the distance over which the prediction is differentiated for a delay [s]: further than noise that stands in both
+/// the gap and the prediction reaches, which would pass for a delay.
+const DELAY_ARM: f64 = 0.15;
+/// Speed below which rolling resistance fades out [m/s].
+const ROLLING_SPEED: f64 = 0.05;
+
+/// What columns depend on besides the trial.
+#[derive(Debug, Clone)]
+pub(super) struct Setting<'a> {
+    pub body: &'a Body,
+    pub base_drag: Vec3,
+    pub channel_width: Option<f64>,
+    pub mass: f64,
+    /// Compared components.
+    pub components: Vec<usize>,
+    /// The wrench comes from inertia, drive and weight.
+    pub inferred: bool,
+    /// True where each stamp of the folder is of one clock.
+    pub one_clock: bool,
+    pub first_stamp: f64,
+}
+
+/// One coefficient's wrench, a value a sample [per unit of the coefficient].
+pub(super) type Column = Vec<[f64; 6]>;
+
+/// Why an effect cannot be looked for in these trials at all.
+pub(super) fn unavailable(effect: Effect, setting: &Setting, manifest: &Manifest, all: &[Series]) -> Option<String> {
+    let has_wheels = || all.iter().any(|s| s.wheels.iter().any(|w| w.iter().any(Option::is_some)));
+    match effect {
+        Effect::ChannelBlockage if setting.channel_width.is_none() => {
+            Some("trials.toml states no channel_width".into())
+        }
+        Effect::WheelPaddleThrust if !has_wheels() => {
+            Some("no wheel speeds were recorded (wheel_fl, wheel_fr, wheel_rl, wheel_rr)".into())
+        }
+        Effect::RollingResistance | Effect::MassError if !setting.inferred => {
+            Some("the wrench was measured, not inferred from mass and drive".into())
+        }
+        Effect::DriveGain if !setting.inferred && manifest.measured.other_forces.is_empty() => {
+            Some("no drive force stands among the columns".into())
+        }
+        _ => None,
+    }
+}
+
+/// True where the wrench of the trials rests on inertia and drive.
+pub(super) fn is_inferred(manifest: &Manifest) -> bool {
+    manifest.measured.method == Some(Method::InverseDynamics)
+}
+
+/// Shapes among which an effect's is first looked for.
+pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<Shape> {
+    match effect {
+        Effect::HullFlooding => [3e-4, 1e-3, 3e-3, 1e-2, 3e-2].map(|ratio| [ratio, 0.0, 0.0]).into(),
+        Effect::WaveMemory => {
+            // a memory shorter than the waves of the hull take to leave it is added mass
+            let period = (setting.body.length / GRAVITY).sqrt();
+            let mut shapes = Vec::new();
+            for form in [0.0, 1.0] {
+                for tau in [1.0, 2.5, 6.0, 15.0] {
+                    for frequency in [0.0, 1.0, 2.0] {
+                        shapes.push([tau * period, frequency / period, form]);
+                    }
+                }
+            }
+            shapes
+        }
+        Effect::Squat | Effect::BedMotion => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::SensorDelay => [0.0, 0.1, 0.25, 0.5].map(|delay| [delay, 0.0, 0.0]).into(),
+        Effect::SensorDrift if setting.one_clock => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::SensorBiasStep => steps(all),
+        _ => vec![[0.0; 3]],
+    }
+}
+
+/// From a trial on (first number 0), or from a time in every trial on (1).
+fn steps(all: &[Series]) -> Vec<Shape> {
+    let count = all.len();
+    let stride = (count as f64 / 16.0).max(1.0);
+    let mut steps = Vec::new();
+    let mut at = 1.0;
+    while at < count as f64 - 0.5 && count > 3 {
+        steps.push([0.0, at.round(), 0.0]);
+        at += stride;
+    }
+    let mut lengths: Vec<f64> = all.iter().map(|series| series.t[series.t.len() - 1] - series.t[0]).collect();
+    let length = super::statistics::median(&mut lengths);
+    steps.extend((1..12).map(|i| [1.0, length * f64::from(i) / 12.0, 0.0]));
+    steps
+}
+
+/// The columns of an effect in one trial: one a coefficient. `rank` is the trial's place in the order of recording.
+pub(super) fn columns(
+    effect: Effect,
+    shape: &Shape,
+    series: &Series,
+    rank: usize,
+    setting: &Setting,
+) -> Vec<Column> {
+    let count = series.t.len();
+    let mut columns = vec![vec![[0.0; 6]; count]; effect.coefficients().len()];
+    match effect.kind() {
+        effects::Kind::Physics => physics(effect, shape, series, setting, &mut columns),
+        _ => chain(effect, shape, series, rank, setting, &mut columns),
+    }
+    columns
+}
+
+fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Column]) {
+    let mut memory = Memory::default();
+    debug_assert!(columns.len() <= MAX_COEFFICIENTS);
+    for sample in 0..series.t.len() {
+        let input = series.input(sample, setting.body, setting.base_drag, setting.channel_width);
+        if effect.has_memory() && sample > 0 {
+            effects::advance(effect, shape, &mut memory, &input, series.t[sample] - series.t[sample - 1]);
+        }
+        effects::basis(effect, shape, &memory, &input, |coefficient, _, load| {
+            let sum = &mut columns[coefficient][sample];
+            (0..3).for_each(|axis| {
+                sum[axis] += load.force[axis];
+                sum[axis + 3] += load.moment[axis];
+            });
+        });
+    }
+}
+
+fn chain(
+    effect: Effect,
+    shape: &Shape,
+    series: &Series,
+    rank: usize,
+    setting: &Setting,
+    columns: &mut [Column],
+) {
+    let since_start = |sample: usize| series.t[sample] - series.t[0];
+    for sample in 0..series.t.len() {
+        let p = &series.predicted[sample];
+        let state = &series.conditions[sample];
+        let up = state.up.into_inner();
+        let mut own = |value: &dyn Fn(usize) -> f64| {
+            setting.components.iter().for_each(|&c| columns[c][sample][c] = value(c));
+        };
+        match effect {
+            Effect::SensorBias => own(&|_| 1.0),
+            Effect::SensorBiasStep => {
+                let after =
+                    if shape[0] > 0.5 { since_start(sample) >= shape[1] } else { rank as f64 >= shape[1] };
+                own(&|_| f64::from(u8::from(after)));
+            }
+            Effect::SensorDrift => {
+                let time =
+                    if shape[0] > 0.5 { series.t[sample] - setting.first_stamp } else { since_start(sample) };
+                own(&|_| time);
+            }
+            Effect::SensorGain => own(&|c| p[c]),
+            Effect::AxisMisalignment => {
+                for (axis, column) in columns.iter_mut().enumerate() {
+                    let e = Vec3::ith(axis, 1.0);
+                    let force = e.cross(&Vec3::new(p[0], p[1], p[2]));
+                    let moment = e.cross(&Vec3::new(p[3], p[4], p[5]));
+                    column[sample] = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+                }
+            }
+            Effect::RollingResistance => {
+                let load = (setting.mass * GRAVITY * up.z - p[2]).max(0.0);
+                let v = state.ground_velocity.x;
+                columns[0][sample][0] = -load * v / v.hypot(ROLLING_SPEED);
+            }
+            Effect::DriveGain => columns[0][sample] = series.other[sample],
+            Effect::MassError => {
+                let inertia = (state.acceleration + up * GRAVITY) * -setting.mass;
+                (0..3).for_each(|axis| columns[0][sample][axis] = inertia[axis]);
+            }
+            _ => {}
+        }
+    }
+    if effect == Effect::SensorDelay {
+        delayed(series, shape[0], &mut columns[0]);
+    }
+}
+
+/// `-(p(t - tau/2 + h) - p(t - tau/2 - h)) / 2h` from bin means: the change per second of delay.
+fn delayed(series: &Series, delay: f64, column: &mut Column) {
+    let centers = series.binned(|sample| series.t[sample]);
+    let at = |shift: f64| -> Vec<f64> { series.t.iter().map(|t| t + shift).collect() };
+    let (early, late) = (at(-0.5 * delay - DELAY_ARM), at(-0.5 * delay + DELAY_ARM));
+    let (first, last) = (centers[0], centers[centers.len() - 1]);
+    for component in 0..6 {
+        let values = series.binned(|sample| series.predicted[sample][component]);
+        let before = crate::signal::interpolate(&centers, &values, &early);
+        let after = crate::signal::interpolate(&centers, &values, &late);
+        for (sample, value) in column.iter_mut().enumerate() {
+            // beyond the ends nothing is known of the prediction
+            let span = late[sample].clamp(first, last) - early[sample].clamp(first, last);
+            value[component] = if span > DELAY_ARM { -(after[sample] - before[sample]) / span } else { 0.0 };
+        }
+    }
+}

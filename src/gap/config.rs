@@ -1,0 +1,98 @@
+//! Settings of the gap workflow.
+
+use serde::{Deserialize, Serialize};
+
+use super::GapError;
+use crate::condition::GroundContact;
+
+/// How to look, and what must hold before something is named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Whether the predictions have water under the tires.
+    pub ground_contact: GroundContact,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Length of a bin, over which samples are averaged [s].
+    pub bin_s: f64,
+    /// Length of a block, the unit of cross-validation [s].
+    pub block_s: f64,
+    /// Parts of the cross-validation.
+    pub folds: usize,
+    /// Share of the trials that take no part in naming and fitting.
+    pub held_out: f64,
+    /// Fewest trials.
+    pub least_trials: usize,
+    /// Largest probability of a false alarm of one effect.
+    pub significance: f64,
+    /// Least share of the remaining gap above the floor that an effect must explain.
+    pub share_of_remaining: f64,
+    /// Least share of the whole explained gap that one of several effects must explain.
+    pub share_of_gap: f64,
+    /// Least size of an effect over the noise floor of one sample.
+    pub relevance: f64,
+    /// Most effects that are named together.
+    pub most_effects: usize,
+    /// Phase-shifted placebos.
+    pub placebos: usize,
+    /// Draws of the bootstrap.
+    pub bootstrap: usize,
+    /// Least share of the structure that the named effects must explain.
+    pub coverage: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            ground_contact: GroundContact::Wetted,
+            seed: 1,
+            bin_s: 0.1,
+            block_s: 1.5,
+            folds: 8,
+            held_out: 0.2,
+            least_trials: 4,
+            significance: 1e-6,
+            share_of_remaining: 0.1,
+            share_of_gap: 0.02,
+            relevance: 0.08,
+            most_effects: 4,
+            placebos: 20,
+            bootstrap: 400,
+            coverage: 0.6,
+        }
+    }
+}
+
+impl Config {
+    /// Refuses numbers that make no sense.
+    pub fn check(&self) -> Result<(), GapError> {
+        let positive =
+            [("bin_s", self.bin_s), ("block_s", self.block_s), ("significance", self.significance)];
+        let shares = [
+            ("held_out", self.held_out),
+            ("share_of_remaining", self.share_of_remaining),
+            ("share_of_gap", self.share_of_gap),
+            ("relevance", self.relevance),
+            ("coverage", self.coverage),
+        ];
+        let counts = [
+            ("folds", self.folds, 2),
+            ("least_trials", self.least_trials, 2),
+            ("most_effects", self.most_effects, 1),
+            ("bootstrap", self.bootstrap, 20),
+        ];
+        if let Some((key, value)) = positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
+        {
+            return Err(GapError::Config { key, value, expected: "positive" });
+        }
+        if let Some((key, value)) = shares.into_iter().find(|(_, value)| !(0.0..1.0).contains(value)) {
+            return Err(GapError::Config { key, value, expected: "from 0 to below 1" });
+        }
+        match counts.into_iter().find(|(_, value, least)| value < least) {
+            Some((key, value, _)) => {
+                Err(GapError::Config { key, value: value as f64, expected: "larger" })
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,388 @@
+//! The regression: rows are the compared components of every bin, columns the coefficients of the candidates.
+//!
+//! Rows are standardised by the noise of their component. The zero of a trial may differ from run to run: each trial's mean
+//! is taken off in the share that this scatter has in it (the transform of the random-effects model; Baltagi, Econometric
+//! Analysis of Panel Data, section 2.3), so that the rows are about independent.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::candidates::{Column, Setting, columns};
+use super::series::Series;
+use crate::effects::{Effect, Shape};
+
+/// An effect of one shape with the columns of its coefficients.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    pub effect: Effect,
+    pub shape: Shape,
+    /// Column and coefficient.
+    pub columns: Vec<(usize, usize)>,
+}
+
+/// Noise of the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RowNoise {
+    /// Standard deviation of a bin, by component.
+    pub bin: [f64; 6],
+    /// Standard deviation of the zero from trial to trial.
+    pub offset: [f64; 6],
+    /// Half width of the smoothing over bins; 0 for none.
+    pub smoothing: usize,
+}
+
+/// Where a row stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Row {
+    pub trial: usize,
+    pub bin: usize,
+    pub component: usize,
+    pub block: usize,
+}
+
+/// Rows of a set of trials.
+#[derive(Debug, Clone)]
+pub(super) struct Rows {
+    pub rows: Vec<Row>,
+    /// Number of blocks.
+    pub blocks: usize,
+    /// Trial of each block.
+    pub block_trial: Vec<usize>,
+    /// Bins of each block, within its trial.
+    pub block_bins: Vec<std::ops::Range<usize>>,
+}
+
+impl Rows {
+    /// Rows of the trials listed, cut into blocks of about `block_s`.
+    pub fn new(all: &[Series], trials: &[usize], components: &[usize], block_s: f64) -> Self {
+        let mut this = Self { rows: Vec::new(), blocks: 0, block_trial: Vec::new(), block_bins: Vec::new() };
+        for &trial in trials {
+            let series = &all[trial];
+            for run in &series.runs {
+                let time = |bin: usize| series.t[series.bins[bin].start];
+                let length = time(run.end - 1) - time(run.start);
+                let count = (length / block_s).round().max(1.0) as usize;
+                let per_block = run.len().div_ceil(count);
+                let mut start = run.start;
+                while start < run.end {
+                    let end = (start + per_block).min(run.end);
+                    for bin in start..end {
+                        let row = |&component: &usize| Row { trial, bin, component, block: this.blocks };
+                        this.rows.extend(components.iter().map(row));
+                    }
+                    this.block_trial.push(trial);
+                    this.block_bins.push(start..end);
+                    this.blocks += 1;
+                    start = end;
+                }
+            }
+        }
+        this
+    }
+}
+
+/// A value a sample to the rows: bin means, smoothed, standardised, partly centered trial by trial.
+pub(super) fn to_rows(
+    all: &[Series],
+    rows: &Rows,
+    trials: &[usize],
+    components: &[usize],
+    noise: &RowNoise,
+    of: impl Fn(usize) -> Column,
+) -> Vec<f64> {
+    let mut out = Vec::with_capacity(rows.rows.len());
+    for &trial in trials {
+        let series = &all[trial];
+        let column = of(trial);
+        let by_component: Vec<Vec<f64>> = components
+            .iter()
+            .map(|&component| {
+                let mut values = series.binned(|sample| column[sample][component]);
+                for run in &series.runs {
+                    smooth(&mut values[run.clone()], noise.smoothing);
+                }
+                let count = values.len() as f64;
+                let mean = values.iter().sum::<f64>() / count;
+                let (bin, offset) = (noise.bin[component], noise.offset[component]);
+                let share = 1.0 - (bin * bin / (bin * bin + count * offset * offset)).sqrt();
+                values.iter_mut().for_each(|value| *value = (*value - share * mean) / bin);
+                values
+            })
+            .collect();
+        for bin in 0..series.bins.len() {
+            out.extend(by_component.iter().map(|values| values[bin]));
+        }
+    }
+    out
+}
+
+/// `[1 2 1] / 4`, `times` times; the ends stay.
+pub(super) fn smooth(values: &mut [f64], times: usize) {
+    let count = values.len();
+    for _ in 0..times {
+        let mut before = values[0];
+        for i in 1..count.saturating_sub(1) {
+            let here = values[i];
+            values[i] = 0.25 * (before + 2.0 * here + values[i + 1]);
+            before = here;
+        }
+    }
+}
+
+/// Sums of products over the rows of one fold.
+#[derive(Debug, Clone)]
+struct Fold {
+    xx: DMatrix<f64>,
+    xy: DVector<f64>,
+    yy: f64,
+}
+
+/// The regression with the sums from which any subset of columns is solved.
+#[derive(Debug, Clone)]
+pub(super) struct Design {
+    pub rows: Rows,
+    pub trials: Vec<usize>,
+    pub noise: RowNoise,
+    pub y: DVector<f64>,
+    pub x: DMatrix<f64>,
+    /// What a column was divided by, so that its mean square is 1.
+    pub scale: Vec<f64>,
+    pub candidates: Vec<Candidate>,
+    pub block_fold: Vec<usize>,
+    folds: Vec<Fold>,
+    total: Fold,
+}
+
+/// A cross-validated fit.
+#[derive(Debug, Clone)]
+pub(super) struct Fitted {
+    /// Scaled coefficients on all rows.
+    pub beta: DVector<f64>,
+    /// Sum of squares of the rows.
+    pub loss: f64,
+    /// The same, each fold by the fit to the others.
+    pub cv_loss: f64,
+    /// By fold.
+    pub fold_losses: Vec<f64>,
+    /// Coefficients without each fold.
+    pub fold_betas: Vec<DVector<f64>>,
+}
+
+impl Design {
+    /// Fills the columns of every candidate; columns without any excitation are left out.
+    pub fn new(
+        all: &[Series],
+        trials: Vec<usize>,
+        setting: &Setting,
+        library: &[(Effect, Shape)],
+        noise: RowNoise,
+        block_s: f64,
+        block_fold: impl Fn(&Rows) -> Vec<usize>,
+        folds: usize,
+    ) -> Self {
+        let rows = Rows::new(all, &trials, &setting.components, block_s);
+        let gap = |trial: usize| all[trial].gap.clone();
+        let y = DVector::from_vec(to_rows(all, &rows, &trials, &setting.components, &noise, gap));
+        let block_fold = block_fold(&rows);
+        let mut this = Self {
+            x: DMatrix::zeros(rows.rows.len(), 0),
+            trials,
+            noise,
+            y,
+            scale: Vec::new(),
+            candidates: Vec::new(),
+            block_fold,
+            folds: Vec::new(),
+            total: Fold { xx: DMatrix::zeros(0, 0), xy: DVector::zeros(0), yy: 0.0 },
+            rows,
+        };
+        let mut values: Vec<f64> = Vec::new();
+        for &(effect, shape) in library {
+            let columns = this.candidate_columns(all, setting, effect, &shape);
+            let mut candidate = Candidate { effect, shape, columns: Vec::new() };
+            for (coefficient, column, scale) in columns {
+                candidate.columns.push((this.scale.len(), coefficient));
+                this.scale.push(scale);
+                values.extend(column);
+            }
+            if !candidate.columns.is_empty() {
+                this.candidates.push(candidate);
+            }
+        }
+        this.x = DMatrix::from_vec(this.y.len(), this.scale.len(), values);
+        this.sum(folds);
+        this
+    }
+
+    fn candidate_columns(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        effect: Effect,
+        shape: &Shape,
+    ) -> Vec<(usize, Vec<f64>, f64)> {
+        let raw: Vec<Vec<Column>> = self
+            .trials
+            .iter()
+            .map(|&trial| columns(effect, shape, &all[trial], trial, setting))
+            .collect();
+        let place = |trial: usize| self.trials.iter().position(|&t| t == trial).unwrap_or_default();
+        let mut found = Vec::new();
+        for coefficient in 0..effect.coefficients().len() {
+            let of = |trial: usize| raw[place(trial)][coefficient].clone();
+            let mut column =
+                to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
+            let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();
+            if scale > 1e-9 && scale.is_finite() {
+                column.iter_mut().for_each(|value| *value /= scale);
+                found.push((coefficient, column, scale));
+            }
+        }
+        found
+    }
+
+    /// Gives a candidate another shape.
+    pub fn reshape(&mut self, all: &[Series], setting: &Setting, candidate: usize, shape: Shape) {
+        let effect = self.candidates[candidate].effect;
+        self.candidates[candidate].shape = shape;
+        let found = self.candidate_columns(all, setting, effect, &shape);
+        let held = self.candidates[candidate].columns.clone();
+        for (column, coefficient) in held {
+            if let Some((_, values, scale)) = found.iter().find(|(c, ..)| *c == coefficient) {
+                self.x.column_mut(column).copy_from_slice(values);
+                self.scale[column] = *scale;
+                self.resum(column);
+            }
+        }
+    }
+
+    fn fold_of(&self, row: usize) -> usize {
+        self.block_fold[self.rows.rows[row].block]
+    }
+
+    fn sum(&mut self, folds: usize) {
+        let count = self.scale.len();
+        let mut by_fold: Vec<Vec<usize>> = vec![Vec::new(); folds];
+        (0..self.y.len()).for_each(|row| by_fold[self.fold_of(row)].push(row));
+        self.folds = by_fold
+            .iter()
+            .map(|rows| {
+                let x = DMatrix::from_fn(rows.len(), count, |i, j| self.x[(rows[i], j)]);
+                let y = DVector::from_fn(rows.len(), |i, _| self.y[rows[i]]);
+                Fold { xx: x.tr_mul(&x), xy: x.tr_mul(&y), yy: y.norm_squared() }
+            })
+            .collect();
+        self.total();
+    }
+
+    fn total(&mut self) {
+        let count = self.scale.len();
+        let zero = Fold { xx: DMatrix::zeros(count, count), xy: DVector::zeros(count), yy: 0.0 };
+        self.total = self.folds.iter().fold(zero, |sum, fold| Fold {
+            xx: sum.xx + &fold.xx,
+            xy: sum.xy + &fold.xy,
+            yy: sum.yy + fold.yy,
+        });
+    }
+
+    fn resum(&mut self, column: usize) {
+        for fold in 0..self.folds.len() {
+            let rows: Vec<usize> = (0..self.y.len()).filter(|&row| self.fold_of(row) == fold).collect();
+            for other in 0..self.scale.len() {
+                let product: f64 =
+                    rows.iter().map(|&row| self.x[(row, column)] * self.x[(row, other)]).sum();
+                self.folds[fold].xx[(column, other)] = product;
+                self.folds[fold].xx[(other, column)] = product;
+            }
+            self.folds[fold].xy[column] = rows.iter().map(|&row| self.x[(row, column)] * self.y[row]).sum();
+        }
+        self.total();
+    }
+
+    /// Sum of squares of the gap.
+    pub fn empty_loss(&self) -> f64 {
+        self.total.yy
+    }
+
+    /// Least squares on all rows: scaled coefficients and the sum of squares left. `None` where columns say the same.
+    pub fn solve(&self, columns: &[usize]) -> Option<(DVector<f64>, f64)> {
+        solve(&self.total, None, columns)
+    }
+
+    /// Least squares with a cross-validated loss.
+    pub fn fit(&self, columns: &[usize]) -> Option<Fitted> {
+        let (beta, loss) = self.solve(columns)?;
+        let mut fitted =
+            Fitted { beta, loss, cv_loss: 0.0, fold_losses: Vec::new(), fold_betas: Vec::new() };
+        for fold in &self.folds {
+            let (beta, _) = solve(&self.total, Some(fold), columns)?;
+            let loss = fold_loss(fold, columns, &beta);
+            fitted.cv_loss += loss;
+            fitted.fold_losses.push(loss);
+            fitted.fold_betas.push(beta);
+        }
+        Some(fitted)
+    }
+
+    /// What is left of the gap, row by row.
+    pub fn residual(&self, columns: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+        let mut residual = self.y.clone();
+        for (index, &column) in columns.iter().enumerate() {
+            residual.axpy(-beta[index], &self.x.column(column), 1.0);
+        }
+        residual
+    }
+
+    /// Inverse of the normal matrix of some columns.
+    pub fn inverse(&self, columns: &[usize]) -> Option<DMatrix<f64>> {
+        let count = columns.len();
+        let xx = DMatrix::from_fn(count, count, |i, j| self.total.xx[(columns[i], columns[j])]);
+        xx.cholesky().map(|factor| factor.inverse())
+    }
+
+    /// Squared sine of the angle between a column and the space of others: 0 where it says nothing new.
+    pub fn novelty(&self, column: usize, others: &[usize]) -> f64 {
+        let xx = &self.total.xx;
+        let length = xx[(column, column)];
+        if others.is_empty() || length == 0.0 {
+            return f64::from(u8::from(length > 0.0));
+        }
+        let count = others.len();
+        let ridge = |i: usize, j: usize| if i == j { 1.0 + 1e-9 } else { 1.0 };
+        let inner = DMatrix::from_fn(count, count, |i, j| xx[(others[i], others[j])] * ridge(i, j));
+        let cross = DVector::from_fn(count, |i, _| xx[(others[i], column)]);
+        let Some(factor) = inner.cholesky() else { return 0.0 };
+        (1.0 - cross.dot(&factor.solve(&cross)) / length).max(0.0)
+    }
+}
+
+fn solve(total: &Fold, without: Option<&Fold>, columns: &[usize]) -> Option<(DVector<f64>, f64)> {
+    let count = columns.len();
+    let xx = |i: usize, j: usize| {
+        let (a, b) = (columns[i], columns[j]);
+        total.xx[(a, b)] - without.map_or(0.0, |fold| fold.xx[(a, b)])
+    };
+    let xy = |i: usize| total.xy[columns[i]] - without.map_or(0.0, |fold| fold.xy[columns[i]]);
+    let yy = total.yy - without.map_or(0.0, |fold| fold.yy);
+    if count == 0 {
+        return Some((DVector::zeros(0), yy));
+    }
+    // a column that a fold alone excites has no length without it
+    let ridge = 1e-7 * (0..count).map(|i| xx(i, i)).fold(0.0, f64::max);
+    let matrix = DMatrix::from_fn(count, count, |i, j| xx(i, j) + if i == j { ridge } else { 0.0 });
+    let right = DVector::from_fn(count, |i, _| xy(i));
+    let beta = matrix.cholesky()?.solve(&right);
+    let loss = yy - 2.0 * beta.dot(&right)
+        + (0..count).map(|i| (0..count).map(|j| beta[i] * beta[j] * xx(i, j)).sum::<f64>()).sum::<f64>();
+    Some((beta, loss))
+}
+
+fn fold_loss(fold: &Fold, columns: &[usize], beta: &DVector<f64>) -> f64 {
+    let mut sum = fold.yy;
+    for (i, &a) in columns.iter().enumerate() {
+        sum -= 2.0 * beta[i] * fold.xy[a];
+        for (j, &b) in columns.iter().enumerate() {
+            sum += beta[i] * beta[j] * fold.xx[(a, b)];
+        }
+    }
+    sum
+}

@@ -1,0 +1,226 @@
+//! Is there a gap, and how small an effect would these trials have shown?
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+use serde::Serialize;
+
+use super::candidates::{Column, Setting, columns, unavailable};
+use super::design::Design;
+use super::robust::errors;
+use super::series::Series;
+use super::statistics::{median, quantile, white_variance};
+use super::{Config, noise::Floor};
+use crate::effects::Effect;
+use crate::train::random::Random;
+use crate::trials::{Manifest, WRENCH};
+
+/// Deviates that an effect must have to be named nine times of ten: the bar, and 1.28 for the power.
+const POWER: f64 = 1.28;
+/// Below this share of signal in its columns an effect is not excited: the rest is noise of the kinematics.
+const LEAST_SIGNAL: f64 = 0.3;
+/// A trial excites an effect when its mean square is this share of that of the trial that does so most.
+const EXCITED: f64 = 0.1;
+
+/// The gap of one component against its floor, root mean squares [N or N m].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GapSize {
+    /// Of all samples.
+    pub rms: f64,
+    /// 90 % interval, by a bootstrap over trials.
+    pub interval: [f64; 2],
+    /// What noise alone would show.
+    pub noise_floor: f64,
+    /// True where the interval lies above the floor.
+    pub above_floor: bool,
+}
+
+/// The gap of each component.
+pub(super) fn sizes(
+    all: &[Series],
+    floors: &[Floor; 6],
+    components: &[usize],
+    config: &Config,
+) -> BTreeMap<&'static str, GapSize> {
+    let of = |&component: &usize| {
+        let squares: Vec<(f64, f64)> = all
+            .iter()
+            .map(|s| (s.gap.iter().map(|gap| gap[component].powi(2)).sum(), s.gap.len() as f64))
+            .collect();
+        let mut random = Random::new(config.seed ^ 0xde7ec7);
+        let rms = |draw: &[(f64, f64)]| {
+            let (sum, count) = draw.iter().fold((0.0, 0.0), |(s, c), (a, b)| (s + a, c + b));
+            (sum / f64::max(count, 1.0)).sqrt()
+        };
+        let mut draws: Vec<f64> = (0..config.bootstrap)
+            .map(|_| {
+                let pick = || squares[(random.unit() * squares.len() as f64) as usize];
+                rms(&std::iter::repeat_with(pick).take(squares.len()).collect::<Vec<_>>())
+            })
+            .collect();
+        let interval = [quantile(&mut draws.clone(), 0.05), quantile(&mut draws, 0.95)];
+        let noise_floor = floors[component].total().hypot(floors[component].model);
+        let size =
+            GapSize { rms: rms(&squares), interval, noise_floor, above_floor: interval[0] > noise_floor };
+        (WRENCH[component], size)
+    };
+    components.iter().map(of).collect()
+}
+
+/// What the trials say about one effect of the library, whether it is there or not.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Excitation {
+    /// Effect.
+    pub name: &'static str,
+    /// Trials that excite it.
+    pub trials: usize,
+    /// The smallest coefficient that these trials would have shown, by name.
+    pub minimum_detectable: BTreeMap<&'static str, Detectable>,
+    /// The same as a force or moment, root mean square over all samples [N or N m].
+    pub minimum_load: Option<f64>,
+    /// Why it could not have been found; none where it could.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_testable: Option<String>,
+}
+
+/// A smallest coefficient.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Detectable {
+    /// Size.
+    pub value: f64,
+    /// Unit; 1 where it has none.
+    pub unit: &'static str,
+}
+
+/// The excitation of every effect; `residual` is what the named effects leave of the rows.
+pub(super) fn excitations(
+    design: &Design,
+    all: &[Series],
+    setting: &Setting,
+    manifest: &Manifest,
+    residual: &DVector<f64>,
+    library: &[Effect],
+    config: &Config,
+) -> Vec<Excitation> {
+    let bar = super::statistics::deviate_of(config.significance) + POWER;
+    library.iter().map(|&effect| of_effect(effect, design, all, setting, manifest, residual, bar)).collect()
+}
+
+fn of_effect(
+    effect: Effect,
+    design: &Design,
+    all: &[Series],
+    setting: &Setting,
+    manifest: &Manifest,
+    residual: &DVector<f64>,
+    bar: f64,
+) -> Excitation {
+    let mut found = Excitation {
+        name: effect.name(),
+        trials: 0,
+        minimum_detectable: BTreeMap::new(),
+        minimum_load: None,
+        not_testable: unavailable(effect, setting, manifest, all),
+    };
+    if found.not_testable.is_some() {
+        return found;
+    }
+    let forms: Vec<usize> = (0..design.candidates.len()).filter(|&i| design.candidates[i].effect == effect).collect();
+    let Some(&form) = forms.get(forms.len() / 2) else {
+        found.not_testable = Some(not_excited(effect).into());
+        return found;
+    };
+    let candidate = &design.candidates[form];
+    let raw: Vec<Vec<Column>> =
+        all.iter().enumerate().map(|(rank, s)| columns(effect, &candidate.shape, s, rank, setting)).collect();
+    let mut plausible = false;
+    let mut excited = false;
+    for &(column, coefficient) in &candidate.columns {
+        let (signal, trials) = signal(&raw, coefficient, all, setting, design);
+        let smooth = signal.max(0.0);
+        found.trials = found.trials.max(if smooth > LEAST_SIGNAL { trials } else { 0 });
+        excited |= smooth > LEAST_SIGNAL;
+        let Some(error) = errors(design, &[column], residual).map(|errors| errors[0]) else { continue };
+        let floor = white_error(design, column);
+        let detectable = bar * error.std.max(floor) / design.scale[column] / smooth.max(0.01);
+        let coefficient = &effect.coefficients()[coefficient];
+        plausible |= smooth > LEAST_SIGNAL && detectable < largest_plausible(effect, coefficient);
+        found
+            .minimum_detectable
+            .insert(coefficient.name, Detectable { value: detectable, unit: coefficient.unit });
+        let load = bar * error.std.max(floor) * mean_bin(design, setting);
+        found.minimum_load = Some(found.minimum_load.map_or(load, |other| other.min(load)));
+    }
+    if !excited {
+        found.not_testable = Some(not_excited(effect).into());
+    } else if !plausible {
+        found.not_testable =
+            Some("excited too little: even the largest plausible value would drown in the noise".into());
+    }
+    found
+}
+
+/// Standard error that rows of unit variance would give.
+fn white_error(design: &Design, column: usize) -> f64 {
+    design.x.column(column).norm_squared().max(1e-12).sqrt().recip()
+}
+
+fn mean_bin(design: &Design, setting: &Setting) -> f64 {
+    let mut sizes: Vec<f64> = setting.components.iter().map(|&c| design.noise.bin[c]).collect();
+    median(&mut sizes)
+}
+
+/// Share of signal, not noise of the kinematics, in the bins of a column, and the number of trials that excite it.
+fn signal(
+    raw: &[Vec<Column>],
+    coefficient: usize,
+    all: &[Series],
+    setting: &Setting,
+    design: &Design,
+) -> (f64, usize) {
+    let (mut noise, mut total) = (0.0, 0.0);
+    let mut by_trial = vec![0.0; all.len()];
+    for (trial, series) in all.iter().enumerate() {
+        for &component in &setting.components {
+            let values = series.binned(|sample| raw[trial][coefficient][sample][component]);
+            let weight = design.noise.bin[component].powi(-2);
+            for run in series.runs.iter().filter(|run| run.len() >= 6) {
+                let mut values = values[run.clone()].to_vec();
+                noise += weight * white_variance(&values) * values.len() as f64;
+                let energy = weight * values.iter().map(|v| v * v).sum::<f64>();
+                total += energy;
+                super::design::smooth(&mut values, 2);
+                by_trial[trial] += weight * values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
+            }
+        }
+    }
+    let most = by_trial.iter().copied().fold(0.0, f64::max);
+    let trials = by_trial.iter().filter(|e| **e > EXCITED * most && **e > 0.0).count();
+    (if total > 0.0 { 1.0 - noise / total } else { 0.0 }, trials)
+}
+
+/// Above this a coefficient is no longer an error that somebody makes.
+fn largest_plausible(effect: Effect, coefficient: &crate::effects::Coefficient) -> f64 {
+    match (effect, coefficient.literature) {
+        (_, Some(band)) => band[1].max(-band[0]),
+        (Effect::Current, _) => 1.0,
+        (Effect::WaterLevelOffset, _) => 0.05,
+        (Effect::DensityError, _) => 0.2,
+        (Effect::SensorDelay, _) => 0.5,
+        (Effect::SensorGain, _) => 0.5,
+        _ => coefficient.bounds[1],
+    }
+}
+
+fn not_excited(effect: Effect) -> &'static str {
+    match effect {
+        Effect::AddedMass => "no trial accelerates beyond the noise of its accelerations",
+        Effect::Rotation => "no trial turns",
+        Effect::WaterEntrySlamming => "no trial enters the water",
+        Effect::HullFlooding => "no trial is in the water",
+        Effect::WaveMemory => "no trial changes its speed",
+        Effect::SensorDelay => "the predicted wrench hardly changes within a trial",
+        Effect::DriveGain => "the known drive force is zero",
+        _ => "no trial excites it in the components that were measured",
+    }
+}

@@ -1,0 +1,223 @@
+//! What a region or a structure is described in.
+
+use nalgebra::DVector;
+
+use super::candidates::Column;
+use super::design::{Design, to_rows};
+use super::series::Series;
+use crate::frame::GRAVITY;
+
+/// Names of the features of a place, with units; all the same for a mirrored vehicle.
+pub(super) const FEATURES: [(&str, &str); 9] = [
+    ("depth", "m"),
+    ("froude_depth", "1"),
+    ("speed", "m/s"),
+    ("acceleration", "m/s2"),
+    ("yaw_rate", "rad/s"),
+    ("wetting_rate", "m/s"),
+    ("time_in_water", "s"),
+    ("pitch", "rad"),
+    ("roll", "rad"),
+];
+
+/// Features of each bin of a trial.
+pub(super) fn of_bins(series: &Series) -> Vec<[f64; 9]> {
+    let time_in_water = time_in_water(series);
+    let mean = |value: &dyn Fn(usize) -> f64| series.binned(value);
+    let conditions = &series.conditions;
+    let columns = [
+        mean(&|i| conditions[i].depth),
+        mean(&|i| conditions[i].velocity.norm() / (GRAVITY * conditions[i].depth.max(0.01)).sqrt()),
+        mean(&|i| conditions[i].velocity.norm()),
+        // the mean before the norm, or noise would pass for acceleration
+        {
+            let [x, y, z] = [0, 1, 2].map(|axis| mean(&|i| conditions[i].acceleration[axis]));
+            (0..x.len()).map(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt()).collect()
+        },
+        mean(&|i| conditions[i].angular_velocity.z).into_iter().map(f64::abs).collect(),
+        mean(&|i| series.wetting_rate[i]),
+        mean(&|i| time_in_water[i]),
+        mean(&|i| series.roll_pitch[i][1]),
+        mean(&|i| series.roll_pitch[i][0]).into_iter().map(f64::abs).collect(),
+    ];
+    (0..series.bins.len()).map(|bin| std::array::from_fn(|f| columns[f][bin])).collect()
+}
+
+fn time_in_water(series: &Series) -> Vec<f64> {
+    let mut since = None;
+    let mut of = |(t, depth): (&f64, f64)| {
+        if depth <= 0.0 {
+            since = None;
+            return 0.0;
+        }
+        t - *since.get_or_insert(*t)
+    };
+    series.t.iter().zip(series.conditions.iter().map(|c| c.depth)).map(&mut of).collect()
+}
+
+/// A general model of the gap that knows no effect: many smooth functions of the state, apart for each component. What it
+/// predicts of blocks that it has not seen is structure, whatever its name.
+#[derive(Debug, Clone)]
+pub(super) struct General {
+    /// Columns, each over all rows.
+    columns: Vec<(String, Vec<f64>)>,
+}
+
+/// What the general model finds in the rows.
+#[derive(Debug, Clone)]
+pub(super) struct Structure {
+    /// Cross-validated gain of the loss, not below 0.
+    pub gain: f64,
+    /// Loss left in sample, with the fitted numbers counted.
+    pub loss: f64,
+    /// The gain over its standard error from trial to trial.
+    pub deviate: f64,
+    /// Functions that say most by themselves, with the share of the rows' squares.
+    pub strongest: Vec<(String, f64)>,
+}
+
+impl General {
+    pub fn new(all: &[Series], design: &Design, components: &[usize]) -> Self {
+        let functions = functions();
+        let mut columns = Vec::new();
+        for (name, function) in functions {
+            let of = |trial: usize| -> Column {
+                let series = &all[trial];
+                let time = time_in_water(series);
+                (0..series.t.len()).map(|i| [function(series, i, time[i]); 6]).collect()
+            };
+            let values = to_rows(all, &design.rows, &design.trials, components, &design.noise, of);
+            if values.iter().any(|v| v.abs() > 1e-12) {
+                columns.push((name.to_owned(), values));
+            }
+        }
+        Self { columns }
+    }
+
+    /// Fits each component of `target`, which has the rows of the design.
+    pub fn structure(&self, design: &Design, components: &[usize], target: &DVector<f64>) -> Structure {
+        let folds = design.block_fold.iter().max().map_or(1, |last| last + 1);
+        let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+        let mut gains = vec![0.0; trials];
+        let mut sum = Structure { gain: 0.0, loss: 0.0, deviate: 0.0, strongest: Vec::new() };
+        let mut shares = vec![0.0; self.columns.len()];
+        for &component in components {
+            let rows: Vec<usize> =
+                (0..target.len()).filter(|&r| design.rows.rows[r].component == component).collect();
+            self.component(design, target, &rows, folds, &mut gains, &mut sum, &mut shares);
+        }
+        let whole = target.norm_squared().max(f64::MIN_POSITIVE);
+        let used: Vec<f64> = design.trials.iter().map(|&trial| gains[trial]).collect();
+        let count = used.len() as f64;
+        let mean = used.iter().sum::<f64>() / count;
+        let variance = used.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        sum.gain = used.iter().sum::<f64>().max(0.0);
+        sum.deviate = mean / (variance / count).sqrt().max(f64::MIN_POSITIVE);
+        let mut order: Vec<usize> = (0..self.columns.len()).collect();
+        order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
+        sum.strongest =
+            order.into_iter().take(3).map(|i| (self.columns[i].0.clone(), shares[i] / whole)).collect();
+        sum
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "sums of one pass")]
+    fn component(
+        &self,
+        design: &Design,
+        target: &DVector<f64>,
+        rows: &[usize],
+        folds: usize,
+        gains: &mut [f64],
+        sum: &mut Structure,
+        shares: &mut [f64],
+    ) {
+        use nalgebra::DMatrix;
+        let count = self.columns.len();
+        let fold_of = |row: usize| design.block_fold[design.rows.rows[row].block];
+        let x = DMatrix::from_fn(rows.len(), count, |i, j| self.columns[j].1[rows[i]]);
+        let scale: Vec<f64> =
+            (0..count).map(|j| (x.column(j).norm_squared() / rows.len() as f64).sqrt().max(1e-12)).collect();
+        let x = DMatrix::from_fn(rows.len(), count, |i, j| x[(i, j)] / scale[j]);
+        let y = DVector::from_fn(rows.len(), |i, _| target[rows[i]]);
+        let ridge = 1e-3 * rows.len() as f64;
+        let solve = |xx: &DMatrix<f64>, xy: &DVector<f64>| {
+            let mut matrix = xx.clone();
+            (0..count).for_each(|i| matrix[(i, i)] += ridge);
+            matrix.cholesky().map(|factor| factor.solve(xy))
+        };
+        let (xx, xy) = (x.tr_mul(&x), x.tr_mul(&y));
+        for j in 0..count {
+            shares[j] += xy[j].powi(2) / xx[(j, j)].max(1e-12);
+        }
+        let freedom = (rows.len() as f64 / (rows.len() as f64 - count as f64).max(1.0)).max(1.0);
+        sum.loss += solve(&xx, &xy).map_or(y.norm_squared(), |beta| (&y - &x * beta).norm_squared()) * freedom;
+        for fold in 0..folds {
+            let inside: Vec<usize> = (0..rows.len()).filter(|&i| fold_of(rows[i]) == fold).collect();
+            let part = DMatrix::from_fn(inside.len(), count, |i, j| x[(inside[i], j)]);
+            let part_y = DVector::from_fn(inside.len(), |i, _| y[inside[i]]);
+            let Some(beta) = solve(&(&xx - part.tr_mul(&part)), &(&xy - part.tr_mul(&part_y))) else {
+                continue;
+            };
+            let left = &part_y - part * beta;
+            for (i, &row) in inside.iter().enumerate() {
+                gains[design.rows.rows[rows[row]].trial] += part_y[i].powi(2) - left[i].powi(2);
+            }
+        }
+    }
+}
+
+type Function = fn(&Series, usize, f64) -> f64;
+
+fn functions() -> Vec<(&'static str, Function)> {
+    vec![
+        ("a constant", |_, _, _| 1.0),
+        ("forward velocity", |s, i, _| s.conditions[i].velocity.x),
+        ("lateral velocity", |s, i, _| s.conditions[i].velocity.y),
+        ("vertical velocity", |s, i, _| s.conditions[i].velocity.z),
+        ("forward velocity squared with its sign", |s, i, _| {
+            s.conditions[i].velocity.x * s.conditions[i].velocity.norm()
+        }),
+        ("lateral velocity times speed", |s, i, _| s.conditions[i].velocity.y * s.conditions[i].velocity.norm()),
+        ("speed squared", |s, i, _| s.conditions[i].velocity.norm_squared()),
+        ("speed cubed", |s, i, _| s.conditions[i].velocity.norm().powi(3)),
+        ("forward velocity times speed squared", |s, i, _| {
+            s.conditions[i].velocity.x * s.conditions[i].velocity.norm_squared()
+        }),
+        ("depth", |s, i, _| s.conditions[i].depth),
+        ("depth squared", |s, i, _| s.conditions[i].depth.powi(2)),
+        ("depth times speed squared", |s, i, _| {
+            s.conditions[i].depth * s.conditions[i].velocity.norm_squared()
+        }),
+        ("depth times forward velocity squared", |s, i, _| {
+            s.conditions[i].depth * s.conditions[i].velocity.x * s.conditions[i].velocity.norm()
+        }),
+        ("depth times forward velocity", |s, i, _| s.conditions[i].depth * s.conditions[i].velocity.x),
+        ("forward acceleration", |s, i, _| s.conditions[i].acceleration.x),
+        ("lateral acceleration", |s, i, _| s.conditions[i].acceleration.y),
+        ("vertical acceleration", |s, i, _| s.conditions[i].acceleration.z),
+        ("depth times forward acceleration", |s, i, _| {
+            s.conditions[i].depth * s.conditions[i].acceleration.x
+        }),
+        ("forward acceleration times speed", |s, i, _| {
+            s.conditions[i].acceleration.x * s.conditions[i].velocity.norm()
+        }),
+        ("roll rate", |s, i, _| s.conditions[i].angular_velocity.x),
+        ("pitch rate", |s, i, _| s.conditions[i].angular_velocity.y),
+        ("yaw rate", |s, i, _| s.conditions[i].angular_velocity.z),
+        ("yaw rate times forward velocity", |s, i, _| {
+            s.conditions[i].angular_velocity.z * s.conditions[i].velocity.x
+        }),
+        ("yaw rate squared", |s, i, _| s.conditions[i].angular_velocity.z.powi(2)),
+        ("angular acceleration about z", |s, i, _| s.conditions[i].angular_acceleration.z),
+        ("wetting rate", |s, i, _| s.wetting_rate[i]),
+        ("entry speed squared", |s, i, _| s.wetting_rate[i].max(0.0).powi(2)),
+        ("time in water", |_, _, time| time),
+        ("time since the entry, fading", |_, _, time| (-time / 1.5).exp()),
+        ("pitch", |s, i, _| s.roll_pitch[i][1]),
+        ("roll", |s, i, _| s.roll_pitch[i][0]),
+        ("heading (cosine)", |s, i, _| s.yaw[i].cos()),
+        ("heading (sine)", |s, i, _| s.yaw[i].sin()),
+        ("speed times heading (cosine)", |s, i, _| s.conditions[i].velocity.norm() * s.yaw[i].cos()),
+        ("speed times heading (sine)", |s, i, _| s.conditions[i].velocity.norm() * s.yaw[i].sin()),
+    ]
+}

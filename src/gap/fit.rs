@@ -1,0 +1,194 @@
+//! Parameters of the named effects, with intervals.
+//!
+//! Least squares on the rows of the design, corrected for noise in the accelerations: a column with a share `s` of noise in
+//! its variance pulls its coefficient down by `1 - s` (Fuller, Measurement Error Models, section 1.2), so that share is
+//! taken off the normal matrix. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use super::Config;
+use super::candidates::{Setting, columns};
+use super::design::Design;
+use super::robust::errors;
+use super::select::Member;
+use super::series::Series;
+use super::statistics::{quantile, white_variance};
+use crate::effects::{Effect, Shape};
+use crate::train::random::Random;
+
+/// Fewest trials, in effect, that let an interval rest on the scatter between trials.
+const ENOUGH_TRIALS: f64 = 8.0;
+/// Fewer trials than this, in effect: one condition.
+const ONE_CONDITION: f64 = 2.5;
+
+/// A fitted parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Best estimate.
+    pub value: f64,
+    /// Standard error.
+    pub std: f64,
+    /// Unit; 1 where it has none.
+    pub unit: &'static str,
+    /// 90 % interval.
+    pub interval: [f64; 2],
+    /// Band of published values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub literature: Option<[f64; 2]>,
+}
+
+/// The fit of a set.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    /// Coefficients in their units, in the order of the set's columns.
+    pub values: Vec<f64>,
+    /// Covariance of the values.
+    pub covariance: DMatrix<f64>,
+    /// 90 % intervals.
+    pub intervals: Vec<[f64; 2]>,
+    /// Seen in one condition only, by member.
+    pub provisional: Vec<bool>,
+    /// Standard errors of the shapes, by member.
+    pub shape_std: Vec<Shape>,
+}
+
+/// Fits a set on the rows of the design.
+pub(super) fn fit(
+    design: &Design,
+    set: &[Member],
+    all: &[Series],
+    setting: &Setting,
+    config: &Config,
+) -> Option<Fit> {
+    let used: Vec<(usize, usize, usize)> = set
+        .iter()
+        .enumerate()
+        .flat_map(|(m, member)| member.columns.iter().map(move |&(column, k)| (m, column, k)))
+        .collect();
+    let columns: Vec<usize> = used.iter().map(|(_, column, _)| *column).collect();
+    let noise: Vec<f64> = used
+        .iter()
+        .map(|&(m, _, k)| noise_share(design, &set[m], k, all, setting))
+        .collect();
+    let clusters = clusters(design, &columns);
+    let (beta, _) = design.solve(&columns)?;
+    let errors = errors(design, &columns, &design.residual(&columns, &beta))?;
+    let few = errors.iter().map(|e| e.trials).fold(f64::INFINITY, f64::min) < ENOUGH_TRIALS;
+    let groups = if few { clusters.blocks } else { clusters.trials };
+    let whole: Vec<f64> = vec![1.0; groups.len()];
+    let best = weighted(&groups, &whole, &noise)?;
+    let draws = bootstrap(&groups, &noise, config);
+    let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
+    let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
+    let count = columns.len();
+    let mean: Vec<f64> =
+        (0..count).map(|i| draws.iter().map(|d| d[i]).sum::<f64>() / draws.len().max(1) as f64).collect();
+    let covariance = DMatrix::from_fn(count, count, |i, j| {
+        let products = draws.iter().map(|d| (d[i] - mean[i]) * (d[j] - mean[j])).sum::<f64>();
+        products / (draws.len().max(2) - 1) as f64 / (scale[i] * scale[j])
+    });
+    let intervals = (0..count)
+        .map(|i| {
+            let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale[i]).collect();
+            [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)]
+        })
+        .collect();
+    let provisional = set
+        .iter()
+        .enumerate()
+        .map(|(m, _)| {
+            let own = used.iter().zip(&errors).filter(|((member, ..), _)| *member == m);
+            own.map(|(_, e)| e.trials).fold(f64::INFINITY, f64::min) < ONE_CONDITION
+        })
+        .collect();
+    Some(Fit { values, covariance, intervals, provisional, shape_std: vec![[0.0; 3]; set.len()] })
+}
+
+/// Normal equations of one cluster.
+struct Group {
+    xx: DMatrix<f64>,
+    xy: DVector<f64>,
+}
+
+struct Clusters {
+    trials: Vec<Group>,
+    blocks: Vec<Group>,
+}
+
+fn clusters(design: &Design, columns: &[usize]) -> Clusters {
+    let count = columns.len();
+    let empty = || Group { xx: DMatrix::zeros(count, count), xy: DVector::zeros(count) };
+    let mut blocks: Vec<Group> = (0..design.rows.blocks).map(|_| empty()).collect();
+    for (row, place) in design.rows.rows.iter().enumerate() {
+        let group = &mut blocks[place.block];
+        for (i, &a) in columns.iter().enumerate() {
+            let x = design.x[(row, a)];
+            group.xy[i] += x * design.y[row];
+            for (j, &b) in columns.iter().enumerate() {
+                group.xx[(i, j)] += x * design.x[(row, b)];
+            }
+        }
+    }
+    let mut trials: Vec<Group> = design.trials.iter().map(|_| empty()).collect();
+    for (block, group) in blocks.iter().enumerate() {
+        let place = design.trials.iter().position(|&t| t == design.rows.block_trial[block]);
+        let trial = &mut trials[place.unwrap_or_default()];
+        trial.xx += &group.xx;
+        trial.xy += &group.xy;
+    }
+    Clusters { trials, blocks }
+}
+
+fn weighted(groups: &[Group], weights: &[f64], noise: &[f64]) -> Option<DVector<f64>> {
+    let count = noise.len();
+    let mut xx = DMatrix::zeros(count, count);
+    let mut xy = DVector::zeros(count);
+    for (group, &weight) in groups.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        xx += &group.xx * weight;
+        xy += &group.xy * weight;
+    }
+    for i in 0..count {
+        xx[(i, i)] *= 1.0 - noise[i] + 1e-9;
+    }
+    xx.cholesky().map(|factor| factor.solve(&xy))
+}
+
+/// Estimates from clusters drawn with replacement.
+fn bootstrap(groups: &[Group], noise: &[f64], config: &Config) -> Vec<DVector<f64>> {
+    let mut random = Random::new(config.seed ^ 0xb007);
+    let draw = |random: &mut Random| {
+        let mut weights = vec![0.0; groups.len()];
+        for _ in 0..groups.len() {
+            weights[(random.unit() * groups.len() as f64) as usize] += 1.0;
+        }
+        weights
+    };
+    (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random), noise)).collect()
+}
+
+/// Share of noise in the variance of a column of accelerations, after the design's smoothing.
+fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Series], setting: &Setting) -> f64 {
+    let candidate = &design.candidates[member.candidate];
+    if !matches!(candidate.effect, Effect::AddedMass | Effect::MassError) {
+        return 0.0;
+    }
+    let passes = design.noise.smoothing;
+    let gain = if passes == 0 { 1.0 } else { (std::f64::consts::TAU * passes as f64).sqrt().recip() };
+    let (mut noise, mut total) = (0.0, 0.0);
+    for &trial in &design.trials {
+        let series = &all[trial];
+        let column = columns(candidate.effect, &candidate.shape, series, trial, setting);
+        for &component in &setting.components {
+            let values = series.binned(|sample| column[coefficient][sample][component]);
+            let weight = design.noise.bin[component].powi(-2);
+            for run in series.runs.iter().filter(|run| run.len() >= 8) {
+                noise += weight * white_variance(&values[run.clone()]) * gain * run.len() as f64;
+                let mut smoothed = values[run.clone()].to_vec();
+                super::design::smooth(&mut smoothed, passes);
+                total += weight * smoothed.iter().map(|v| v * v).sum::<f64>();
+            }
+        }
+    }
+    if total > 0.0 { (noise / total).min(0.5) } else { 0.0 }
+}

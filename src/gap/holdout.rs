@@ -1,0 +1,190 @@
+//! The gap before and after on trials that took no part in naming and fitting.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::candidates::{Setting, columns};
+use super::features::of_bins;
+use super::locate::Region;
+use super::noise::Floor;
+use super::series::Series;
+use super::statistics::quantile;
+use super::{Config, Named};
+use crate::train::random::Random;
+use crate::trials::WRENCH;
+
+/// A region may not become worse by more than this share.
+const WORSE: f64 = 0.05;
+
+/// Root mean squares of one component [N or N m]; of `all` in noise floors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Closure {
+    /// Without the named effects.
+    pub before: f64,
+    /// With them.
+    pub after: f64,
+    /// What noise alone would show.
+    pub noise_floor: f64,
+    /// `(before - after) / (before - noise_floor)`; none where before is not above the floor.
+    pub closure: Option<f64>,
+    /// 90 % interval of the closure, by a bootstrap over the trials kept back.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// A region that the named effects make worse.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Worse {
+    /// The region.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// Gap before, in noise floors.
+    pub before: f64,
+    /// Gap after.
+    pub after: f64,
+}
+
+/// The wrench that the named effects add to each sample of a trial.
+pub(super) fn explained(named: &[Named], series: &Series, rank: usize, setting: &Setting) -> Vec<[f64; 6]> {
+    let mut sum = vec![[0.0; 6]; series.t.len()];
+    for named in named {
+        let columns = columns(named.effect, &named.shape, series, rank, setting);
+        for &(coefficient, value) in &named.coefficients {
+            for (sum, column) in sum.iter_mut().zip(&columns[coefficient]) {
+                (0..6).for_each(|c| sum[c] += value * column[c]);
+            }
+        }
+    }
+    sum
+}
+
+/// Squares before and after of one trial, by component, and its samples.
+#[derive(Clone)]
+struct Sums {
+    before: [f64; 6],
+    after: [f64; 6],
+    count: f64,
+}
+
+/// The closure of each component and of all together in noise floors.
+pub(super) fn closures(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    setting: &Setting,
+    floors: &[Floor; 6],
+    config: &Config,
+) -> BTreeMap<&'static str, Closure> {
+    let sums: Vec<Sums> = held
+        .iter()
+        .map(|&trial| {
+            let series = &all[trial];
+            let added = explained(named, series, trial, setting);
+            let mut sums = Sums { before: [0.0; 6], after: [0.0; 6], count: series.t.len() as f64 };
+            for (gap, added) in series.gap.iter().zip(&added) {
+                for &c in &setting.components {
+                    sums.before[c] += gap[c].powi(2);
+                    sums.after[c] += (gap[c] - added[c]).powi(2);
+                }
+            }
+            sums
+        })
+        .collect();
+    let mut random = Random::new(config.seed ^ 0xc105);
+    let draws: Vec<Vec<Sums>> = (0..config.bootstrap)
+        .map(|_| (0..sums.len()).map(|_| sums[(random.unit() * sums.len() as f64) as usize].clone()).collect())
+        .collect();
+    let closure = |components: &[usize], floor: f64, unit: bool| {
+        let weight = |c: usize| if unit { 1.0 } else { floors[c].total().max(1e-12).powi(-2) };
+        let sizes = |sums: &[Sums]| {
+            let count = sums.iter().map(|s| s.count).sum::<f64>() * components.len() as f64;
+            let rms = |of: &dyn Fn(&Sums, usize) -> f64| {
+                let squares = sums.iter().flat_map(|s| components.iter().map(move |&c| (s, c)));
+                (squares.map(|(s, c)| of(s, c) * weight(c)).sum::<f64>() / count.max(1.0)).sqrt()
+            };
+            (rms(&|s, c| s.before[c]), rms(&|s, c| s.after[c]))
+        };
+        let share = |(before, after): (f64, f64)| (before > 1.02 * floor).then(|| (before - after) / (before - floor));
+        let (before, after) = sizes(&sums);
+        let mut found: Vec<f64> = draws.iter().filter_map(|draw| share(sizes(draw))).collect();
+        let interval = share((before, after)).filter(|_| found.len() * 2 > draws.len()).map(|_| {
+            [quantile(&mut found.clone(), 0.05), quantile(&mut found, 0.95)]
+        });
+        Closure { before, after, noise_floor: floor, closure: share((before, after)), interval }
+    };
+    let mut closures: BTreeMap<&'static str, Closure> = setting
+        .components
+        .iter()
+        .map(|&c| (WRENCH[c], closure(&[c], floors[c].total(), true)))
+        .collect();
+    closures.insert("all", closure(&setting.components, 1.0, false));
+    closures
+}
+
+/// Regions, and thirds of depth and speed, where the gap of the trials kept back grows by more than a twentieth.
+pub(super) fn worse(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    setting: &Setting,
+    floors: &[Floor; 6],
+    regions: &[Region],
+) -> Vec<Worse> {
+    let mut points: Vec<([f64; 9], f64, f64)> = Vec::new();
+    for &trial in held {
+        let series = &all[trial];
+        let added = explained(named, series, trial, setting);
+        let size = |value: &dyn Fn(usize, usize) -> f64| {
+            let square = |i: usize| {
+                setting
+                    .components
+                    .iter()
+                    .map(|&c| (value(i, c) / floors[c].total().max(1e-12)).powi(2))
+                    .sum::<f64>()
+                    / setting.components.len() as f64
+            };
+            series.binned(square)
+        };
+        let before = size(&|i, c| series.gap[i][c]);
+        let after = size(&|i, c| series.gap[i][c] - added[i][c]);
+        points.extend(of_bins(series).into_iter().zip(before).zip(after).map(|((f, b), a)| (f, b, a)));
+    }
+    let mut places: Vec<(String, Box<dyn Fn(&[f64; 9]) -> bool>)> = Vec::new();
+    for region in regions {
+        let limits: Vec<(usize, f64, f64)> = region
+            .conditions
+            .iter()
+            .filter_map(|c| {
+                let index = super::features::FEATURES.iter().position(|(name, _)| *name == c.quantity)?;
+                Some((index, c.above.unwrap_or(f64::NEG_INFINITY), c.at_most.unwrap_or(f64::INFINITY)))
+            })
+            .collect();
+        places.push((
+            region.place.clone(),
+            Box::new(move |f| limits.iter().all(|&(i, low, high)| f[i] > low && f[i] <= high)),
+        ));
+    }
+    for (feature, name) in [(0, "depth"), (2, "speed")] {
+        let mut values: Vec<f64> = points.iter().map(|(f, ..)| f[feature]).collect();
+        let cuts = [quantile(&mut values.clone(), 1.0 / 3.0), quantile(&mut values, 2.0 / 3.0)];
+        let limits = [(f64::NEG_INFINITY, cuts[0]), (cuts[0], cuts[1]), (cuts[1], f64::INFINITY)];
+        for (third, (low, high)) in ["lowest", "middle", "highest"].into_iter().zip(limits) {
+            places.push((format!("{third} third of {name}"), Box::new(move |f| f[feature] > low && f[feature] <= high)));
+        }
+    }
+    let mut worse = Vec::new();
+    for (place, within) in places {
+        let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
+        for (features, b, a) in &points {
+            if within(features) {
+                (before, after, count) = (before + b, after + a, count + 1.0);
+            }
+        }
+        let (before, after) = ((before / f64::max(count, 1.0)).sqrt(), (after / f64::max(count, 1.0)).sqrt());
+        // a fraction of the floor more is no harm that anyone could measure
+        if count >= 5.0 && after > (1.0 + WORSE) * before && after * after - before * before > 0.05 {
+            worse.push(Worse { place, before, after });
+        }
+    }
+    worse
+}

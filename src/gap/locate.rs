@@ -1,0 +1,263 @@
+//! Where the gap is: a shallow tree over the state.
+//!
+//! Grown on one half of the trials by variance reduction of the squared standardised gap (Breiman and others, CART 1984),
+//! at most three conditions deep; what it claims is estimated on the other half (Athey and Imbens, PNAS 2016), where a split
+//! must hold again, and tested by giving each trial the gaps of another.
+
+use serde::Serialize;
+
+use super::Config;
+use super::features::{FEATURES, of_bins};
+use super::series::Series;
+use crate::train::random::Random;
+
+/// Least share of the bins that a region may hold.
+const LEAST_SHARE: f64 = 0.03;
+/// Conditions of a region.
+const DEPTH: usize = 3;
+/// How many times the gap of one side must be that of the other for a split to say something.
+const CONTRAST: f64 = 1.5;
+/// Largest probability that a region is chance.
+const SIGNIFICANCE: f64 = 0.05;
+
+/// A place in the state space where the gap is larger than the noise explains.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Region {
+    /// At most three conditions.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// The conditions as numbers: quantity, lower and upper limit.
+    pub conditions: Vec<Condition>,
+    /// Share of the squared gap above the floor, estimated on trials that did not choose the region.
+    pub share_of_gap: f64,
+    /// Share of the samples.
+    pub share_of_samples: f64,
+    /// Trials that enter it.
+    pub trials: usize,
+    /// Standardised gap in it over that elsewhere, root mean square.
+    pub contrast: f64,
+    /// Probability of such a contrast where the place means nothing.
+    pub p_value: f64,
+}
+
+/// One condition of a region.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Condition {
+    /// Quantity.
+    pub quantity: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Above this.
+    pub above: Option<f64>,
+    /// At most this.
+    pub at_most: Option<f64>,
+}
+
+/// A bin as the tree sees it.
+struct Point {
+    trial: usize,
+    features: [f64; 9],
+    /// Squared standardised gap above the floor.
+    excess: f64,
+}
+
+type Limits = [[f64; 2]; 9];
+
+const OPEN: Limits = [[f64::NEG_INFINITY, f64::INFINITY]; 9];
+
+fn inside(limits: &Limits, features: &[f64; 9]) -> bool {
+    limits.iter().zip(features).all(|([low, high], value)| value > low && value <= high)
+}
+
+/// Regions by share, and how many splits were tried. `gap_bins` gives the standardised squared gap of each bin of a trial,
+/// less what noise alone would show.
+pub(super) fn locate(
+    all: &[Series],
+    trials: &[usize],
+    excess: impl Fn(usize) -> Vec<f64>,
+    config: &Config,
+) -> (Vec<Region>, usize) {
+    let mut points = Vec::new();
+    for &trial in trials {
+        let bins = of_bins(&all[trial]).into_iter().zip(excess(trial));
+        points.extend(bins.map(|(features, excess)| Point { trial, features, excess }));
+    }
+    let mut order = trials.to_vec();
+    Random::new(config.seed ^ 0x10ca7e).shuffle(&mut order);
+    let growing = &order[..order.len() / 2];
+    let (grow, check): (Vec<&Point>, Vec<&Point>) =
+        points.iter().partition(|point| growing.contains(&point.trial));
+    if grow.is_empty() || check.is_empty() {
+        return (Vec::new(), 0);
+    }
+    let mut tried = 0;
+    let mut leaves = Vec::new();
+    split(&grow, &check, OPEN, DEPTH, &mut leaves, &mut tried);
+    let mut random = Random::new(config.seed ^ 0x9e21);
+    let mut regions: Vec<Region> = leaves
+        .into_iter()
+        .filter(|limits| *limits != OPEN)
+        .filter_map(|limits| region(&limits, &check, trials.len(), &mut random))
+        .collect();
+    regions.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap).then(a.place.cmp(&b.place)));
+    regions.truncate(5);
+    (regions, tried)
+}
+
+fn mean(points: &[&Point]) -> f64 {
+    points.iter().map(|p| p.excess).sum::<f64>() / points.len().max(1) as f64
+}
+
+/// Leaves of the tree over points within `limits`.
+fn split(
+    grow: &[&Point],
+    check: &[&Point],
+    limits: Limits,
+    depth: usize,
+    leaves: &mut Vec<Limits>,
+    tried: &mut usize,
+) {
+    let best = (depth > 0).then(|| best_split(grow, tried)).flatten();
+    let Some((feature, at)) = best else {
+        leaves.push(limits);
+        return;
+    };
+    let below = |p: &&&Point| p.features[feature] <= at;
+    let (low_grow, high_grow): (Vec<&Point>, Vec<&Point>) = grow.iter().partition(|p| below(&p));
+    let (low_check, high_check): (Vec<&Point>, Vec<&Point>) = check.iter().partition(|p| below(&p));
+    // the other half of the trials must see the same side ahead, clearly
+    let sides = [mean(&low_check), mean(&high_check)];
+    let ahead = usize::from(mean(&high_grow) > mean(&low_grow));
+    let holds = !low_check.is_empty()
+        && !high_check.is_empty()
+        && sides[ahead] > 0.0
+        && sides[ahead] > CONTRAST * CONTRAST * sides[1 - ahead].max(0.0);
+    if !holds {
+        leaves.push(limits);
+        return;
+    }
+    let (mut low, mut high) = (limits, limits);
+    low[feature][1] = at;
+    high[feature][0] = at;
+    split(&low_grow, &low_check, low, depth - 1, leaves, tried);
+    split(&high_grow, &high_check, high, depth - 1, leaves, tried);
+}
+
+/// The split that takes most off the sum of squares; winsorised, so that a blow does not carve a region of its own.
+fn best_split(points: &[&Point], tried: &mut usize) -> Option<(usize, f64)> {
+    const CUTS: usize = 16;
+    let least = (LEAST_SHARE * points.len() as f64).max(8.0) as usize;
+    if points.len() < 2 * least {
+        return None;
+    }
+    let mut sizes: Vec<f64> = points.iter().map(|p| p.excess).collect();
+    let cap = super::statistics::quantile(&mut sizes, 0.98).max(1e-12);
+    let mut best: Option<(f64, usize, f64)> = None;
+    for feature in 0..FEATURES.len() {
+        let mut pairs: Vec<(f64, f64)> =
+            points.iter().map(|p| (p.features[feature], p.excess.min(cap))).collect();
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let count = pairs.len();
+        let mut prefix = vec![0.0];
+        pairs.iter().for_each(|(_, e)| prefix.push(prefix[prefix.len() - 1] + e));
+        let whole = prefix[count];
+        for cut in 1..CUTS {
+            let at = (count * cut / CUTS).clamp(least, count - least);
+            let value = pairs[at - 1].0;
+            let n = pairs.partition_point(|(v, _)| *v <= value);
+            if n < least || count - n < least {
+                continue;
+            }
+            *tried += 1;
+            let (a, b) = (prefix[n] / n as f64, (whole - prefix[n]) / (count - n) as f64);
+            let gain = (a - b).powi(2) * n as f64 * (count - n) as f64 / count as f64;
+            if best.is_none_or(|(other, ..)| gain > other) {
+                best = Some((gain, feature, value));
+            }
+        }
+    }
+    best.filter(|(gain, ..)| *gain > 0.0).map(|(_, feature, value)| (feature, value))
+}
+
+fn region(limits: &Limits, check: &[&Point], trials: usize, random: &mut Random) -> Option<Region> {
+    let whole: f64 = check.iter().map(|p| p.excess).sum();
+    let (within, without): (Vec<&Point>, Vec<&Point>) = check.iter().partition(|p| inside(limits, &p.features));
+    if within.is_empty() || without.is_empty() || whole <= 0.0 {
+        return None;
+    }
+    let (here, there) = (mean(&within), mean(&without));
+    let share = within.iter().map(|p| p.excess).sum::<f64>() / whole;
+    if here <= there.max(0.0) || share < 0.05 {
+        return None;
+    }
+    let p_value = permuted(limits, check, here - there, random);
+    if p_value > SIGNIFICANCE {
+        return None;
+    }
+    let mut entered: Vec<usize> = within.iter().map(|p| p.trial).collect();
+    entered.dedup();
+    let conditions = conditions(limits);
+    Some(Region {
+        place: conditions.iter().map(text).collect::<Vec<_>>().join(" and "),
+        conditions,
+        share_of_gap: share,
+        share_of_samples: within.len() as f64 / check.len() as f64,
+        trials: (entered.len() * 2).min(trials),
+        contrast: (here.max(0.0) / there.max(1e-6 * here)).sqrt(),
+        p_value,
+    })
+}
+
+/// Share of permutations, in which a trial's gaps are those of another, with as large a difference.
+fn permuted(limits: &Limits, points: &[&Point], observed: f64, random: &mut Random) -> f64 {
+    const DRAWS: usize = 99;
+    let mut by_trial: Vec<Vec<&Point>> = Vec::new();
+    for point in points {
+        match by_trial.last_mut().filter(|trial| trial[0].trial == point.trial) {
+            Some(trial) => trial.push(point),
+            None => by_trial.push(vec![point]),
+        }
+    }
+    let mut as_large = 0;
+    for _ in 0..DRAWS {
+        let order = random.permutation(by_trial.len());
+        let (mut here, mut there) = ([0.0; 2], [0.0; 2]);
+        for (trial, &other) in by_trial.iter().zip(&order) {
+            let gaps = &by_trial[other];
+            let shift = (random.unit() * gaps.len() as f64) as usize;
+            for (i, point) in trial.iter().enumerate() {
+                let excess = gaps[(i + shift) % gaps.len()].excess;
+                let side = if inside(limits, &point.features) { &mut here } else { &mut there };
+                side[0] += excess;
+                side[1] += 1.0;
+            }
+        }
+        as_large += usize::from(here[0] / f64::max(here[1], 1.0) - there[0] / f64::max(there[1], 1.0) >= observed);
+    }
+    (1 + as_large) as f64 / (1 + DRAWS) as f64
+}
+
+fn conditions(limits: &Limits) -> Vec<Condition> {
+    let of = |(index, [low, high]): (usize, &[f64; 2])| {
+        let (quantity, unit) = FEATURES[index];
+        let finite = |value: f64| value.is_finite().then_some(value);
+        (low.is_finite() || high.is_finite()).then(|| Condition {
+            quantity,
+            unit,
+            above: finite(*low),
+            at_most: finite(*high),
+        })
+    };
+    limits.iter().enumerate().filter_map(of).collect()
+}
+
+fn text(condition: &Condition) -> String {
+    let Condition { quantity, unit, above, at_most } = condition;
+    let unit = if *unit == "1" { String::new() } else { format!(" {unit}") };
+    match (above, at_most) {
+        (Some(above), Some(at_most)) => format!("{quantity} between {above:.3} and {at_most:.3}{unit}"),
+        (Some(above), None) => format!("{quantity} above {above:.3}{unit}"),
+        (None, Some(at_most)) => format!("{quantity} at most {at_most:.3}{unit}"),
+        (None, None) => quantity.to_string(),
+    }
+}

@@ -1,0 +1,59 @@
+//! The measured wrench of a trial: as its columns say, or inferred from the motion.
+//!
+//! Inverse dynamics (`method = "inverse_dynamics"`): `F = m (a + g up) - sum of other forces`. A column of a known other
+//! force is named after the component it acts on (`drive_fx`). Components without such a column are not inferred, since
+//! what the ground carries is unknown there. A dry twin, the same command without water, is taken off at the same time
+//! since the start, with the difference of the inertia.
+
+use super::GapError;
+use crate::frame::GRAVITY;
+use crate::signal::interpolate;
+use crate::trials::{Manifest, Method, Trial, Trials, WRENCH};
+
+/// The measured wrench of each sample; `None` for a component that was not measured [N, N m].
+pub(super) fn measured(trials: &Trials, trial: &Trial, mass: f64) -> Result<[Option<Vec<f64>>; 6], GapError> {
+    let direct = trial.measured.clone();
+    if trials.manifest.measured.method != Some(Method::InverseDynamics) || direct.iter().any(Option::is_some) {
+        return Ok(direct);
+    }
+    let mass = trials.manifest.mass.unwrap_or(mass);
+    let mut wrench = inferred(&trials.manifest, trial, mass);
+    if let Some(name) = trials.manifest.measured.dry_twins.get(&trial.name) {
+        let missing = || GapError::NoTwin { trial: trial.name.clone(), twin: name.clone() };
+        let twin = trials.trials.iter().find(|other| other.name == *name).ok_or_else(missing)?;
+        take_off(&mut wrench, trial, twin, &inferred(&trials.manifest, twin, mass));
+    }
+    Ok(wrench)
+}
+
+/// Sum of the known other forces on a component, by the end of the column's name.
+pub(super) fn other_force(trial: &Trial, component: usize) -> Option<Vec<f64>> {
+    let suffix = format!("_{}", WRENCH[component]);
+    let mut columns = trial.other_forces.iter().filter(|(name, _)| name.ends_with(&suffix));
+    let mut sum = columns.next()?.1.clone();
+    for (_, column) in columns {
+        sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += value);
+    }
+    Some(sum)
+}
+
+fn inferred(_manifest: &Manifest, trial: &Trial, mass: f64) -> [Option<Vec<f64>>; 6] {
+    let force = |axis: usize| {
+        let known = other_force(trial, axis)?;
+        let value = |(sample, other): (usize, f64)| {
+            mass * (trial.acceleration[sample][axis] + GRAVITY * trial.up(sample)[axis]) - other
+        };
+        Some(known.into_iter().enumerate().map(value).collect())
+    };
+    [force(0), force(1), force(2), None, None, None]
+}
+
+fn take_off(wrench: &mut [Option<Vec<f64>>; 6], trial: &Trial, twin: &Trial, dry: &[Option<Vec<f64>>; 6]) {
+    let since_start: Vec<f64> = trial.t.iter().map(|t| t - trial.t[0] + twin.t[0]).collect();
+    for (wet, dry) in wrench.iter_mut().zip(dry) {
+        if let (Some(wet), Some(dry)) = (wet, dry) {
+            let dry = interpolate(&twin.t, dry, &since_start);
+            wet.iter_mut().zip(dry).for_each(|(wet, dry)| *wet -= dry);
+        }
+    }
+}

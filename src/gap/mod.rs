@@ -1,0 +1,156 @@
+//! The gap workflow: where a model and measured trials disagree, which known effect explains it, whether anything else could,
+//! and how much smaller the gap is with it on trials that took no part.
+//!
+//! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
+//!
+//! Reading order: `config`, `measurement` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
+//! library as columns), `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that hold),
+//! `select` (which effects), `features` and `locate` (where; structure without a name), `fit`, `holdout`, `detect` (what would
+//! have shown), `experiment`, `report`, `page` and `effects_file`.
+
+mod candidates;
+mod config;
+mod design;
+mod detect;
+mod experiment;
+mod features;
+mod fit;
+mod holdout;
+mod locate;
+mod measurement;
+mod noise;
+mod report;
+mod robust;
+mod run;
+mod select;
+mod series;
+mod split;
+mod statistics;
+
+pub use config::Config;
+pub use detect::{Detectable, Excitation, GapSize};
+pub use fit::Parameter;
+pub use holdout::{Closure, Worse};
+pub use locate::{Condition as RegionCondition, Region};
+pub use noise::{Floor, FloorSource};
+pub use report::{
+    GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict,
+};
+pub use run::{body_of, run};
+pub use select::Refusal;
+
+use crate::effects::{Effect, Shape};
+use crate::wrench::Wrench;
+
+/// A model's answer.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Predicted {
+    /// Net wrench about the center of mass [N, N m].
+    pub wrench: Wrench,
+    /// Its standard deviation [N, N m].
+    pub uncertainty: [f64; 6],
+}
+
+/// An effect with its numbers.
+#[derive(Debug, Clone)]
+struct Named {
+    effect: Effect,
+    shape: Shape,
+    /// Coefficient and value.
+    coefficients: Vec<(usize, f64)>,
+}
+
+/// Why there is no verdict.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GapError {
+    /// A setting that makes no sense.
+    #[error("{key} = {value} must be {expected}")]
+    Config {
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// Trials of another vehicle.
+    #[error("the trials are of vehicle \"{trials}\", not \"{asked}\": give --vehicle {trials}")]
+    Vehicle {
+        /// In the trials.
+        trials: String,
+        /// Asked for.
+        asked: String,
+    },
+    /// Another simulator's prediction, but nothing known of the body.
+    #[error(
+        "vehicle \"{vehicle}\" has no bundle, and trials.toml has no [body] table (length, width, draft, mass, displaced_volume, center_of_mass)"
+    )]
+    NoBody {
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// Neither a bundle nor `sim_` columns.
+    #[error(
+        "{trial}.csv has no sim_ column and vehicle \"{vehicle}\" has no bundle: nothing predicts the wrench"
+    )]
+    NoPrediction {
+        /// Name of the trial.
+        trial: String,
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// No component to compare.
+    #[error(
+        "{trial}.csv has no measured component that is predicted: it needs one of fx, fy, fz, mx, my, mz, or method = \"inverse_dynamics\" with the columns of the other forces"
+    )]
+    NothingMeasured {
+        /// Name of the trial.
+        trial: String,
+    },
+    /// Components that differ.
+    #[error(
+        "{trial}.csv differs from the trial before it in column {component}: all trials must have the same components; list those to use in measured.columns"
+    )]
+    Components {
+        /// Name of the trial.
+        trial: String,
+        /// The component.
+        component: &'static str,
+    },
+    /// Too few to keep some back.
+    #[error("{trials} trials are too few: the method keeps some back and needs at least {least}")]
+    TooFewTrials {
+        /// Trials found.
+        trials: usize,
+        /// Trials needed.
+        least: usize,
+    },
+    /// Too short to cut into blocks.
+    #[error(
+        "{blocks} blocks of {block_s} s are too few for {folds} folds: record longer trials, or make block_s smaller"
+    )]
+    TooShort {
+        /// Blocks found.
+        blocks: usize,
+        /// Length of a block [s].
+        block_s: f64,
+        /// Folds.
+        folds: usize,
+    },
+    /// A twin that is not there.
+    #[error("{trial}.csv has the dry twin {twin}, which is not there")]
+    NoTwin {
+        /// Name of the trial.
+        trial: String,
+        /// Name of the twin.
+        twin: String,
+    },
+    /// A prediction that is no number.
+    #[error("{trial}.csv, row {row}: the predicted wrench is not finite")]
+    NotFinite {
+        /// Name of the trial.
+        trial: String,
+        /// Line of its file.
+        row: u64,
+    },
+}

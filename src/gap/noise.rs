@@ -1,0 +1,165 @@
+//! The noise floor: what no effect can explain.
+//!
+//! From repeats, where there are any; else from the part of the gap that changes from sample to sample; never below the
+//! noise that `trials.toml` states. The model's own uncertainty stands beside it.
+
+use super::design::{RowNoise, smooth};
+use super::series::Series;
+use super::statistics::{median, white_variance};
+use crate::signal::interpolate;
+use crate::trials::{Manifest, WRENCH};
+use serde::Serialize;
+
+/// Where a floor comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FloorSource {
+    /// Trials that repeat each other.
+    Repeats,
+    /// The part of the gap that changes from sample to sample.
+    HighFrequency,
+    /// Stated in `trials.toml`.
+    Stated,
+}
+
+/// The floor of one component, one standard deviation of a sample [N or N m].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Floor {
+    /// Of one sample.
+    pub sample: f64,
+    /// Of a trial's zero, from trial to trial.
+    pub offset: f64,
+    /// The model's own.
+    pub model: f64,
+    /// Where `sample` comes from.
+    pub source: FloorSource,
+}
+
+impl Floor {
+    /// What is expected of the gap where nothing is missing [N or N m].
+    pub fn total(&self) -> f64 {
+        self.sample.hypot(self.offset)
+    }
+}
+
+/// The floor of each compared component; the others are 0.
+pub(super) fn floors(all: &[Series], manifest: &Manifest, components: &[usize]) -> [Floor; 6] {
+    std::array::from_fn(|component| {
+        let name = WRENCH[component];
+        let stated = manifest.sensor_noise.get(name).copied();
+        let offset = manifest.trial_offset.get(name).copied().unwrap_or(0.0);
+        let mut floor = Floor { sample: 0.0, offset, model: 0.0, source: FloorSource::HighFrequency };
+        if !components.contains(&component) {
+            return floor;
+        }
+        floor.sample = high_frequency(all, component);
+        if let Some(repeats) = repeats(all, manifest, component) {
+            floor = Floor { sample: repeats, source: FloorSource::Repeats, ..floor };
+        }
+        if let Some(stated) = stated.filter(|&stated| stated > floor.sample) {
+            floor = Floor { sample: stated, source: FloorSource::Stated, ..floor };
+        }
+        let squares = all.iter().flat_map(|s| s.uncertainty.iter().map(|u| u[component].powi(2)));
+        let count = all.iter().map(|s| s.t.len()).sum::<usize>().max(1);
+        floor.model = (squares.sum::<f64>() / count as f64).sqrt();
+        floor
+    })
+}
+
+fn high_frequency(all: &[Series], component: usize) -> f64 {
+    let mut variances: Vec<f64> = all
+        .iter()
+        .map(|series| white_variance(&series.gap.iter().map(|gap| gap[component]).collect::<Vec<_>>()))
+        .collect();
+    median(&mut variances).sqrt()
+}
+
+/// Half the variance of the difference of two trials that repeat each other, at the same time since their start.
+fn repeats(all: &[Series], manifest: &Manifest, component: usize) -> Option<f64> {
+    let mut variances = Vec::new();
+    for group in &manifest.measured.repeats {
+        let group: Vec<&Series> =
+            group.iter().filter_map(|name| all.iter().find(|series| series.name == *name)).collect();
+        for (index, a) in group.iter().enumerate() {
+            for b in &group[index + 1..] {
+                variances.push(half_difference(a, b, component));
+            }
+        }
+    }
+    (!variances.is_empty()).then(|| median(&mut variances).sqrt())
+}
+
+fn half_difference(a: &Series, b: &Series, component: usize) -> f64 {
+    let gap = |series: &Series| series.gap.iter().map(|gap| gap[component]).collect::<Vec<f64>>();
+    let since: Vec<f64> = a.t.iter().map(|t| t - a.t[0] + b.t[0]).collect();
+    let other = interpolate(&b.t, &gap(b), &since);
+    let last = b.t[b.t.len() - 1];
+    let differences: Vec<f64> =
+        gap(a).iter().zip(&other).zip(&since).filter(|(_, t)| **t <= last).map(|((a, b), _)| a - b).collect();
+    let mean = differences.iter().sum::<f64>() / differences.len().max(1) as f64;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
+    0.5 * variance / differences.len().max(1) as f64
+}
+
+/// Noise of the rows, for weights: of bins by their own high-frequency part, of trials by what the manifest states or the
+/// scatter of the trials' means shows beyond it.
+pub(super) fn row_noise(
+    all: &[Series],
+    trials: &[usize],
+    components: &[usize],
+    floors: &[Floor; 6],
+    smoothing: usize,
+) -> RowNoise {
+    let mut noise = RowNoise { bin: [1.0; 6], offset: [0.0; 6], smoothing };
+    for &component in components {
+        let mut variances = Vec::new();
+        for &trial in trials {
+            let series = &all[trial];
+            let values = series.binned(|sample| series.gap[sample][component]);
+            let runs = series.runs.iter().filter(|run| run.len() >= 4);
+            variances.extend(runs.map(|run| white_variance(&values[run.clone()])));
+        }
+        let samples = all.iter().flat_map(|s| s.bins.iter().map(|bin| bin.len() as f64));
+        let per_bin = median(&mut samples.collect::<Vec<_>>()).max(1.0);
+        let white = floors[component].sample / per_bin.sqrt();
+        let bin = median(&mut variances).sqrt().max(white);
+        // a component without any noise at all weighs as if its gap were noise of a thousandth
+        let size = rms(all, trials, component);
+        noise.bin[component] = bin.max(1e-3 * size).max(1e-12);
+        noise.offset[component] = floors[component].offset;
+    }
+    noise
+}
+
+fn rms(all: &[Series], trials: &[usize], component: usize) -> f64 {
+    let squares = trials.iter().flat_map(|&t| all[t].gap.iter().map(|gap| gap[component].powi(2)));
+    let count = trials.iter().map(|&t| all[t].t.len()).sum::<usize>().max(1);
+    (squares.sum::<f64>() / count as f64).sqrt()
+}
+
+/// Passes of smoothing over bins after which the noise of the acceleration is a small share of it; the same smoothing goes
+/// over the gap and every column, so that none is favored.
+pub(super) fn smoothing(all: &[Series], trials: &[usize]) -> usize {
+    const MOST: usize = 6;
+    const SMALL: f64 = 0.03;
+    (0..MOST).find(|&passes| acceleration_noise(all, trials, passes) < SMALL).unwrap_or(MOST)
+}
+
+/// Share of noise in the variance of the forward acceleration's bins after some passes.
+fn acceleration_noise(all: &[Series], trials: &[usize], passes: usize) -> f64 {
+    let (mut noise, mut total) = (0.0, 0.0);
+    for &trial in trials {
+        let series = &all[trial];
+        let values = series.binned(|sample| series.conditions[sample].acceleration.x);
+        for run in series.runs.iter().filter(|run| run.len() >= 8) {
+            let raw = white_variance(&values[run.clone()]);
+            let mut smoothed = values[run.clone()].to_vec();
+            smooth(&mut smoothed, passes);
+            // white noise keeps C(4m, 2m) / 16^m of its variance after m passes
+            let gain = if passes == 0 { 1.0 } else { (std::f64::consts::TAU * passes as f64).sqrt().recip() };
+            noise += raw * gain * run.len() as f64;
+            total += smoothed.iter().map(|v| v * v).sum::<f64>();
+        }
+    }
+    if total > 0.0 { noise / total } else { 0.0 }
+}

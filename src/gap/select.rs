@@ -1,0 +1,510 @@
+//! Which effects: forward selection with swaps and deletions over the whole library.
+//!
+//! Physics, sensors and drive compete in one regression. Each effect of a set must pass every gate given the others:
+//! significant by cluster-robust errors, inside its physical bounds, of one sign in every fold, better in most folds and in
+//! most of the blocks that excite it, a stated share of the remaining gap above the floor, larger than its phase-shifted
+//! placebos, and large enough to matter beside the noise of a sample and the model's own uncertainty.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::design::{Design, Fitted};
+use super::noise::Floor;
+use super::robust::{Error, errors};
+use super::{Config, candidates::Setting};
+use crate::effects::Effect;
+use crate::train::random::Random;
+
+/// Least deviate of a column that stays in a group.
+const COLUMN_DEVIATE: f64 = 4.0;
+/// Share of the folds in which an effect must help and keep its sign.
+const MOST_FOLDS: f64 = 0.75;
+/// A shifted column that still points the same way is no placebo.
+const SAME_DIRECTION: f64 = 0.9;
+
+/// An effect of a set: its candidate, and the columns that are in use with their coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Member {
+    pub candidate: usize,
+    pub columns: Vec<(usize, usize)>,
+}
+
+/// How an effect does beside a set.
+#[derive(Debug, Clone)]
+pub(super) struct Judged {
+    pub member: Member,
+    pub effect: Effect,
+    /// Cross-validated loss of the set with it.
+    pub cv_loss: f64,
+    /// In-sample gain of the loss.
+    pub gain: f64,
+    /// Why it is not named; `None` where every gate is passed.
+    pub refused: Option<Refusal>,
+}
+
+/// A gate that was not passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refusal {
+    /// As likely chance.
+    NotSignificant,
+    /// Coefficients beyond what is physically possible.
+    OutOfBounds,
+    /// Too small beside the noise or the model's uncertainty.
+    Irrelevant,
+    /// Explains too little of the remaining gap.
+    SmallShare,
+    /// Does not help in most folds, or changes sign between them.
+    Unstable,
+    /// Placebos do as well.
+    Placebo,
+}
+
+/// The regression with what the gates need.
+pub(super) struct Judge<'a> {
+    pub design: &'a Design,
+    pub setting: &'a Setting<'a>,
+    pub config: &'a Config,
+    pub floors: &'a [Floor; 6],
+    /// Loss that nothing explains.
+    pub floor_loss: f64,
+}
+
+impl Judge<'_> {
+    /// Columns of a set.
+    pub fn columns(&self, set: &[Member]) -> Vec<usize> {
+        set.iter().flat_map(|member| member.columns.iter().map(|(column, _)| *column)).collect()
+    }
+
+    pub fn effect(&self, member: &Member) -> Effect {
+        self.design.candidates[member.candidate].effect
+    }
+
+    /// The best form of an effect beside a set, without regard to the gates that need most work.
+    pub fn judge(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let base = self.columns(set);
+        let (_, before) = self.design.solve(&base)?;
+        let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
+        let mut ranked: Vec<(f64, usize)> = forms
+            .filter_map(|(index, candidate)| {
+                let mut columns = base.clone();
+                columns.extend(candidate.columns.iter().map(|(column, _)| *column));
+                Some((self.design.solve(&columns)?.1, index))
+            })
+            .collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut first = None;
+        for &(_, candidate) in ranked.iter().take(2) {
+            let judged = self.judge_form(set, &base, before, candidate)?;
+            if judged.refused.is_none() {
+                return Some(judged);
+            }
+            first.get_or_insert(judged);
+        }
+        first
+    }
+
+    fn judge_form(&self, set: &[Member], base: &[usize], before: f64, candidate: usize) -> Option<Judged> {
+        let effect = self.design.candidates[candidate].effect;
+        let mut own = self.design.candidates[candidate].columns.clone();
+        let mut refused = None;
+        let (fitted, found) = loop {
+            let columns: Vec<usize> = base.iter().copied().chain(own.iter().map(|(c, _)| *c)).collect();
+            let (beta, _) = self.design.solve(&columns)?;
+            let residual = self.design.residual(&columns, &beta);
+            let errors = errors(self.design, &columns, &residual)?;
+            let at = base.len();
+            let outside = |i: usize| self.out_of_bounds(effect, own[i], beta[at + i], &errors[at + i]);
+            let deviate = |i: usize| errors[at + i].deviate(beta[at + i]);
+            let weakest = (0..own.len()).min_by(|&a, &b| deviate(a).total_cmp(&deviate(b)));
+            let bad = (0..own.len()).find(|&i| outside(i)).filter(|_| own.len() > 1);
+            let drop = bad.or(weakest.filter(|&i| own.len() > 1 && deviate(i) < COLUMN_DEVIATE));
+            if let Some(drop) = drop {
+                own.remove(drop);
+                continue;
+            }
+            if outside(0) && own.len() == 1 {
+                refused = Some(Refusal::OutOfBounds);
+            }
+            let best = (0..own.len()).map(|i| errors[at + i].probability(beta[at + i])).fold(1.0, f64::min);
+            if best > self.config.significance {
+                refused = refused.or(Some(Refusal::NotSignificant));
+            }
+            break (self.design.fit(&columns)?, best);
+        };
+        let _ = found;
+        let gain = before - fitted.loss;
+        let member = Member { candidate, columns: own };
+        refused = refused.or_else(|| self.gates(set, &member, base, before, &fitted));
+        Some(Judged { member, effect, cv_loss: fitted.cv_loss, gain, refused })
+    }
+
+    fn out_of_bounds(&self, effect: Effect, column: (usize, usize), beta: f64, error: &Error) -> bool {
+        let [low, high] = effect.coefficients()[column.1].bounds;
+        let scale = self.design.scale[column.0];
+        let (value, slack) = (beta / scale, 2.0 * error.std / scale);
+        value < low - slack || value > high + slack
+    }
+
+    fn gates(
+        &self,
+        set: &[Member],
+        member: &Member,
+        base: &[usize],
+        before: f64,
+        fitted: &Fitted,
+    ) -> Option<Refusal> {
+        let effect = self.effect(member);
+        // a moving bed changes drag and lift; drag alone is the drag coefficient's
+        let held = &self.design.candidates[member.candidate].columns;
+        if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
+            return Some(Refusal::NotSignificant);
+        }
+        if !self.relevant(member, base.len(), fitted) {
+            return Some(Refusal::Irrelevant);
+        }
+        let gain = before - fitted.loss;
+        let remaining = (before - self.floor_loss).max(0.0);
+        let whole = (self.design.empty_loss() - self.floor_loss).max(0.0);
+        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * whole };
+        if gain < self.config.share_of_remaining * remaining || gain < of_whole {
+            return Some(Refusal::SmallShare);
+        }
+        (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
+    }
+
+    /// Size of what a member adds, against the noise of a sample and the model's uncertainty, in any component.
+    fn relevant(&self, member: &Member, first: usize, fitted: &Fitted) -> bool {
+        let design = self.design;
+        let mut squares = [0.0; 6];
+        let mut count = [0.0; 6];
+        for (row, place) in design.rows.rows.iter().enumerate() {
+            let of = |(i, (column, _)): (usize, &(usize, usize))| fitted.beta[first + i] * design.x[(row, *column)];
+            let value: f64 = member.columns.iter().enumerate().map(of).sum();
+            squares[place.component] += (value * design.noise.bin[place.component]).powi(2);
+            count[place.component] += 1.0;
+        }
+        self.setting.components.iter().any(|&c| {
+            let size = (squares[c] / f64::max(count[c], 1.0)).sqrt();
+            let floor = &self.floors[c];
+            size > self.config.relevance * floor.sample && size > floor.model
+        })
+    }
+
+    fn stable(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        let Some(without) = self.design.fit(base) else { return false };
+        let pairs = without.fold_losses.iter().zip(&fitted.fold_losses);
+        let helped = pairs.filter(|(without, with)| with < without).count() as f64;
+        let folds = fitted.fold_losses.len() as f64;
+        // the strongest column carries the sign
+        let strongest = (0..member.columns.len())
+            .max_by(|&a, &b| fitted.beta[base.len() + a].abs().total_cmp(&fitted.beta[base.len() + b].abs()));
+        let Some(strongest) = strongest else { return false };
+        let sign = fitted.beta[base.len() + strongest].signum();
+        let kept = fitted.fold_betas.iter().all(|beta| beta[base.len() + strongest].signum() == sign);
+        helped >= MOST_FOLDS * folds && kept && self.helps_most_blocks(member, base, fitted, &without)
+    }
+
+    /// Among the blocks that together hold nine tenths of the member's own energy, most must be better.
+    fn helps_most_blocks(&self, member: &Member, base: &[usize], with: &Fitted, without: &Fitted) -> bool {
+        let design = self.design;
+        let blocks = design.rows.blocks;
+        let (mut energy, mut change) = (vec![0.0; blocks], vec![0.0; blocks]);
+        for (row, place) in design.rows.rows.iter().enumerate() {
+            let fold = design.block_fold[place.block];
+            let sum = |beta: &DVector<f64>| {
+                base.iter().enumerate().map(|(i, &c)| beta[i] * design.x[(row, c)]).sum::<f64>()
+            };
+            let own: f64 = member
+                .columns
+                .iter()
+                .enumerate()
+                .map(|(i, (c, _))| with.fold_betas[fold][base.len() + i] * design.x[(row, *c)])
+                .sum();
+            let (a, b) = (sum(&without.fold_betas[fold]), sum(&with.fold_betas[fold]) + own);
+            energy[place.block] += own * own;
+            change[place.block] += (design.y[row] - b).powi(2) - (design.y[row] - a).powi(2);
+        }
+        let mut order: Vec<usize> = (0..blocks).collect();
+        order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]).then(a.cmp(&b)));
+        let whole: f64 = energy.iter().sum();
+        let (mut held, mut better, mut looked) = (0.0, 0, 0);
+        for block in order {
+            if held > 0.9 * whole {
+                break;
+            }
+            held += energy[block];
+            looked += 1;
+            better += usize::from(change[block] < 0.0);
+        }
+        2 * better > looked
+    }
+
+    /// True where a member beats copies of itself that are shifted in time within each trial.
+    pub fn beats_placebos(&self, set: &[Member], member: &Member) -> Option<(f64, f64)> {
+        let design = self.design;
+        let others: Vec<Member> = set.iter().filter(|other| *other != member).cloned().collect();
+        let base = self.columns(&others);
+        let (beta, before) = design.solve(&base)?;
+        let residual = design.residual(&base, &beta);
+        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
+        let all: Vec<usize> = base.iter().chain(&own).copied().collect();
+        let real = before - design.solve(&all)?.1;
+        let mut random = Random::new(self.config.seed ^ 0x9e37);
+        let mut strongest: f64 = 0.0;
+        for _ in 0..self.config.placebos {
+            let order = self.shifted(&mut random);
+            let columns: Vec<DVector<f64>> = own
+                .iter()
+                .map(|&c| DVector::from_iterator(order.len(), order.iter().map(|&r| design.x[(r, c)])))
+                .collect();
+            let alike = columns.iter().zip(&own).any(|(shifted, &c)| {
+                let original = design.x.column(c);
+                shifted.dot(&original) / (shifted.norm() * original.norm()).max(1e-12) > SAME_DIRECTION
+            });
+            if !alike {
+                strongest = strongest.max(projected(design, &base, &columns, &residual));
+            }
+        }
+        Some((real, strongest))
+    }
+
+    /// For every row the row of the same component whose time is shifted within its trial.
+    fn shifted(&self, random: &mut Random) -> Vec<usize> {
+        let rows = &self.design.rows.rows;
+        let width = self.setting.components.len();
+        let mut order = Vec::with_capacity(rows.len());
+        let mut start = 0;
+        while start < rows.len() {
+            let end = start + rows[start..].iter().take_while(|row| row.trial == rows[start].trial).count();
+            let bins = (end - start) / width;
+            let shift = ((0.25 + 0.5 * random.unit()) * bins as f64) as usize;
+            for bin in 0..bins {
+                let from = start + (bin + shift) % bins * width;
+                order.extend(from..from + width);
+            }
+            start = end;
+        }
+        order
+    }
+
+    /// The search: adds the best effect that passes, then swaps and deletes until nothing changes.
+    pub fn select(&self, library: &[Effect]) -> Vec<Member> {
+        let mut set: Vec<Member> = Vec::new();
+        while set.len() < self.config.most_effects {
+            let Some(best) = self.best_addition(&set, library) else { break };
+            set.push(best.member);
+            self.improve(&mut set, library);
+        }
+        if set.len() == 1 {
+            self.try_pairs(&mut set, library);
+        }
+        set.sort_by_key(|member| self.effect(member));
+        set
+    }
+
+    fn taken(&self, set: &[Member], effect: Effect) -> bool {
+        set.iter().any(|member| self.effect(member) == effect)
+    }
+
+    fn passes(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let judged = self.judge(set, effect).filter(|judged| judged.refused.is_none())?;
+        let mut whole = set.to_vec();
+        whole.push(judged.member.clone());
+        let (real, placebo) = self.beats_placebos(&whole, &judged.member)?;
+        (real > 1.05 * placebo).then_some(judged)
+    }
+
+    fn best_addition(&self, set: &[Member], library: &[Effect]) -> Option<Judged> {
+        let free = library.iter().filter(|effect| !self.taken(set, **effect));
+        let found = free.filter_map(|&effect| self.passes(set, effect));
+        found.min_by(|a, b| self.score(a, set).total_cmp(&self.score(b, set)).then(a.effect.cmp(&b.effect)))
+    }
+
+    /// Cross-validated loss, and a little for every number: among equals the simpler wins.
+    fn score(&self, judged: &Judged, set: &[Member]) -> f64 {
+        judged.cv_loss + self.price(self.columns(set).len() + judged.member.columns.len())
+    }
+
+    /// What `count` numbers cost in loss: Schwarz's criterion.
+    fn price(&self, count: usize) -> f64 {
+        let variance = self.floor_loss / self.design.y.len().max(1) as f64;
+        count as f64 * variance * (self.design.y.len().max(2) as f64).ln()
+    }
+
+    fn improve(&self, set: &mut Vec<Member>, library: &[Effect]) {
+        for _ in 0..6 {
+            if !self.swap_one(set, library) && !self.delete_one(set) {
+                return;
+            }
+        }
+    }
+
+    fn set_score(&self, set: &[Member]) -> f64 {
+        let columns = self.columns(set);
+        self.design.fit(&columns).map_or(f64::INFINITY, |f| f.cv_loss + self.price(columns.len()))
+    }
+
+    fn swap_one(&self, set: &mut Vec<Member>, library: &[Effect]) -> bool {
+        let now = self.set_score(set);
+        for index in 0..set.len() {
+            let mut others = set.clone();
+            let out = others.remove(index);
+            let Some(best) = self.best_addition(&others, library) else { continue };
+            if best.effect != self.effect(&out) && self.score(&best, &others) < now - 1e-9 * now.abs() {
+                others.push(best.member);
+                *set = others;
+                return true;
+            }
+            // the same effect, but in the form that suits the others
+            if best.effect == self.effect(&out) && best.member != out {
+                let score = self.score(&best, &others);
+                if score < now - 1e-6 * now.abs() {
+                    others.push(best.member);
+                    *set = others;
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn delete_one(&self, set: &mut Vec<Member>) -> bool {
+        if set.len() < 2 {
+            return false;
+        }
+        for index in 0..set.len() {
+            let mut others = set.clone();
+            let out = others.remove(index);
+            if self.passes(&others, self.effect(&out)).is_none() {
+                *set = others;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// One effect may stand for the sum of two that are both needed: every pair is looked at once.
+    fn try_pairs(&self, set: &mut Vec<Member>, library: &[Effect]) {
+        let now = self.set_score(set);
+        let mut best: Option<(f64, Vec<Member>)> = None;
+        for (index, &first) in library.iter().enumerate() {
+            let Some(a) = self.judge(&[], first) else { continue };
+            for &second in &library[index + 1..] {
+                let Some(b) = self.judge_quick(&[a.member.clone()], second) else { continue };
+                let pair = vec![a.member.clone(), b];
+                let score = self.set_score(&pair);
+                if score < best.as_ref().map_or(now, |(score, _)| *score) - 1e-6 * now.abs() {
+                    best = Some((score, pair));
+                }
+            }
+        }
+        if let Some((_, pair)) = best {
+            let effects: Vec<Effect> = pair.iter().map(|member| self.effect(member)).collect();
+            let Some(a) = self.passes(&pair[1..], effects[0]) else { return };
+            let Some(b) = self.passes(std::slice::from_ref(&a.member), effects[1]) else { return };
+            let found = vec![a.member, b.member];
+            if self.set_score(&found) < now {
+                *set = found;
+                self.improve(set, library);
+            }
+        }
+    }
+
+    /// The best form of an effect beside a set by least squares alone.
+    fn judge_quick(&self, set: &[Member], effect: Effect) -> Option<Member> {
+        let base = self.columns(set);
+        let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
+        let best = forms
+            .filter_map(|(index, candidate)| {
+                let mut columns = base.clone();
+                columns.extend(candidate.columns.iter().map(|(column, _)| *column));
+                Some((self.design.solve(&columns)?.1, index))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Member { candidate: best.1, columns: self.design.candidates[best.1].columns.clone() })
+    }
+
+    /// Sets in which one effect is exchanged that explain as much within two standard errors, with no more numbers.
+    pub fn alternatives(&self, set: &[Member], library: &[Effect]) -> Vec<Vec<Member>> {
+        let columns = self.columns(set);
+        let Some(fitted) = self.design.fit(&columns) else { return Vec::new() };
+        let explained = (self.design.empty_loss() - fitted.loss).max(0.0);
+        let mut found = Vec::new();
+        for index in 0..set.len() {
+            let mut others = set.to_vec();
+            let out = others.remove(index);
+            for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
+                let Some(judged) = self.passes(&others, effect) else { continue };
+                // what needs more numbers to say the same is no rival
+                if self.numbers(&judged.member) > self.numbers(&out) {
+                    continue;
+                }
+                let mut rival = others.clone();
+                rival.push(judged.member);
+                let Some((difference, error)) = self.difference(&rival, set) else { continue };
+                if difference <= (2.0 * error).max(0.01 * explained) {
+                    rival.sort_by_key(|member| self.effect(member));
+                    found.push((difference, rival));
+                }
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.into_iter().map(|(_, rival)| rival).collect()
+    }
+
+    /// Numbers that a member was fitted with, nonlinear ones included.
+    fn numbers(&self, member: &Member) -> usize {
+        let shape = match self.effect(member) {
+            Effect::SensorBiasStep => 1,
+            effect => effect.shape_names().len(),
+        };
+        member.columns.len() + shape
+    }
+
+    /// Cross-validated loss of one set over another, and its standard error from trial to trial.
+    fn difference(&self, rival: &[Member], set: &[Member]) -> Option<(f64, f64)> {
+        let (a, b) = (self.trial_losses(rival)?, self.trial_losses(set)?);
+        let differences: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
+        let count = differences.len() as f64;
+        let mean = differences.iter().sum::<f64>() / count;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        Some((mean * count, (variance * count).sqrt()))
+    }
+
+    fn trial_losses(&self, set: &[Member]) -> Option<Vec<f64>> {
+        let columns = self.columns(set);
+        let fitted = self.design.fit(&columns)?;
+        let design = self.design;
+        let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+        let mut losses = vec![0.0; trials];
+        for (row, place) in design.rows.rows.iter().enumerate() {
+            let beta = &fitted.fold_betas[design.block_fold[place.block]];
+            let sum: f64 = columns.iter().enumerate().map(|(i, &c)| beta[i] * design.x[(row, c)]).sum();
+            losses[place.trial] += (design.y[row] - sum).powi(2);
+        }
+        let used: Vec<f64> = design.trials.iter().map(|&trial| losses[trial]).collect();
+        Some(used)
+    }
+}
+
+/// Gain of columns that are no part of the design beside a base of which `residual` is what it leaves.
+fn projected(design: &Design, base: &[usize], columns: &[DVector<f64>], residual: &DVector<f64>) -> f64 {
+    let inverse = design.inverse(base);
+    let mut clean: Vec<DVector<f64>> = Vec::new();
+    for column in columns {
+        let mut column = column.clone();
+        if let Some(inverse) = inverse.as_ref().filter(|_| !base.is_empty()) {
+            let cross = DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&column)));
+            let weights = inverse * cross;
+            base.iter().enumerate().for_each(|(i, &c)| column.axpy(-weights[i], &design.x.column(c), 1.0));
+        }
+        clean.push(column);
+    }
+    let count = clean.len();
+    let ridge = 1e-9 * clean.iter().map(DVector::norm_squared).fold(0.0, f64::max);
+    let xx = DMatrix::from_fn(count, count, |i, j| {
+        clean[i].dot(&clean[j]) + if i == j { ridge } else { 0.0 }
+    });
+    let xy = DVector::from_iterator(count, clean.iter().map(|column| column.dot(residual)));
+    xx.cholesky().map_or(0.0, |factor| xy.dot(&factor.solve(&xy)))
+}

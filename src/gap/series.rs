@@ -1,0 +1,237 @@
+//! Trials as the workflow sees them: state, prediction and gap of every sample, and bins of samples.
+
+use std::ops::Range;
+
+use super::measurement::{measured, other_force};
+use super::statistics::white_variance;
+use super::{Config, GapError, Predicted};
+use crate::condition::Condition;
+use crate::effects::{Body, Immersion, Input};
+use crate::frame::Vec3;
+use crate::signal::{SavitzkyGolay, pieces};
+use crate::trials::{Trial, Trials, WRENCH};
+use crate::wrench::Wrench;
+
+/// One trial; a value a sample.
+#[derive(Debug, Clone)]
+pub(super) struct Series {
+    pub name: String,
+    pub t: Vec<f64>,
+    pub conditions: Vec<Condition>,
+    pub immersions: Vec<Immersion>,
+    pub yaw: Vec<f64>,
+    pub roll_pitch: Vec<[f64; 2]>,
+    pub wetting_rate: Vec<f64>,
+    pub wheels: Vec<[Option<f64>; 4]>,
+    /// Model's wrench; 0 where another simulator has no column of a component.
+    pub predicted: Vec<[f64; 6]>,
+    /// The model's own standard deviation.
+    pub uncertainty: Vec<[f64; 6]>,
+    /// Measured minus predicted; 0 for components that are not compared.
+    pub gap: Vec<[f64; 6]>,
+    /// Known other force on each component, where there is one.
+    pub other: Vec<[f64; 6]>,
+    /// Samples of each bin.
+    pub bins: Vec<Range<usize>>,
+    /// Bins of each run without a hole.
+    pub runs: Vec<Range<usize>>,
+}
+
+impl Series {
+    /// The state of a sample as an effect sees it.
+    pub fn input<'a>(
+        &'a self,
+        sample: usize,
+        body: &'a Body,
+        base_drag: Vec3,
+        channel_width: Option<f64>,
+    ) -> Input<'a> {
+        let p = &self.predicted[sample];
+        Input {
+            body,
+            condition: &self.conditions[sample],
+            immersion: &self.immersions[sample],
+            predicted: Wrench {
+                force: Vec3::new(p[0], p[1], p[2]),
+                moment: Vec3::new(p[3], p[4], p[5]),
+            },
+            base_drag,
+            yaw: self.yaw[sample],
+            wetting_rate: self.wetting_rate[sample],
+            channel_width,
+            wheel_speeds: self.wheels[sample],
+        }
+    }
+
+    /// Mean of a value over each bin.
+    pub fn binned(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mean = |bin: &Range<usize>| bin.clone().map(&value).sum::<f64>() / bin.len() as f64;
+        self.bins.iter().map(mean).collect()
+    }
+}
+
+/// Series by name, the components that are compared, and the trials that are only twins.
+pub(super) fn series(
+    trials: &Trials,
+    body: &Body,
+    predict: &mut dyn FnMut(&Condition) -> Predicted,
+    config: &Config,
+) -> Result<(Vec<Series>, Vec<usize>), GapError> {
+    let twins: Vec<&String> = trials.manifest.measured.dry_twins.values().collect();
+    let mut used: Vec<&Trial> =
+        trials.trials.iter().filter(|trial| !twins.contains(&&trial.name)).collect();
+    // the order in which the files came must not matter
+    used.sort_by(|a, b| a.name.cmp(&b.name));
+    let mut all = Vec::new();
+    let mut common: Option<[bool; 6]> = None;
+    for trial in used {
+        let (series, present) = of_trial(trials, trial, body, predict, config)?;
+        if !present.contains(&true) {
+            return Err(GapError::NothingMeasured { trial: trial.name.clone() });
+        }
+        if let Some(other) = common.filter(|other| *other != present) {
+            let component = (0..6).find(|&c| other[c] != present[c]).unwrap_or_default();
+            return Err(GapError::Components { trial: trial.name.clone(), component: WRENCH[component] });
+        }
+        common = Some(present);
+        all.push(series);
+    }
+    if all.len() < config.least_trials {
+        return Err(GapError::TooFewTrials { trials: all.len(), least: config.least_trials });
+    }
+    let present = common.unwrap_or_default();
+    Ok((all, (0..6).filter(|&c| present[c]).collect()))
+}
+
+fn of_trial(
+    trials: &Trials,
+    trial: &Trial,
+    body: &Body,
+    predict: &mut dyn FnMut(&Condition) -> Predicted,
+    config: &Config,
+) -> Result<(Series, [bool; 6]), GapError> {
+    let measured = measured(trials, trial, body.mass)?;
+    let simulated = trial.simulated.iter().any(Option::is_some);
+    let mut present: [bool; 6] = std::array::from_fn(|c| measured[c].is_some());
+    if simulated {
+        (0..6).for_each(|c| present[c] &= trial.simulated[c].is_some());
+    }
+    let count = trial.len();
+    let mut predicted = Vec::with_capacity(count);
+    let mut uncertainty = vec![[0.0; 6]; count];
+    let mut conditions = Vec::with_capacity(count);
+    let mut immersions = Vec::with_capacity(count);
+    for sample in 0..count {
+        let condition = trial.condition(sample, config.ground_contact);
+        let wrench = if simulated {
+            std::array::from_fn(|c| trial.simulated[c].as_ref().map_or(0.0, |column| column[sample]))
+        } else {
+            // on dry ground there is no water below the wheels
+            let wading = Condition { depth: condition.depth.max(0.0), ..condition };
+            let answer = predict(&wading);
+            uncertainty[sample] = answer.uncertainty;
+            let (f, m) = (answer.wrench.force, answer.wrench.moment);
+            [f.x, f.y, f.z, m.x, m.y, m.z]
+        };
+        if !wrench.iter().all(|value: &f64| value.is_finite()) {
+            return Err(GapError::NotFinite { trial: trial.name.clone(), row: trial.rows[sample] });
+        }
+        predicted.push(wrench);
+        let mut immersion = Immersion::default();
+        body.immerse(&condition, &mut immersion);
+        immersions.push(immersion);
+        conditions.push(condition);
+    }
+    smooth_accelerations(&trial.t, &mut conditions);
+    let other: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| other_force(trial, c));
+    let gap = (0..count).map(|i| {
+        std::array::from_fn(|c| match (&measured[c], present[c]) {
+            (Some(column), true) => column[i] - predicted[i][c],
+            _ => 0.0,
+        })
+    });
+    let (bins, runs) = bins(&trial.t, config.bin_s);
+    let series = Series {
+        name: trial.name.clone(),
+        gap: gap.collect(),
+        other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
+        wetting_rate: wetting_rate(&trial.t, &trial.depth),
+        wheels: (0..count)
+            .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
+            .collect(),
+        yaw: trial.yaw.clone(),
+        roll_pitch: trial.roll.iter().zip(&trial.pitch).map(|(r, p)| [*r, *p]).collect(),
+        t: trial.t.clone(),
+        conditions,
+        immersions,
+        predicted,
+        uncertainty,
+        bins,
+        runs,
+    };
+    Ok((series, present))
+}
+
+/// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
+const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
+
+/// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
+fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
+    let pieces = pieces(t);
+    for (angular, axis) in [false, true].into_iter().flat_map(|angular| (0..3).map(move |axis| (angular, axis))) {
+        let read = |c: &Condition| if angular { c.angular_acceleration[axis] } else { c.acceleration[axis] };
+        let values: Vec<f64> = conditions.iter().map(read).collect();
+        let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
+        let share = white_variance(&values) / power.max(f64::MIN_POSITIVE);
+        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else { continue };
+        for piece in &pieces {
+            let span = t[piece.end - 1] - t[piece.start];
+            let step = span / (piece.len().max(2) - 1) as f64;
+            let odd = (piece.len() - 1) / 2 * 2 + 1;
+            let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
+            let smooth = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
+            for (sample, value) in piece.clone().zip(smooth.into_iter().flatten()) {
+                let condition = &mut conditions[sample];
+                if angular {
+                    condition.angular_acceleration[axis] = value;
+                } else {
+                    condition.acceleration[axis] = value;
+                }
+            }
+        }
+    }
+}
+
+/// Rate of the depth, smoothed over about a third of a second: noise must not look like entry.
+fn wetting_rate(t: &[f64], depth: &[f64]) -> Vec<f64> {
+    let mut rate = Vec::with_capacity(t.len());
+    for piece in pieces(t) {
+        let (times, depth) = (&t[piece.clone()], &depth[piece]);
+        let count = times.len();
+        let step = (times[count - 1] - times[0]) / (count.max(2) - 1) as f64;
+        let window = ((0.33 / step.max(1e-6)) as usize).clamp(5, 101) | 1;
+        let window = window.min((count.max(1) - 1) / 2 * 2 + 1);
+        // jitter of the stamps moves the rate by less than noise does
+        let derivative = SavitzkyGolay::new(window, 2.min(window.saturating_sub(1)))
+            .and_then(|filter| filter.derivative(depth, 1, step))
+            .unwrap_or_else(|_| vec![0.0; count]);
+        rate.extend(derivative);
+    }
+    rate
+}
+
+/// Bins of about `length` within each run without a hole; at least one sample each.
+fn bins(t: &[f64], length: f64) -> (Vec<Range<usize>>, Vec<Range<usize>>) {
+    let (mut bins, mut runs) = (Vec::new(), Vec::new());
+    for piece in pieces(t) {
+        let first = bins.len();
+        let mut start = piece.start;
+        while start < piece.end {
+            let end = (start + 1..piece.end).find(|&i| t[i] - t[start] >= length * 0.999).unwrap_or(piece.end);
+            bins.push(start..end);
+            start = end;
+        }
+        runs.push(first..bins.len());
+    }
+    (bins, runs)
+}

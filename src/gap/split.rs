@@ -1,0 +1,76 @@
+//! Which trials take no part in naming, and how blocks are dealt into folds: both by what they excite.
+
+use super::Config;
+use super::design::Rows;
+use super::features::of_bins;
+use super::series::Series;
+use crate::train::random::Random;
+
+/// Means that tell what is excited.
+fn signature(bins: &[[f64; 9]]) -> [f64; 6] {
+    let mean = |of: &dyn Fn(&[f64; 9]) -> f64| bins.iter().map(of).sum::<f64>() / bins.len().max(1) as f64;
+    [
+        mean(&|f| f[0]),
+        mean(&|f| f[2]),
+        mean(&|f| f[3]),
+        mean(&|f| f[4]),
+        mean(&|f| f[5].max(0.0)),
+        mean(&|f| f[7].abs()),
+    ]
+}
+
+/// Orders items so that neighbors excite the same: by the feature that stands out most, then by its size.
+fn by_excitation(signatures: &[[f64; 6]]) -> Vec<(usize, usize)> {
+    let count = signatures.len() as f64;
+    let mean: [f64; 6] = std::array::from_fn(|f| signatures.iter().map(|s| s[f]).sum::<f64>() / count);
+    let std: [f64; 6] = std::array::from_fn(|f| {
+        let variance = signatures.iter().map(|s| (s[f] - mean[f]).powi(2)).sum::<f64>() / count;
+        variance.sqrt().max(1e-9 + 1e-6 * mean[f].abs())
+    });
+    let score = |s: &[f64; 6], f: usize| (s[f] - mean[f]) / std[f];
+    let mut order: Vec<(usize, usize)> = signatures
+        .iter()
+        .enumerate()
+        .map(|(index, s)| {
+            // depth is the base of all: it stands out only beyond the others
+            let class = (0..6).max_by(|&a, &b| score(s, a).total_cmp(&score(s, b))).unwrap_or_default();
+            (class, index)
+        })
+        .collect();
+    order.sort_by(|a, b| {
+        let value = |(class, index): &(usize, usize)| signatures[*index][*class];
+        a.0.cmp(&b.0).then(value(a).total_cmp(&value(b))).then(a.1.cmp(&b.1))
+    });
+    order
+}
+
+/// Trials for naming and those kept back. A kind of excitation that fewer than three trials have stays with naming.
+pub(super) fn hold_out(all: &[Series], config: &Config) -> (Vec<usize>, Vec<usize>) {
+    let signatures: Vec<[f64; 6]> = all.iter().map(|s| signature(&of_bins(s))).collect();
+    let order = by_excitation(&signatures);
+    let wanted = ((all.len() as f64 * config.held_out).round() as usize).clamp(1, all.len() - 2);
+    let sizes: Vec<usize> = (0..6).map(|class| order.iter().filter(|(c, _)| *c == class).count()).collect();
+    let free: Vec<usize> = order.iter().filter(|(class, _)| sizes[*class] >= 3).map(|(_, i)| *i).collect();
+    let free = if free.len() > wanted { free } else { order.iter().map(|(_, i)| *i).collect() };
+    let stride = free.len() as f64 / wanted as f64;
+    let start = Random::new(config.seed ^ 0x4e1d).unit();
+    let mut held: Vec<usize> =
+        (0..wanted).map(|k| free[((k as f64 + start) * stride) as usize % free.len()]).collect();
+    held.sort_unstable();
+    held.dedup();
+    let naming = (0..all.len()).filter(|index| !held.contains(index)).collect();
+    (naming, held)
+}
+
+/// Fold of each block.
+pub(super) fn folds(all: &[Series], rows: &Rows, config: &Config) -> Vec<usize> {
+    let features: Vec<Vec<[f64; 9]>> = all.iter().map(of_bins).collect();
+    let signatures: Vec<[f64; 6]> = (0..rows.blocks)
+        .map(|block| signature(&features[rows.block_trial[block]][rows.block_bins[block].clone()]))
+        .collect();
+    let mut fold = vec![0; rows.blocks];
+    for (place, (_, block)) in by_excitation(&signatures).into_iter().enumerate() {
+        fold[block] = place % config.folds;
+    }
+    fold
+}

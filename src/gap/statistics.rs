@@ -1,0 +1,84 @@
+//! Small numbers about numbers.
+
+/// Median; 0 for none.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Quantile by the nearest rank; 0 for none.
+pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    values.sort_by(f64::total_cmp);
+    values[((values.len() - 1) as f64 * share).round() as usize]
+}
+
+/// Variance of white noise on an otherwise smooth signal, from third differences, which a parabola has none of:
+/// `var(x0 - 3 x1 + 3 x2 - x3) = 20 var(noise)`.
+pub(super) fn white_variance(values: &[f64]) -> f64 {
+    if values.len() < 4 {
+        return 0.0;
+    }
+    let squares = values.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).powi(2));
+    squares.sum::<f64>() / (20.0 * (values.len() - 3) as f64)
+}
+
+/// Probability that a normal variable is further from 0 than `z`, both sides (Abramowitz and Stegun 7.1.26, and its
+/// asymptotic form beyond 5, where the former has lost its digits).
+pub(super) fn normal_tails(z: f64) -> f64 {
+    let x = z.abs() / std::f64::consts::SQRT_2;
+    if x > 3.5 {
+        return (-x * x).exp() / (x * std::f64::consts::PI.sqrt()) * (1.0 - 0.5 / (x * x));
+    }
+    let t = 1.0 / (1.0 + 0.327_591_1 * x);
+    let polynomial =
+        t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
+    (polynomial * (-x * x).exp()).max(0.0)
+}
+
+/// Deviate that is exceeded, both sides, with a probability.
+pub(super) fn deviate_of(probability: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 40.0);
+    while high - low > 1e-6 {
+        let middle = 0.5 * (low + high);
+        if normal_tails(middle) > probability { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// Normal deviate as rare as Student's `t` with `freedom` degrees (Wallace 1959, as in Johnson and Kotz).
+pub(super) fn normal_from_student(t: f64, freedom: f64) -> f64 {
+    let n = freedom.max(1.0);
+    let root = (n * (1.0 + t * t / n).ln()).sqrt();
+    (8.0 * n + 1.0) / (8.0 * n + 3.0) * root
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tails_agree_with_the_tables() {
+        for (z, p) in [(1.959_964, 0.05), (2.575_829, 0.01), (4.891_638, 1e-6), (6.109_41, 1e-9)] {
+            assert!((normal_tails(z) / p - 1.0).abs() < 0.02, "{z}");
+        }
+        // Student's two-sided 1 % point for 10 degrees is 3.169, for 50 degrees 2.678
+        for (t, freedom) in [(3.169, 10.0), (2.678, 50.0)] {
+            assert!((normal_tails(normal_from_student(t, freedom)) / 0.01 - 1.0).abs() < 0.05);
+        }
+    }
+
+    #[test]
+    fn white_noise_is_told_from_a_parabola() {
+        let mut random = crate::train::random::Random::new(1);
+        let values: Vec<f64> = (0..4000)
+            .map(|i| (random.unit() - 0.5) * 12_f64.sqrt() * 2.0 + 1e-3 * f64::from(i * i) / 100.0)
+            .collect();
+        assert!((white_variance(&values).sqrt() - 2.0).abs() < 0.1);
+    }
+}
