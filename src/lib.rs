@@ -11,7 +11,7 @@
 //! the network ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and
 //! held against ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from
 //! ([`cfd`]), what learns it ([`train`]), judges it by held-out cases ([`evaluate`]), holds it against measured motion
-//! ([`validate`]) and scores tools that name what is missing ([`gap_bench`]), the settings ([`config`]) and the server
+//! ([`validate`]), names what it lacks ([`gap`]) and scores tools that name what is missing ([`gap_bench`]), the settings ([`config`]) and the server
 //! as a whole ([`server`]).
 
 pub mod condition;
@@ -45,9 +45,9 @@ pub mod states;
 
 pub mod cfd;
 pub mod evaluate;
+pub mod gap;
 pub mod gap_bench;
 pub mod train;
-pub mod gap;
 pub mod validate;
 
 pub mod config;

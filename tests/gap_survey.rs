@@ -13,7 +13,13 @@ fn scaled(name: &str, strength: f64, motions: &[Vec<planted::State>]) -> (Vec<Ve
     let size = rms(&unit);
     // the strongest measured component is `strength` times its noise
     let ratio = [0, 2, 4, 5].map(|c| size[c] / NOISE[c]).into_iter().fold(0.0, f64::max);
-    let factor = if name == "none" { 0.0 } else if name == "sensor_delay" || name == "current" { 1.0 } else { strength / ratio };
+    let factor = if name == "none" {
+        0.0
+    } else if name == "sensor_delay" || name == "current" {
+        1.0
+    } else {
+        strength / ratio
+    };
     let scaled = unit.into_iter().map(|t| t.into_iter().map(|w| w.map(|v| v * factor)).collect()).collect();
     (scaled, factor)
 }
@@ -33,12 +39,17 @@ fn survey() {
             let trials = trials(&motions, &added, &Noise::white(NOISE), seed);
             let body = gap::body_of(&trials).expect("a body");
             let start = std::time::Instant::now();
-            let report = gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs");
+            let report =
+                gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs");
             let effects: Vec<String> = report
                 .effects
                 .iter()
                 .map(|e| {
-                    let p: Vec<String> = e.parameters.iter().map(|(n, p)| format!("{n}={:.4}±{:.4}", p.value, p.std)).collect();
+                    let p: Vec<String> = e
+                        .parameters
+                        .iter()
+                        .map(|(n, p)| format!("{n}={:.4}±{:.4}", p.value, p.std))
+                        .collect();
                     format!("{}[{}] {:.2}", e.name, p.join(" "), e.share_of_gap)
                 })
                 .collect();

@@ -271,7 +271,7 @@ impl Running<'_> {
         let speeds = internal_vectors(&text).into_iter().map(|u| u[0].hypot(u[1]).hypot(u[2]));
         // NaN is larger than anything here: max() alone would drop it
         let speed = speeds.fold(0.0, |most, speed: f64| if speed <= most { most } else { speed });
-        if inflow > 0.0 && !(speed <= FASTEST * inflow) {
+        if inflow > 0.0 && (speed.is_nan() || speed > FASTEST * inflow) {
             return Err(SolveError::PotentialFlow { speed, inflow });
         }
         let head = text.split("boundaryField").next().unwrap_or_default();

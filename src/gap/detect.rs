@@ -12,7 +12,7 @@ use super::series::Series;
 use super::statistics::{median, quantile, white_variance};
 use super::{Config, noise::Floor};
 use crate::effects::Effect;
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::trials::{Manifest, WRENCH};
 
 /// Deviates that an effect must have to be named nine times of ten: the bar, and 1.28 for the power.
@@ -125,7 +125,8 @@ fn of_effect(
     if found.not_testable.is_some() {
         return found;
     }
-    let forms: Vec<usize> = (0..design.candidates.len()).filter(|&i| design.candidates[i].effect == effect).collect();
+    let forms: Vec<usize> =
+        (0..design.candidates.len()).filter(|&i| design.candidates[i].effect == effect).collect();
     let Some(&form) = forms.get(forms.len() / 2) else {
         found.not_testable = Some(not_excited(effect).into());
         return found;

@@ -150,7 +150,8 @@ impl General {
             shares[j] += xy[j].powi(2) / xx[(j, j)].max(1e-12);
         }
         let freedom = (rows.len() as f64 / (rows.len() as f64 - count as f64).max(1.0)).max(1.0);
-        sum.loss += solve(&xx, &xy).map_or(y.norm_squared(), |beta| (&y - &x * beta).norm_squared()) * freedom;
+        sum.loss +=
+            solve(&xx, &xy).map_or(y.norm_squared(), |beta| (&y - &x * beta).norm_squared()) * freedom;
         for fold in 0..folds {
             let inside: Vec<usize> = (0..rows.len()).filter(|&i| fold_of(rows[i]) == fold).collect();
             let part = DMatrix::from_fn(inside.len(), count, |i, j| x[(inside[i], j)]);
@@ -177,7 +178,9 @@ fn functions() -> Vec<(&'static str, Function)> {
         ("forward velocity squared with its sign", |s, i, _| {
             s.conditions[i].velocity.x * s.conditions[i].velocity.norm()
         }),
-        ("lateral velocity times speed", |s, i, _| s.conditions[i].velocity.y * s.conditions[i].velocity.norm()),
+        ("lateral velocity times speed", |s, i, _| {
+            s.conditions[i].velocity.y * s.conditions[i].velocity.norm()
+        }),
         ("speed squared", |s, i, _| s.conditions[i].velocity.norm_squared()),
         ("speed cubed", |s, i, _| s.conditions[i].velocity.norm().powi(3)),
         ("forward velocity times speed squared", |s, i, _| {

@@ -15,7 +15,7 @@ use super::select::Member;
 use super::series::Series;
 use super::statistics::{quantile, white_variance};
 use crate::effects::{Effect, Shape};
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Fewest trials, in effect, that let an interval rest on the scatter between trials.
 const ENOUGH_TRIALS: f64 = 8.0;
@@ -67,10 +67,8 @@ pub(super) fn fit(
         .flat_map(|(m, member)| member.columns.iter().map(move |&(column, k)| (m, column, k)))
         .collect();
     let columns: Vec<usize> = used.iter().map(|(_, column, _)| *column).collect();
-    let noise: Vec<f64> = used
-        .iter()
-        .map(|&(m, _, k)| noise_share(design, &set[m], k, all, setting))
-        .collect();
+    let noise: Vec<f64> =
+        used.iter().map(|&(m, _, k)| noise_share(design, &set[m], k, all, setting)).collect();
     let clusters = clusters(design, &columns);
     let (beta, _) = design.solve(&columns)?;
     let errors = errors(design, &columns, &design.residual(&columns, &beta))?;
@@ -168,7 +166,13 @@ fn bootstrap(groups: &[Group], noise: &[f64], config: &Config) -> Vec<DVector<f6
 }
 
 /// Share of noise in the variance of a column of accelerations, after the design's smoothing.
-fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Series], setting: &Setting) -> f64 {
+fn noise_share(
+    design: &Design,
+    member: &Member,
+    coefficient: usize,
+    all: &[Series],
+    setting: &Setting,
+) -> f64 {
     let candidate = &design.candidates[member.candidate];
     if !matches!(candidate.effect, Effect::AddedMass | Effect::MassError) {
         return 0.0;

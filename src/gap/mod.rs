@@ -33,9 +33,7 @@ pub use fit::Parameter;
 pub use holdout::{Closure, Worse};
 pub use locate::{Condition as RegionCondition, Region};
 pub use noise::{Floor, FloorSource};
-pub use report::{
-    GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict,
-};
+pub use report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 pub use run::{body_of, run};
 pub use select::Refusal;
 

@@ -78,8 +78,7 @@ pub fn run(
         .collect();
     let noise = row_noise(&all, &naming, &setting.components, &floors, smoothing(&all, &naming));
     let deal = |rows: &super::design::Rows| folds(&all, rows, config);
-    let mut design =
-        Design::new(&all, naming, &setting, &forms, noise, config.block_s, deal, config.folds);
+    let mut design = Design::new(&all, naming, &setting, &forms, noise, config.block_s, deal, config.folds);
     if design.rows.blocks < 2 * config.folds {
         let (blocks, block_s, folds) = (design.rows.blocks, config.block_s, config.folds);
         return Err(GapError::TooShort { blocks, block_s, folds });
@@ -257,7 +256,8 @@ fn iterate(
 ) {
     for _ in 0..times {
         let own = design.candidates[candidate].columns.clone();
-        let columns: Vec<usize> = own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
+        let columns: Vec<usize> =
+            own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
         let Some((beta, _)) = design.solve(&columns) else { return };
         let effect = design.candidates[candidate].effect;
         let mut shape = design.candidates[candidate].shape;
@@ -299,7 +299,8 @@ fn search(
     others: &[usize],
     axes: &[usize],
 ) {
-    let columns: Vec<usize> = member.columns.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
+    let columns: Vec<usize> =
+        member.columns.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
     let memory = design.candidates[member.candidate].effect == Effect::WaveMemory;
     let shortest = if memory { 0.8 * (setting.body.length / GRAVITY).sqrt() } else { 0.0 };
     let loss = |design: &Design| design.solve(&columns).map_or(f64::INFINITY, |(_, loss)| loss);
@@ -370,15 +371,8 @@ fn report(
         Verdict::NothingMissing => (Vec::new(), 0),
         _ => locate::locate(all, &design.trials, gap_excess, config),
     };
-    let excitation = detect::excitations(
-        design,
-        all,
-        setting,
-        &trials.manifest,
-        &found.residual,
-        &Effect::ALL,
-        config,
-    );
+    let excitation =
+        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &Effect::ALL, config);
     let not_testable = excitation.iter().filter_map(not_testable).collect();
     let alternatives: Vec<Vec<&'static str>> = match holds {
         true => found.alternatives.iter().map(|set| names(judge, set)).collect(),
@@ -450,8 +444,10 @@ fn named_effects(
             let spec = &specs[coefficient];
             let std = fitted.covariance[(first + i, first + i)].max(0.0).sqrt();
             let interval = fitted.intervals[first + i];
-            parameters
-                .insert(spec.name, Parameter { value, std, unit: spec.unit, interval, literature: spec.literature });
+            parameters.insert(
+                spec.name,
+                Parameter { value, std, unit: spec.unit, interval, literature: spec.literature },
+            );
         }
         for (axis, &(name, unit)) in one.effect.shape_names().iter().enumerate() {
             let (value, std) = (one.shape[axis], fitted.shape_std[index][axis]);
@@ -493,7 +489,8 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
                 effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
             }
             effects::basis(named.effect, &named.shape, &memory, &input, |coefficient, part, load| {
-                let value = named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
+                let value =
+                    named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
                 let name = match part {
                     Part::Panel(panel) => setting.body.panels[panel].name.clone(),
                     Part::Hull => "hull".to_owned(),
@@ -539,7 +536,11 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
     let loss = if holds { found.loss } else { judge.design.empty_loss() };
     let noise = judge.floor_loss.min(loss) / whole;
     let explained = (1.0 - loss / whole).max(0.0);
-    BTreeMap::from([("noise", noise), ("explained", explained), ("unexplained", (1.0 - noise - explained).max(0.0))])
+    BTreeMap::from([
+        ("noise", noise),
+        ("explained", explained),
+        ("unexplained", (1.0 - noise - explained).max(0.0)),
+    ])
 }
 
 fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
@@ -645,16 +646,15 @@ fn traces(named: &[Named], all: &[Series], setting: &Setting, floors: &[Floor; 6
 }
 
 fn summary(report: &Report) -> String {
-    let names = |effects: &[NamedEffect]| {
-        effects.iter().map(|e| e.name).collect::<Vec<_>>().join(" and ")
-    };
+    let names = |effects: &[NamedEffect]| effects.iter().map(|e| e.name).collect::<Vec<_>>().join(" and ");
     let closed = report.gap.held_out.get("all").and_then(|all| all.closure);
     let closed = closed.map_or_else(String::new, |c| {
         format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c)
     });
     match report.verdict {
         Verdict::NothingMissing => {
-            "Nothing is missing that these trials can show: the gap holds no structure beyond its noise.".into()
+            "Nothing is missing that these trials can show: the gap holds no structure beyond its noise."
+                .into()
         }
         Verdict::Named => format!("The gap is {}.{closed}", names(&report.effects)),
         Verdict::Ambiguous => format!(
@@ -663,8 +663,8 @@ fn summary(report: &Report) -> String {
             report.alternatives.iter().map(|set| set.join(" and ")).collect::<Vec<_>>().join(", or "),
         ),
         Verdict::NoCandidateFits => {
-            "There is a gap with structure, and no effect of the library explains it; nothing is applied.".into()
+            "There is a gap with structure, and no effect of the library explains it; nothing is applied."
+                .into()
         }
     }
 }
-

@@ -12,7 +12,7 @@ use super::noise::Floor;
 use super::robust::{Error, errors};
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Least deviate of a column that stays in a group.
 const COLUMN_DEVIATE: f64 = 4.0;
@@ -178,7 +178,9 @@ impl Judge<'_> {
         let mut squares = [0.0; 6];
         let mut count = [0.0; 6];
         for (row, place) in design.rows.rows.iter().enumerate() {
-            let of = |(i, (column, _)): (usize, &(usize, usize))| fitted.beta[first + i] * design.x[(row, *column)];
+            let of = |(i, (column, _)): (usize, &(usize, usize))| {
+                fitted.beta[first + i] * design.x[(row, *column)]
+            };
             let value: f64 = member.columns.iter().enumerate().map(of).sum();
             squares[place.component] += (value * design.noise.bin[place.component]).powi(2);
             count[place.component] += 1.0;
@@ -494,7 +496,8 @@ fn projected(design: &Design, base: &[usize], columns: &[DVector<f64>], residual
     for column in columns {
         let mut column = column.clone();
         if let Some(inverse) = inverse.as_ref().filter(|_| !base.is_empty()) {
-            let cross = DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&column)));
+            let cross =
+                DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&column)));
             let weights = inverse * cross;
             base.iter().enumerate().for_each(|(i, &c)| column.axpy(-weights[i], &design.x.column(c), 1.0));
         }
@@ -502,9 +505,8 @@ fn projected(design: &Design, base: &[usize], columns: &[DVector<f64>], residual
     }
     let count = clean.len();
     let ridge = 1e-9 * clean.iter().map(DVector::norm_squared).fold(0.0, f64::max);
-    let xx = DMatrix::from_fn(count, count, |i, j| {
-        clean[i].dot(&clean[j]) + if i == j { ridge } else { 0.0 }
-    });
+    let xx =
+        DMatrix::from_fn(count, count, |i, j| clean[i].dot(&clean[j]) + if i == j { ridge } else { 0.0 });
     let xy = DVector::from_iterator(count, clean.iter().map(|column| column.dot(residual)));
     xx.cholesky().map_or(0.0, |factor| xy.dot(&factor.solve(&xy)))
 }

@@ -51,10 +51,7 @@ impl Series {
             body,
             condition: &self.conditions[sample],
             immersion: &self.immersions[sample],
-            predicted: Wrench {
-                force: Vec3::new(p[0], p[1], p[2]),
-                moment: Vec3::new(p[3], p[4], p[5]),
-            },
+            predicted: Wrench { force: Vec3::new(p[0], p[1], p[2]), moment: Vec3::new(p[3], p[4], p[5]) },
             base_drag,
             yaw: self.yaw[sample],
             wetting_rate: self.wetting_rate[sample],
@@ -78,8 +75,7 @@ pub(super) fn series(
     config: &Config,
 ) -> Result<(Vec<Series>, Vec<usize>), GapError> {
     let twins: Vec<&String> = trials.manifest.measured.dry_twins.values().collect();
-    let mut used: Vec<&Trial> =
-        trials.trials.iter().filter(|trial| !twins.contains(&&trial.name)).collect();
+    let mut used: Vec<&Trial> = trials.trials.iter().filter(|trial| !twins.contains(&&trial.name)).collect();
     // the order in which the files came must not matter
     used.sort_by(|a, b| a.name.cmp(&b.name));
     let mut all = Vec::new();
@@ -178,12 +174,16 @@ const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
 /// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
 fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
     let pieces = pieces(t);
-    for (angular, axis) in [false, true].into_iter().flat_map(|angular| (0..3).map(move |axis| (angular, axis))) {
+    for (angular, axis) in
+        [false, true].into_iter().flat_map(|angular| (0..3).map(move |axis| (angular, axis)))
+    {
         let read = |c: &Condition| if angular { c.angular_acceleration[axis] } else { c.acceleration[axis] };
         let values: Vec<f64> = conditions.iter().map(read).collect();
         let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
         let share = white_variance(&values) / power.max(f64::MIN_POSITIVE);
-        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else { continue };
+        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else {
+            continue;
+        };
         for piece in &pieces {
             let span = t[piece.end - 1] - t[piece.start];
             let step = span / (piece.len().max(2) - 1) as f64;
@@ -227,7 +227,8 @@ fn bins(t: &[f64], length: f64) -> (Vec<Range<usize>>, Vec<Range<usize>>) {
         let first = bins.len();
         let mut start = piece.start;
         while start < piece.end {
-            let end = (start + 1..piece.end).find(|&i| t[i] - t[start] >= length * 0.999).unwrap_or(piece.end);
+            let end =
+                (start + 1..piece.end).find(|&i| t[i] - t[start] >= length * 0.999).unwrap_or(piece.end);
             bins.push(start..end);
             start = end;
         }

@@ -36,8 +36,9 @@ pub(super) fn normal_tails(z: f64) -> f64 {
         return (-x * x).exp() / (x * std::f64::consts::PI.sqrt()) * (1.0 - 0.5 / (x * x));
     }
     let t = 1.0 / (1.0 + 0.327_591_1 * x);
-    let polynomial =
-        t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
+    let polynomial = t
+        * (0.254_829_592
+            + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
     (polynomial * (-x * x).exp()).max(0.0)
 }
 
@@ -75,7 +76,7 @@ mod tests {
 
     #[test]
     fn white_noise_is_told_from_a_parabola() {
-        let mut random = crate::train::random::Random::new(1);
+        let mut random = crate::random::Random::new(1);
         let values: Vec<f64> = (0..4000)
             .map(|i| (random.unit() - 0.5) * 12_f64.sqrt() * 2.0 + 1e-3 * f64::from(i * i) / 100.0)
             .collect();

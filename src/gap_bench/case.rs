@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::hidden::{Effect, Hidden, Kind, LIBRARY, OUTSIDE};
 use super::schedule::Maneuver::{self, *};
 use super::{Feature, NoiseKind, Plan, Region};
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Sort of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

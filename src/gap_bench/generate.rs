@@ -8,8 +8,8 @@ use super::noise::{CELL, QUANTUM, SmoothError, left_by_dropouts, of_wrench, reco
 use super::track::DENSITY;
 use super::{NoiseKind, Region, Schedule, Simulator, State, Track, Wrench6};
 use crate::frame::Vec3;
+use crate::random::Random;
 use crate::signal::{SavitzkyGolay, UniformGrid, interpolate, pieces};
-use crate::train::random::Random;
 use crate::trials::{Body, Gap, Manifest, Measured, Method, Trial, Trials, WRENCH};
 
 /// Width of the channel [m].

@@ -1,7 +1,7 @@
 //! The same data told in another way: an answer must not change.
 
 use crate::frame::Vec3;
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::trials::{Trial, Trials};
 
 /// The trials in another order.

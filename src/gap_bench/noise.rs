@@ -2,8 +2,8 @@
 
 use super::{Track, Wrench6};
 use crate::frame::Vec3;
+use crate::random::Random;
 use crate::signal::SavitzkyGolay;
-use crate::train::random::Random;
 
 /// Gaussian numbers with mean 0 and variance 1, by the polar method (Marsaglia and Bray, 1964).
 #[derive(Debug, Clone)]

@@ -11,7 +11,7 @@ use super::case::{Case, Family};
 use super::generate::generate;
 use super::score::Judged;
 use super::{Schedule, Simulator, folder, invariance};
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::trials::Trials;
 
 /// A tool that is scored: trials in, an answer or the reason for none out.

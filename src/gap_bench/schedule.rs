@@ -2,7 +2,7 @@
 
 use super::profile::Profile;
 use super::track::{Motion, Track, of_run};
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::validate::generated::{self, Run};
 use crate::vehicle::Vehicle;
 

@@ -9,7 +9,7 @@ use super::case::{Case, Family};
 use super::generate::{Generated, inside};
 use super::hidden::Parameter;
 use super::{NoiseKind, Region};
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Two-sided 90 % of a normal distribution.
 const Z90: f64 = 1.645;

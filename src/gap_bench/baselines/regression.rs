@@ -220,7 +220,7 @@ mod tests {
 
     use super::*;
     use crate::gap_bench::Gaussian;
-    use crate::train::random::Random;
+    use crate::random::Random;
 
     /// y = 2 x0 - 3 x3 with noise, six independent columns.
     fn planted(noise: f64) -> Vec<Normal> {

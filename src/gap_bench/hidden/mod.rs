@@ -19,7 +19,7 @@ use serde::Serialize;
 pub use truth::{Parameter, parameters};
 
 use super::{Simulator, Track, Wrench6};
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Something that can be hidden.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
