@@ -125,6 +125,11 @@ impl Schedule {
         Self { runs: full.runs.into_iter().step_by(6).collect(), rate: 37.0, duration: 7.0 }
     }
 
+    /// The same with 1,000 samples in each trial that is not the paper's.
+    pub(super) fn of_thousand_samples(&self) -> Self {
+        Self { rate: 111.0, duration: 9.0, ..self.clone() }
+    }
+
     /// The motions of a plan in the order of a session, random within each way of moving.
     pub(super) fn tracks(&self, plan: &Plan, wheel_radius: f64, random: &mut Random) -> Vec<Track> {
         let paper = self.runs.iter().filter(|_| plan.paper);
