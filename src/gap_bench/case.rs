@@ -62,7 +62,7 @@ pub struct Case {
     pub gate: Option<Region>,
     /// The trials.
     pub plan: Plan,
-    /// The effect that the trials cannot tell from the hidden one.
+    /// The effect that no trial, or none of these, can tell from the hidden one.
     pub twin: Option<Effect>,
     /// True where further trials of the plan tell the two apart.
     pub resolved: bool,
@@ -212,6 +212,8 @@ fn case(family: Family, index: usize, random: &mut Random) -> Case {
             case.strength = [3.0, 1.0, 0.3][index / LIBRARY.len() % 3];
             case.hidden = vec![Hidden::draw(effect, random)];
             case.inferred = effect.kind() == Kind::Drive;
+            // all that is measured is proportional to the density
+            case.twin = (effect == Effect::DensityError).then_some(Effect::SensorGain);
         }
         Family::Set => {
             let mut effects = SETTABLE;
@@ -253,6 +255,7 @@ fn confound(case: &mut Case, index: usize, random: &mut Random) {
     let mut hidden = Hidden::draw(effect, random);
     match effect {
         Effect::SensorBias => hidden.shape[0] = pair.component,
+        Effect::SensorGain => hidden.shape[0] = -1.0,
         // with or against the motion
         Effect::Current => hidden.shape[0] = if random.unit() < 0.5 { 0.0 } else { std::f64::consts::PI },
         _ => {}

@@ -14,8 +14,10 @@ use crate::trials::{Body, Gap, Manifest, Measured, Method, Trial, Trials, WRENCH
 
 /// Width of the channel [m].
 const CHANNEL: f64 = 3.0;
-/// How much better or worse than the stated instruments those of a case may be.
-const INSTRUMENTS: [f64; 2] = [0.1, 3.0];
+/// How much better or worse than the stated load cell that of a case may be.
+const INSTRUMENTS: [f64; 2] = [0.1, 20.0];
+/// How much worse than stated the cameras may be: they do not get as bad as an inferred wrench.
+const CAMERAS: f64 = 3.0;
 /// Column of the drive force where the wrench is inferred.
 pub const DRIVE: &str = "drive_fx";
 /// Draft that the body's table states for the generated box [m].
@@ -99,7 +101,7 @@ impl Scene<'_> {
         let (mut tracks, mut predicted, mut noise) = (Vec::new(), Vec::new(), Vec::new());
         for track in self.tracks {
             let mut random = random.fork();
-            let recorded = recorded(track, scale, &mut random);
+            let recorded = recorded(track, scale.min(CAMERAS), &mut random);
             let simulator = &self.setting.simulator;
             predicted.push(recorded.states.iter().map(|state| simulator.predict(state)).collect::<Vec<_>>());
             let mut cell = of_wrench(kind, track, scale, &mut random);

@@ -19,7 +19,7 @@ impl Gaussian {
     }
 
     /// The next number.
-    pub fn next(&mut self) -> f64 {
+    pub fn draw(&mut self) -> f64 {
         if let Some(spare) = self.spare.take() {
             return spare;
         }
@@ -81,7 +81,7 @@ pub(super) fn recorded(track: &Track, scale: f64, random: &mut Random) -> Track 
     let count = track.states.len();
     let ratio = (CAMERA_RATE * track.step).round().max(1.0) as usize;
     let mut channel = |std: f64| {
-        let white: Vec<f64> = (0..count * ratio).map(|_| std * scale * gaussian.next()).collect();
+        let white: Vec<f64> = (0..count * ratio).map(|_| std * scale * gaussian.draw()).collect();
         let step = track.step / ratio as f64;
         let filter = SavitzkyGolay::new(9, 2);
         let of = |order| filter.as_ref().ok().and_then(|f| f.derivative(&white, order, step).ok());
@@ -99,7 +99,7 @@ pub(super) fn recorded(track: &Track, scale: f64, random: &mut Random) -> Track 
         state.angular_velocity += Vec3::from_fn(|axis, _| angle[axis][1][i]);
         state.depth -= place[2][0][i];
         (0..3).for_each(|axis| state.attitude[axis] += angle[axis][0][i]);
-        state.wheels.iter_mut().for_each(|speed| *speed += WHEEL * scale * wheels.next());
+        state.wheels.iter_mut().for_each(|speed| *speed += WHEEL * scale * wheels.draw());
     }
     recorded
 }
@@ -108,7 +108,7 @@ pub(super) fn recorded(track: &Track, scale: f64, random: &mut Random) -> Track 
 pub(super) fn of_wrench(kind: NoiseKind, track: &Track, scale: f64, random: &mut Random) -> Vec<Wrench6> {
     let mut gaussian = Gaussian::new(random.fork());
     let std = Wrench6::from(CELL) * scale;
-    let mut next = || Wrench6::from_fn(|_, _| gaussian.next()).component_mul(&std);
+    let mut next = || Wrench6::from_fn(|_, _| gaussian.draw()).component_mul(&std);
     let offset = next() * if kind == NoiseKind::Offsets { 1.0 } else { 0.0 };
     let kept = if kind == NoiseKind::Colored { (-track.step / MEMORY).exp() } else { 0.0 };
     let fresh = (1.0 - kept * kept).sqrt();
@@ -150,7 +150,7 @@ impl SmoothError {
     pub fn new(random: &mut Random) -> Self {
         let mut gaussian = Gaussian::new(random.fork());
         let wave = |_| {
-            let mut row = [0; 6].map(|_| gaussian.next());
+            let mut row = [0; 6].map(|_| gaussian.draw());
             row[4] = std::f64::consts::TAU * random.unit();
             row
         };
@@ -207,8 +207,7 @@ mod tests {
                 let values: Vec<f64> = noise.iter().map(|n| n[component]).collect();
                 let (mean, std) = moments(&values);
                 assert!(mean.abs() < 0.08 * stated && (std / (0.5 * stated) - 1.0).abs() < 0.06, "{kind:?}");
-                let expected =
-                    if kind == NoiseKind::White { 0.0 } else { (-1.0 / 111.0 / MEMORY as f64).exp() };
+                let expected = if kind == NoiseKind::White { 0.0 } else { (-1.0 / 111.0 / MEMORY).exp() };
                 assert!((autocorrelation(&values, 1) - expected).abs() < 0.03);
             }
         }

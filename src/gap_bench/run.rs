@@ -66,9 +66,11 @@ pub fn run(
     invariance: usize,
     progress: &mut dyn FnMut(Progress),
 ) -> Vec<Outcome> {
+    let fine = schedule.of_thousand_samples();
     let mut outcomes = vec![Outcome::default(); tools.len()];
     for (index, case) in cases.iter().enumerate() {
         progress(Progress { case: &case.name, done: [index, cases.len()] });
+        let schedule = if case.family == Family::Timing { &fine } else { schedule };
         let generated = generate(case, schedule, simulator);
         for ((_, tool), outcome) in tools.iter().zip(&mut outcomes) {
             let start = Instant::now();

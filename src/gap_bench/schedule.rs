@@ -125,6 +125,11 @@ impl Schedule {
         Self { runs: full.runs.into_iter().step_by(6).collect(), rate: 37.0, duration: 7.0 }
     }
 
+    /// The same with 1,000 samples in each trial that is not the paper's.
+    pub(super) fn of_thousand_samples(&self) -> Self {
+        Self { rate: 111.0, duration: 9.0, ..self.clone() }
+    }
+
     /// The motions of a plan in the order of a session, random within each way of moving.
     pub(super) fn tracks(&self, plan: &Plan, wheel_radius: f64, random: &mut Random) -> Vec<Track> {
         let paper = self.runs.iter().filter(|_| plan.paper);
@@ -251,7 +256,7 @@ mod tests {
     fn all_of_the_paper_s_trials_and_the_others_are_there_and_move_as_they_say() {
         let vehicle = shipped::warthog().unwrap().vehicle().unwrap();
         let schedule = Schedule::full(&vehicle, 1);
-        // a vehicle is over a bend of the ground in a fifth of a second
+        // a vehicle is over a bend of the ground in a fifth of a second, and its jerk jumps at both ends
         let fine = Schedule { rate: 240.0, ..schedule };
         let tracks = fine.tracks(&Plan::RICH, 0.3, &mut Random::new(2));
         assert_eq!(tracks.len(), 71 + 18);
@@ -263,7 +268,7 @@ mod tests {
             for window in track.states.windows(3) {
                 let difference = (window[2].velocity - window[0].velocity) / (2.0 * h);
                 let exact = window[1].acceleration - window[1].angular_velocity.cross(&window[1].velocity);
-                assert!((difference - exact).norm() < 0.2, "{}: {difference} {exact}", track.name);
+                assert!((difference - exact).norm() < 0.4, "{}: {difference} {exact}", track.name);
                 let turned = (window[2].attitude[1] - window[0].attitude[1]) / (2.0 * h);
                 assert!((turned - window[1].angular_velocity.y).abs() < 0.05, "{}", track.name);
             }

@@ -44,6 +44,8 @@ pub struct Judged {
     pub noise: NoiseKind,
     /// What was hidden.
     pub hidden: BTreeSet<String>,
+    /// True where the trials cannot tell the hidden effect from another, so that both may be held possible.
+    pub has_twin: bool,
     /// True where further trials resolve a pair.
     pub resolved: bool,
     /// Why there is no answer.
@@ -83,6 +85,7 @@ impl Judged {
             strengths: truth.strengths.clone(),
             noise: case.noise,
             hidden,
+            has_twin: case.twin.is_some() && !case.resolved,
             resolved: case.resolved,
             error: None,
             verdict: None,
@@ -122,9 +125,14 @@ impl Judged {
         }
     }
 
-    /// Nothing but the truth, and all of it.
+    /// Nothing but the truth, and all of it; or, where nothing can tell it from another, both.
     fn is_right(&self) -> bool {
         self.verdict == Some(Verdict::Named) && self.named == self.hidden
+            || self.has_twin && self.holds_truth_possible()
+    }
+
+    fn holds_truth_possible(&self) -> bool {
+        self.verdict == Some(Verdict::Ambiguous) && self.hidden.is_subset(&self.possible)
     }
 
     fn is_wrong_with_confidence(&self) -> bool {
@@ -241,7 +249,7 @@ pub fn rows(judged: &[Judged]) -> Vec<Row> {
         let errors: Vec<f64> =
             single(strength).flat_map(|case| &case.parameters).map(relative_error).collect();
         let measure = format!("parameter error, median, {strength} x the floor");
-        rows.push(bootstrap(&measure, Reach::AtMost(reach), &errors, |errors| median(errors)));
+        rows.push(bootstrap(&measure, Reach::AtMost(reach), &errors, median));
     }
     let parameters = || judged.iter().flat_map(|case| &case.parameters);
     let signs = parameters().map(|p| p.planted * p.estimated < 0.0);
@@ -251,21 +259,14 @@ pub fn rows(judged: &[Judged]) -> Vec<Row> {
     for (strength, reach) in [(3.0, 0.9), (1.0, 0.7)] {
         let closures: Vec<f64> = single(strength).map(|case| case.closure.unwrap_or(0.0)).collect();
         let measure = format!("held-out closure, median, {strength} x the floor");
-        rows.push(bootstrap(&measure, Reach::AtLeast(reach), &closures, |values| median(values)));
+        rows.push(bootstrap(&measure, Reach::AtLeast(reach), &closures, median));
     }
     let shares: Vec<f64> = of(Family::Single)
         .filter(|case| case.strength >= 1.0)
         .filter_map(|case| Some(case.closure.unwrap_or(0.0) / case.true_closure.filter(|c| *c > 0.1)?))
         .collect();
-    rows.push(bootstrap(
-        "closure over that of the true term, median",
-        Reach::AtLeast(0.95),
-        &shares,
-        |values| median(values),
-    ));
+    rows.push(bootstrap("closure over that of the true term, median", Reach::AtLeast(0.95), &shares, median));
     let pair = |resolved: bool| of(Family::Confounded).filter(move |case| case.resolved == resolved);
-    let holds_truth =
-        |case: &Judged| case.verdict == Some(Verdict::Ambiguous) && case.hidden.is_subset(&case.possible);
     rows.extend([
         share(
             "outside the library: no candidate fits",
@@ -280,7 +281,7 @@ pub fn rows(judged: &[Judged]) -> Vec<Row> {
         share(
             "indistinguishable pair: ambiguous, holding the truth",
             Reach::AtLeast(0.95),
-            pair(false).map(holds_truth),
+            pair(false).map(Judged::holds_truth_possible),
         ),
         share(
             "the same after a trial that tells: right name",
@@ -419,8 +420,8 @@ mod tests {
     fn medians_and_bootstraps_hold_their_values() {
         assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
-        let row = bootstrap("m", Reach::AtMost(0.5), &[0.4; 20], |values| median(values));
+        let row = bootstrap("m", Reach::AtMost(0.5), &[0.4; 20], median);
         assert_eq!((row.value, row.interval, row.holds), (Some(0.4), Some([0.4, 0.4]), Some(true)));
-        assert_eq!(bootstrap::<f64>("m", Reach::Open, &[], |v| median(v)).value, None);
+        assert_eq!(bootstrap::<f64>("m", Reach::Open, &[], median).value, None);
     }
 }

@@ -228,8 +228,8 @@ mod tests {
         let fold = |_| {
             let mut normal = Normal::new(6);
             for _ in 0..200 {
-                let row: Vec<f64> = (0..6).map(|_| gaussian.next()).collect();
-                normal.add(&row, 2.0 * row[0] - 3.0 * row[3] + noise * gaussian.next());
+                let row: Vec<f64> = (0..6).map(|_| gaussian.draw()).collect();
+                normal.add(&row, 2.0 * row[0] - 3.0 * row[3] + noise * gaussian.draw());
             }
             normal
         };

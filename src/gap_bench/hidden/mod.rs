@@ -201,7 +201,7 @@ impl Hidden {
             HullFlooding => [between(2.0, 6.0), between(0.2, 0.8), 0.0],
             WaveMemory => [between(0.6, 1.4), between(2.0, 4.0), 0.0],
             // components: x, y, z
-            SensorBias | SensorDrift => [between(0.0, 3.0).floor(), 0.0, 0.0],
+            SensorBias | SensorDrift | SensorGain => [between(0.0, 3.0).floor(), 0.0, 0.0],
             SensorBiasStep => [between(0.0, 3.0).floor(), between(0.3, 0.7), 0.0],
             Tether => [between(-1.0, 1.0), 0.0, 0.0],
             Seiche => [between(1.5, 4.0), between(0.0, 6.0), between(-3.1, 3.1)],

@@ -1,4 +1,5 @@
-//! A load cell as a chain: turned axes, a delay line, a gain, a zero that is off, steps or drifts.
+//! A load cell as a chain: turned axes, a delay line, a gain of one channel or of all, a zero that is off,
+//! steps or drifts.
 
 use super::{Effect, Hidden, Setting};
 use crate::frame::Vec3;
@@ -24,7 +25,9 @@ pub(super) fn change(hidden: &Hidden, setting: &Setting, track: &Track, wrench: 
             vec![zero(if jumped { size } else { 0.0 }); wrench.len()]
         }
         Effect::SensorDrift => track.states.iter().map(|state| zero(size * state.t)).collect(),
-        Effect::SensorGain => wrench.iter().map(|wrench| wrench * size).collect(),
+        // below 0: of all channels
+        Effect::SensorGain if hidden.shape[0] < 0.0 => wrench.iter().map(|wrench| wrench * size).collect(),
+        Effect::SensorGain => wrench.iter().map(|wrench| zero(size * wrench[component])).collect(),
         _ => {
             // the sensor is turned by `size` about y
             let turn = nalgebra::Rotation3::from_axis_angle(&Vec3::y_axis(), -size);
@@ -85,7 +88,9 @@ mod tests {
         let wrench = [Wrench6::repeat(2.0); 3];
         let states: Vec<State> = (0..3).map(|i| State { t: f64::from(i), ..State::default() }).collect();
         let gain = on_box_with(hidden(Effect::SensorGain, 0.1), states.clone(), &wrench);
-        assert!((gain[1] - Wrench6::repeat(0.2)).norm() < 1e-12);
+        assert!((gain[1] - Wrench6::x() * 0.2).norm() < 1e-12);
+        let all = Hidden { shape: [-1.0, 0.0, 0.0], ..hidden(Effect::SensorGain, 0.1) };
+        assert!((on_box_with(all, states.clone(), &wrench)[1] - Wrench6::repeat(0.2)).norm() < 1e-12);
         let drift = on_box_with(hidden(Effect::SensorDrift, 0.5), states.clone(), &wrench);
         assert_eq!([drift[0][0], drift[2][0], drift[2][1]], [0.0, 1.0, 0.0]);
         let bias = on_box_with(hidden(Effect::SensorBias, -3.0), states, &wrench);
