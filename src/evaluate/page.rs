@@ -66,7 +66,7 @@ fn table(heads: &[String], paper: usize, rows: &[Vec<String>]) -> String {
 }
 
 fn number(value: f64) -> String {
-    if value.abs() < 10.0 { format!("{value:.2}") } else { format!("{value:.1}") }
+    if value.abs() < 100.0 { format!("{value:.2}") } else { format!("{value:.1}") }
 }
 
 fn stated(value: Option<f64>) -> String {

@@ -195,8 +195,11 @@ fn groups(vehicle: &Vehicle, heat: &Heat, name: impl Fn(usize) -> String) -> Vec
     groups.into_iter().map(report).collect()
 }
 
+/// A number that states are ordered by.
+type Quantity = fn(&State) -> f64;
+
 fn slices(heat: &Heat, forces: &[Vec3]) -> Vec<SliceReport> {
-    let quantities: [(&str, fn(&State) -> f64); 3] = [
+    let quantities: [(&str, Quantity); 3] = [
         ("depth", |state| state.condition.depth),
         ("speed", State::speed),
         ("obliqueness", State::obliqueness),
