@@ -55,7 +55,7 @@ pub fn basis(
         Effect::AddedMass => added_mass::basis(input, &mut emit),
         Effect::LinearDamping => linear_damping::basis(input, &mut emit),
         Effect::DragCoefficientError => drag_coefficient_error::basis(input, &mut emit),
-        Effect::Rotation => rotation::basis(input, &mut emit),
+        Effect::Rotation => rotation::basis(shape, input, &mut emit),
         Effect::Current => current::basis(shape, input, &mut emit),
         Effect::WaterLevelOffset => water_level_offset::basis(input, &mut emit),
         Effect::DensityError => density_error::basis(input, &mut emit),

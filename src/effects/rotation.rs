@@ -1,13 +1,15 @@
 //! Local velocity of a turning hull, for a model that knows the velocity of the origin only.
 //!
 //! `f = D(v + omega x r) - D(v)` on each wet panel with the quadratic drag `D_i(u) = -1/2 rho C A_i |u| u_i`, `r` over four
-//! points of the panel. One coefficient `C`: that of a bluff body, 0.4 to 2.1 (as `drag_coefficient_error`).
+//! points of the panel. `C` is that of a bluff body, 0.4 to 2.1 (as `drag_coefficient_error`). The shape is 0 for
+//! strip theory, which knows the load across the hull alone, and 1 for the whole load.
 
 use super::input::{Input, Part};
+use super::library::Shape;
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
-pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let velocity = input.condition.velocity;
     for (index, panel) in input.body.panels.iter().enumerate() {
         let part = &input.immersion.panels[index];
@@ -19,8 +21,9 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
         let scale = 0.25 * wet * input.half_density();
         for point in panel.points(part) {
             let local = input.local_velocity(&point);
-            let force = (drag(&local) - drag(&velocity)) * scale;
-            emit(0, Part::Panel(index), input.at(force, &point));
+            let force: Vec3 = (drag(&local) - drag(&velocity)) * scale;
+            let along = if shape[0] > 0.5 { force.x } else { 0.0 };
+            emit(0, Part::Panel(index), input.at(Vec3::new(along, force.y, force.z), &point));
         }
     }
 }

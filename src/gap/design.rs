@@ -251,6 +251,30 @@ impl Design {
         }
     }
 
+    /// Change of the rows with the logarithm of a nonlinear parameter, for columns with their scaled coefficients.
+    pub fn shape_derivative(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        candidate: usize,
+        axis: usize,
+        columns: &[(usize, usize, f64)],
+    ) -> DVector<f64> {
+        const STEP: f64 = 0.02;
+        let Candidate { effect, mut shape, .. } = self.candidates[candidate];
+        shape[axis] *= 1.0 + STEP;
+        let moved = self.candidate_columns(all, setting, effect, &shape);
+        let mut change = DVector::zeros(self.y.len());
+        for &(column, coefficient, beta) in columns {
+            if let Some((_, values, scale)) = moved.iter().find(|(c, ..)| *c == coefficient) {
+                let factor = beta * scale / self.scale[column] / STEP;
+                change.axpy(factor, &DVector::from_column_slice(values), 1.0);
+                change.axpy(-beta / STEP, &self.x.column(column), 1.0);
+            }
+        }
+        change
+    }
+
     fn fold_of(&self, row: usize) -> usize {
         self.block_fold[self.rows.rows[row].block]
     }

@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use super::candidates::Column;
 use super::design::{Design, to_rows};
 use super::series::Series;
+use super::statistics::{quantile, white_variance};
 use crate::frame::GRAVITY;
 
 /// Names of the features of a place, with units; all the same for a mirrored vehicle.
@@ -80,7 +81,7 @@ impl General {
     pub fn new(all: &[Series], design: &Design, components: &[usize]) -> Self {
         let functions = functions();
         let mut columns = Vec::new();
-        for (name, function) in functions {
+        let mut add = |name: String, function: &dyn Fn(&Series, usize, f64) -> f64| {
             let of = |trial: usize| -> Column {
                 let series = &all[trial];
                 let time = time_in_water(series);
@@ -88,7 +89,22 @@ impl General {
             };
             let values = to_rows(all, &design.rows, &design.trials, components, &design.noise, of);
             if values.iter().any(|v| v.abs() > 1e-12) {
-                columns.push((name.to_owned(), values));
+                columns.push((name, values));
+            }
+        };
+        for (name, function) in functions {
+            add(name.to_owned(), &function);
+        }
+        // hats over the range of a quantity follow any shape that a polynomial does not
+        for (name, quantity) in quantities() {
+            let mut values: Vec<f64> =
+                all.iter().flat_map(|s| (0..s.t.len()).step_by(7).map(|i| quantity(s, i))).collect();
+            let (low, high) = (quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995));
+            let width = (high - low) / HATS as f64;
+            for hat in (0..=HATS).filter(|_| width > 1e-6) {
+                let middle = low + hat as f64 * width;
+                let height = move |value: f64| (1.0 - ((value - middle) / width).abs()).max(0.0);
+                add(format!("{name} near {middle:.2}"), &|s, i, _| height(quantity(s, i)));
             }
         }
         Self { columns }
@@ -165,6 +181,82 @@ impl General {
             }
         }
     }
+}
+
+/// Hats over the range of a quantity.
+const HATS: usize = 12;
+
+type Quantity = fn(&Series, usize) -> f64;
+
+fn quantities() -> [(&'static str, Quantity); 3] {
+    [
+        ("forward velocity", |s, i| s.conditions[i].velocity.x),
+        ("depth", |s, i| s.conditions[i].depth),
+        ("yaw rate", |s, i| s.conditions[i].angular_velocity.z),
+    ]
+}
+
+/// How the energy of the rows that no trend explains grows with the state: the deviate of the strongest quantity, its
+/// name, and the root of the energy in its upper third, in noises of a bin. White noise of any size is taken off block by
+/// block, so that noise that grows with speed is no structure.
+pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> (f64, &'static str, f64) {
+    let blocks = design.rows.blocks;
+    let mut series: Vec<[Vec<f64>; 6]> = vec![Default::default(); blocks];
+    for (row, place) in design.rows.rows.iter().enumerate() {
+        series[place.block][place.component].push(target[row]);
+    }
+    let excess: Vec<f64> = series
+        .iter()
+        .map(|components| {
+            let of = |values: &Vec<f64>| {
+                let square = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
+                (square - white_variance(values)).min(1e6)
+            };
+            components.iter().filter(|values| values.len() >= 6).map(of).sum()
+        })
+        .collect();
+    let features: Vec<Vec<[f64; 9]>> = all.iter().map(of_bins).collect();
+    let mut best = (0.0, "", 0.0);
+    for (index, (name, _)) in FEATURES.iter().enumerate() {
+        let values: Vec<f64> = (0..blocks)
+            .map(|block| {
+                let bins = &features[design.rows.block_trial[block]][design.rows.block_bins[block].clone()];
+                bins.iter().map(|f| f[index]).sum::<f64>() / bins.len().max(1) as f64
+            })
+            .collect();
+        let (deviate, size) = trend(&values, &excess, &design.rows.block_trial);
+        if deviate > best.0 {
+            best = (deviate, *name, size);
+        }
+    }
+    best
+}
+
+/// Deviate of the slope of ranks, clustered by trial, and the root mean excess of the third on the larger side.
+fn trend(values: &[f64], excess: &[f64], trial: &[usize]) -> (f64, f64) {
+    let (x, y) = (ranks(values), ranks(excess));
+    let trials = trial.iter().max().map_or(0, |last| last + 1);
+    let mut scores = vec![0.0; trials];
+    for ((x, y), &trial) in x.iter().zip(&y).zip(trial) {
+        scores[trial] += x * y;
+    }
+    let sum: f64 = scores.iter().sum();
+    let spread = scores.iter().map(|s| s * s).sum::<f64>().sqrt();
+    let upper: Vec<f64> =
+        x.iter().zip(excess).filter(|(x, _)| **x * sum.signum() > 1.0 / 6.0).map(|(_, e)| *e).collect();
+    let mean = upper.iter().sum::<f64>() / upper.len().max(1) as f64;
+    (sum.abs() / spread.max(f64::MIN_POSITIVE), mean.max(0.0).sqrt())
+}
+
+/// Ranks from -1/2 to 1/2.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut ranks = vec![0.0; values.len()];
+    for (rank, index) in order.into_iter().enumerate() {
+        ranks[index] = (rank as f64 + 0.5) / values.len() as f64 - 0.5;
+    }
+    ranks
 }
 
 type Function = fn(&Series, usize, f64) -> f64;

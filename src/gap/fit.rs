@@ -67,40 +67,69 @@ pub(super) fn fit(
         .flat_map(|(m, member)| member.columns.iter().map(move |&(column, k)| (m, column, k)))
         .collect();
     let columns: Vec<usize> = used.iter().map(|(_, column, _)| *column).collect();
-    let noise: Vec<f64> =
+    let mut noise: Vec<f64> =
         used.iter().map(|&(m, _, k)| noise_share(design, &set[m], k, all, setting)).collect();
-    let clusters = clusters(design, &columns);
     let (beta, _) = design.solve(&columns)?;
     let errors = errors(design, &columns, &design.residual(&columns, &beta))?;
+    // a nonlinear parameter moves the rows like one more column; its draws are changes of its logarithm
+    let shapes = shape_axes(design, set);
+    let moved: Vec<DVector<f64>> = shapes
+        .iter()
+        .map(|&(m, axis)| {
+            let own = used.iter().zip(beta.iter()).filter(|((member, ..), _)| *member == m);
+            let own: Vec<(usize, usize, f64)> = own.map(|(&(_, column, k), &b)| (column, k, b)).collect();
+            design.shape_derivative(all, setting, set[m].candidate, axis, &own)
+        })
+        .collect();
+    noise.resize(columns.len() + moved.len(), 0.0);
+    let clusters = clusters(design, &columns, &moved);
     let few = errors.iter().map(|e| e.trials).fold(f64::INFINITY, f64::min) < ENOUGH_TRIALS;
     let groups = if few { clusters.blocks } else { clusters.trials };
-    let whole: Vec<f64> = vec![1.0; groups.len()];
-    let best = weighted(&groups, &whole, &noise)?;
+    let count = columns.len();
+    let best = weighted(&groups, &vec![1.0; groups.len()], &noise)?;
     let draws = bootstrap(&groups, &noise, config);
     let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
     let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
-    let count = columns.len();
-    let mean: Vec<f64> =
-        (0..count).map(|i| draws.iter().map(|d| d[i]).sum::<f64>() / draws.len().max(1) as f64).collect();
-    let covariance = DMatrix::from_fn(count, count, |i, j| {
-        let products = draws.iter().map(|d| (d[i] - mean[i]) * (d[j] - mean[j])).sum::<f64>();
-        products / (draws.len().max(2) - 1) as f64 / (scale[i] * scale[j])
-    });
-    let intervals = (0..count)
-        .map(|i| {
-            let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale[i]).collect();
-            [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)]
-        })
-        .collect();
-    let provisional = set
-        .iter()
-        .enumerate()
-        .map(|(m, _)| {
+    let covariance = DMatrix::from_fn(count, count, |i, j| covariance(&draws, i, j) / (scale[i] * scale[j]));
+    let interval = |i: usize, scale: f64| {
+        let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale).collect();
+        [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)]
+    };
+    let intervals = (0..count).map(|i| interval(i, scale[i])).collect();
+    let mut shape_std = vec![[0.0; 3]; set.len()];
+    for (place, &(m, axis)) in shapes.iter().enumerate() {
+        let value = design.candidates[set[m].candidate].shape[axis];
+        shape_std[m][axis] = value * covariance_of(&draws, count + place).sqrt();
+    }
+    let provisional = (0..set.len())
+        .map(|m| {
             let own = used.iter().zip(&errors).filter(|((member, ..), _)| *member == m);
             own.map(|(_, e)| e.trials).fold(f64::INFINITY, f64::min) < ONE_CONDITION
         })
         .collect();
-    Some(Fit { values, covariance, intervals, provisional, shape_std: vec![[0.0; 3]; set.len()] })
+    Some(Fit { values, covariance, intervals, provisional, shape_std })
+}
+
+/// Members and axes of the nonlinear parameters that were searched for.
+fn shape_axes(design: &Design, set: &[Member]) -> Vec<(usize, usize)> {
+    let mut axes = Vec::new();
+    for (m, member) in set.iter().enumerate() {
+        let candidate = &design.candidates[member.candidate];
+        let named = 0..candidate.effect.shape_names().len();
+        axes.extend(named.filter(|&axis| candidate.shape[axis] != 0.0).map(|axis| (m, axis)));
+    }
+    axes
+}
+
+fn covariance(draws: &[DVector<f64>], i: usize, j: usize) -> f64 {
+    let count = draws.len().max(2) as f64;
+    let mean = |k: usize| draws.iter().map(|d| d[k]).sum::<f64>() / count;
+    let (a, b) = (mean(i), mean(j));
+    draws.iter().map(|d| (d[i] - a) * (d[j] - b)).sum::<f64>() / (count - 1.0)
+}
+
+fn covariance_of(draws: &[DVector<f64>], i: usize) -> f64 {
+    covariance(draws, i, i).max(0.0)
 }
 
 /// Normal equations of one cluster.
@@ -114,17 +143,21 @@ struct Clusters {
     blocks: Vec<Group>,
 }
 
-fn clusters(design: &Design, columns: &[usize]) -> Clusters {
-    let count = columns.len();
+fn clusters(design: &Design, columns: &[usize], moved: &[DVector<f64>]) -> Clusters {
+    let count = columns.len() + moved.len();
+    let value = |row: usize, i: usize| match columns.get(i) {
+        Some(&column) => design.x[(row, column)],
+        None => moved[i - columns.len()][row],
+    };
     let empty = || Group { xx: DMatrix::zeros(count, count), xy: DVector::zeros(count) };
     let mut blocks: Vec<Group> = (0..design.rows.blocks).map(|_| empty()).collect();
     for (row, place) in design.rows.rows.iter().enumerate() {
         let group = &mut blocks[place.block];
-        for (i, &a) in columns.iter().enumerate() {
-            let x = design.x[(row, a)];
+        for i in 0..count {
+            let x = value(row, i);
             group.xy[i] += x * design.y[row];
-            for (j, &b) in columns.iter().enumerate() {
-                group.xx[(i, j)] += x * design.x[(row, b)];
+            for j in 0..count {
+                group.xx[(i, j)] += x * value(row, j);
             }
         }
     }

@@ -81,6 +81,44 @@ pub(super) fn errors(design: &Design, columns: &[usize], residual: &DVector<f64>
     Some((0..count).map(of).collect())
 }
 
+/// The error of the sum that a group of columns adds, as one column of coefficient 1 beside a base: what a group says as a
+/// whole, where its columns point much the same way and none is certain by itself.
+pub(super) fn group(
+    design: &Design,
+    base: &[usize],
+    own: &[usize],
+    beta: &[f64],
+    residual: &DVector<f64>,
+) -> Option<Error> {
+    let mut sum = DVector::zeros(residual.len());
+    own.iter().zip(beta).for_each(|(&column, &beta)| sum.axpy(beta, &design.x.column(column), 1.0));
+    if !base.is_empty() {
+        let cross = DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&sum)));
+        let weights = design.inverse(base)? * cross;
+        base.iter().enumerate().for_each(|(i, &c)| sum.axpy(-weights[i], &design.x.column(c), 1.0));
+    }
+    let rows = &design.rows;
+    let (mut scores, mut energy) = (vec![0.0; rows.blocks], vec![0.0; rows.blocks]);
+    for (row, place) in rows.rows.iter().enumerate() {
+        scores[place.block] += sum[row] * residual[row];
+        energy[place.block] += sum[row] * sum[row];
+    }
+    let trials = rows.block_trial.iter().max().map_or(0, |last| last + 1);
+    let by_trial = |values: &[f64]| {
+        let mut sums = vec![0.0; trials];
+        values.iter().zip(&rows.block_trial).for_each(|(value, &trial)| sums[trial] += value);
+        sums
+    };
+    let trial_energy = by_trial(&energy);
+    let (in_trials, in_blocks) = (effective(trial_energy.iter()), effective(energy.iter()));
+    let (scores, clusters) =
+        if in_trials >= ENOUGH_TRIALS { (by_trial(&scores), in_trials) } else { (scores, in_blocks) };
+    let whole: f64 = energy.iter().sum();
+    let used = scores.iter().filter(|s| **s != 0.0).count().max(2) as f64;
+    let variance = scores.iter().map(|s| s * s).sum::<f64>() * used / (used - 1.0);
+    Some(Error { std: variance.sqrt() / whole.max(f64::MIN_POSITIVE), clusters, trials: in_trials })
+}
+
 /// `(sum e)^2 / sum e^2`: as many clusters of equal energy would scatter as much.
 fn effective<'a>(energies: impl Iterator<Item = &'a f64>) -> f64 {
     let (sum, squares) = energies.fold((0.0, 0.0), |(s, q), e| (s + e, q + e * e));

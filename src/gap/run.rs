@@ -9,7 +9,7 @@ use super::candidates::{Setting, is_inferred, shapes, unavailable};
 use super::design::Design;
 use super::detect::{self, Excitation};
 use super::experiment::separating;
-use super::features::{General, Structure};
+use super::features::{General, Structure, energy};
 use super::fit::{Fit, Parameter, fit};
 use super::holdout::{closures, explained, worse};
 use super::noise::{Floor, floors, row_noise, smoothing};
@@ -26,6 +26,8 @@ use crate::trials::{Trials, WRENCH};
 
 /// Deviates that structure without a name needs.
 const STRUCTURE: f64 = 5.0;
+/// Deviates that energy without a phase needs; with a trial a score it cannot exceed the root of their number.
+const ENERGY: f64 = 3.0;
 
 /// The body that `trials.toml` describes, for another simulator's prediction.
 pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
@@ -91,9 +93,12 @@ pub fn run(
         let judge = Judge { design: &design, setting: &setting, config, floors: &floors, floor_loss };
         judge.select(&library)
     };
-    refine(&mut design, &all, &setting, &mut members);
+    refine(&mut design, &all, &setting, &members);
+    // what stood in for a shape that was not yet right has no place any more
+    members =
+        Judge { design: &design, setting: &setting, config, floors: &floors, floor_loss }.confirmed(&members);
     let judge = Judge { design: &design, setting: &setting, config, floors: &floors, floor_loss };
-    let found = Found::of(&judge, &members, &library, &general, &gap_structure, config);
+    let found = Found::of(&judge, &members, &library, &general, &gap_structure, config, &all);
     Ok(report(trials, &all, &judge, found, held, &library))
 }
 
@@ -106,7 +111,6 @@ struct Found {
     /// What is left, without a name.
     left: Structure,
     loss: f64,
-    coverage: f64,
 }
 
 impl Found {
@@ -117,6 +121,7 @@ impl Found {
         general: &General,
         gap_structure: &Structure,
         config: &Config,
+        all: &[Series],
     ) -> Self {
         let design = judge.design;
         let columns = judge.columns(members);
@@ -127,17 +132,10 @@ impl Found {
         let whole = design.empty_loss() - judge.floor_loss;
         let coverage = if whole > 0.0 { (design.empty_loss() - loss) / whole } else { 1.0 };
         let alternatives = judge.alternatives(members, library);
-        let mut found = Self {
-            verdict: Verdict::Named,
-            members: members.to_vec(),
-            alternatives,
-            residual,
-            left,
-            loss,
-            coverage,
-        };
+        let mut found =
+            Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
         found.verdict = if members.is_empty() {
-            match found.is_structured(judge, gap_structure, config) {
+            match found.is_structured(judge, gap_structure, config, all) {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
@@ -152,7 +150,7 @@ impl Found {
     }
 
     /// Predictable from the state, and large enough to matter.
-    fn is_structured(&self, judge: &Judge, structure: &Structure, config: &Config) -> bool {
+    fn is_structured(&self, judge: &Judge, structure: &Structure, config: &Config, all: &[Series]) -> bool {
         let design = judge.design;
         let rows = design.y.len().max(1) as f64;
         // gain per row is in bins' noise; relevance is in samples' noise
@@ -162,8 +160,11 @@ impl Found {
             .iter()
             .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].model) / design.noise.bin[c])
             .fold(f64::INFINITY, f64::min);
+        let least = config.relevance * relative;
         let size = (structure.gain / rows).sqrt();
-        structure.deviate > STRUCTURE && size > config.relevance * relative
+        // a force that comes and goes with no phase of its own shows in its energy alone
+        let (deviate, _, energy) = energy(all, design, &design.y);
+        structure.deviate > STRUCTURE && size > least || deviate > ENERGY && energy > 2.0 * least.max(0.5)
     }
 }
 
@@ -270,7 +271,7 @@ fn iterate(
 }
 
 /// Fits the nonlinear parameters of the named effects beside each other.
-fn refine(design: &mut Design, all: &[Series], setting: &Setting, members: &mut [Member]) {
+fn refine(design: &mut Design, all: &[Series], setting: &Setting, members: &[Member]) {
     for _ in 0..2 {
         for index in 0..members.len() {
             let others: Vec<usize> = members
@@ -290,7 +291,7 @@ fn refine(design: &mut Design, all: &[Series], setting: &Setting, members: &mut 
     }
 }
 
-/// Coordinate search over the nonlinear parameters of a member, by factors.
+/// Coordinate search over the nonlinear parameters of a member, by factors that shrink.
 fn search(
     design: &mut Design,
     all: &[Series],
@@ -299,31 +300,31 @@ fn search(
     others: &[usize],
     axes: &[usize],
 ) {
+    const TRIES: usize = 8;
     let columns: Vec<usize> =
         member.columns.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
+    let loss = |design: &Design| design.solve(&columns).map_or(f64::INFINITY, |(_, loss)| loss);
     let memory = design.candidates[member.candidate].effect == Effect::WaveMemory;
     let shortest = if memory { 0.8 * (setting.body.length / GRAVITY).sqrt() } else { 0.0 };
-    let loss = |design: &Design| design.solve(&columns).map_or(f64::INFINITY, |(_, loss)| loss);
     let mut best = loss(design);
-    for step in [1.5, 1.2, 1.08] {
+    for step in [1.5, 1.15, 1.05, 1.015] {
         for &axis in axes {
             for factor in [step, 1.0 / step] {
-                let held = design.candidates[member.candidate].shape;
-                let mut shape = held;
-                // a frequency of zero has no factor
-                if axis == 1 && shape[1] == 0.0 {
-                    continue;
-                }
-                shape[axis] *= factor;
-                if axis == 0 && shape[0] < shortest {
-                    continue;
-                }
-                design.reshape(all, setting, member.candidate, shape);
-                let found = loss(design);
-                if found < best {
+                for _ in 0..TRIES {
+                    let held = design.candidates[member.candidate].shape;
+                    let mut shape = held;
+                    shape[axis] *= factor;
+                    // a frequency of zero has no factor
+                    if shape[axis] == held[axis] || (axis == 0 && shape[0] < shortest) {
+                        break;
+                    }
+                    design.reshape(all, setting, member.candidate, shape);
+                    let found = loss(design);
+                    if found >= best {
+                        design.reshape(all, setting, member.candidate, held);
+                        break;
+                    }
                     best = found;
-                } else {
-                    design.reshape(all, setting, member.candidate, held);
                 }
             }
         }

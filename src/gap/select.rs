@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::design::{Design, Fitted};
 use super::noise::Floor;
-use super::robust::{Error, errors};
+use super::robust::{Error, errors, group};
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
 use crate::random::Random;
@@ -107,7 +107,7 @@ impl Judge<'_> {
         let effect = self.design.candidates[candidate].effect;
         let mut own = self.design.candidates[candidate].columns.clone();
         let mut refused = None;
-        let (fitted, found) = loop {
+        let fitted = loop {
             let columns: Vec<usize> = base.iter().copied().chain(own.iter().map(|(c, _)| *c)).collect();
             let (beta, _) = self.design.solve(&columns)?;
             let residual = self.design.residual(&columns, &beta);
@@ -125,13 +125,13 @@ impl Judge<'_> {
             if outside(0) && own.len() == 1 {
                 refused = Some(Refusal::OutOfBounds);
             }
-            let best = (0..own.len()).map(|i| errors[at + i].probability(beta[at + i])).fold(1.0, f64::min);
-            if best > self.config.significance {
+            let mine: Vec<usize> = own.iter().map(|(column, _)| *column).collect();
+            let together = group(self.design, base, &mine, &beta.as_slice()[at..], &residual)?;
+            if together.probability(1.0) > self.config.significance {
                 refused = refused.or(Some(Refusal::NotSignificant));
             }
-            break (self.design.fit(&columns)?, best);
+            break self.design.fit(&columns)?;
         };
-        let _ = found;
         let gain = before - fitted.loss;
         let member = Member { candidate, columns: own };
         refused = refused.or_else(|| self.gates(set, &member, base, before, &fitted));
@@ -287,6 +287,13 @@ impl Judge<'_> {
             start = end;
         }
         order
+    }
+
+    /// A set without the members that no longer pass beside the others.
+    pub fn confirmed(&self, set: &[Member]) -> Vec<Member> {
+        let mut set = set.to_vec();
+        while self.delete_one(&mut set) {}
+        set
     }
 
     /// The search: adds the best effect that passes, then swaps and deletes until nothing changes.
@@ -458,6 +465,8 @@ impl Judge<'_> {
     fn numbers(&self, member: &Member) -> usize {
         let shape = match self.effect(member) {
             Effect::SensorBiasStep => 1,
+            // time constant, frequency, and what it remembers
+            Effect::WaveMemory => 3,
             effect => effect.shape_names().len(),
         };
         member.columns.len() + shape

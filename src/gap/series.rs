@@ -202,15 +202,15 @@ fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
     }
 }
 
-/// Rate of the depth, smoothed over about a third of a second: noise must not look like entry.
+/// Rate of the depth, smoothed over at most a third of a second: noise must not look like entry, nor smoothing take its
+/// peak off.
 fn wetting_rate(t: &[f64], depth: &[f64]) -> Vec<f64> {
     let mut rate = Vec::with_capacity(t.len());
     for piece in pieces(t) {
         let (times, depth) = (&t[piece.clone()], &depth[piece]);
         let count = times.len();
         let step = (times[count - 1] - times[0]) / (count.max(2) - 1) as f64;
-        let window = ((0.33 / step.max(1e-6)) as usize).clamp(5, 101) | 1;
-        let window = window.min((count.max(1) - 1) / 2 * 2 + 1);
+        let window = rate_window(depth, step).min((count.max(1) - 1) / 2 * 2 + 1);
         // jitter of the stamps moves the rate by less than noise does
         let derivative = SavitzkyGolay::new(window, 2.min(window.saturating_sub(1)))
             .and_then(|filter| filter.derivative(depth, 1, step))
@@ -218,6 +218,18 @@ fn wetting_rate(t: &[f64], depth: &[f64]) -> Vec<f64> {
         rate.extend(derivative);
     }
     rate
+}
+
+/// Samples of the window whose noise is a fiftieth of the fastest rate.
+fn rate_window(depth: &[f64], step: f64) -> usize {
+    let longest = ((0.33 / step.max(1e-6)) as usize).clamp(5, 101);
+    let change =
+        depth.windows(longest.min(depth.len())).map(|w| (w[w.len() - 1] - w[0]).abs()).fold(0.0, f64::max);
+    let fastest = change / (step * longest as f64);
+    // the slope of a window of w samples has the variance 12 / w^3 of that of a sample
+    let noise = white_variance(depth).sqrt() / step.max(1e-6);
+    let needed = (12.0 * (noise / (0.02 * fastest).max(1e-9)).powi(2)).cbrt();
+    (needed.min(1e3) as usize).clamp(5, longest) | 1
 }
 
 /// Bins of about `length` within each run without a hole; at least one sample each.
