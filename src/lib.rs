@@ -9,7 +9,7 @@
 //! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`signal`]), the body ([`geometry`], [`vehicle`]), its
 //! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
 //! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), measured data ([`trials`]), the doors ([`service`],
-//! [`client`], [`soak`]), what learns it ([`train`]) and holds it against measured motion ([`validate`]), the settings
+//! [`client`], [`soak`]), what learns it ([`train`]), holds it against measured motion ([`validate`]) and finds what it lacks ([`gap`]), the settings
 //! ([`config`]) and the server as a whole ([`server`]).
 
 pub mod condition;

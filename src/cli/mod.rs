@@ -1,6 +1,7 @@
 //! Arguments in, one function a subcommand, exit codes out: 0 success, 1 what was asked for does not hold, 2 usage.
 
 mod campaign;
+mod gap;
 mod predict;
 mod progress;
 mod query;
@@ -49,6 +50,8 @@ enum Command {
     Train(train::Train),
     /// Hold a model against two laws of physics along the motion of trials
     Validate(validate::Validate),
+    /// Find where a model and measured trials disagree, and name the missing effect
+    Gap(gap::Gap),
     /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
@@ -64,6 +67,7 @@ impl Cli {
             Command::Campaign(command) => command.run(),
             Command::Train(command) => command.run(),
             Command::Validate(command) => command.run(),
+            Command::Gap(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
     }

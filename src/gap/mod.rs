@@ -12,6 +12,7 @@ mod candidates;
 mod config;
 mod design;
 mod detect;
+mod effects_file;
 mod experiment;
 mod features;
 mod fit;
@@ -19,6 +20,8 @@ mod holdout;
 mod locate;
 mod measurement;
 mod noise;
+mod page;
+mod plot;
 mod report;
 mod robust;
 mod run;
@@ -29,10 +32,12 @@ mod statistics;
 
 pub use config::Config;
 pub use detect::{Detectable, Excitation, GapSize};
+pub use effects_file::effects_toml;
 pub use fit::Parameter;
 pub use holdout::{Closure, Worse};
 pub use locate::{Condition as RegionCondition, Region};
 pub use noise::{Floor, FloorSource};
+pub use plot::PlotError;
 pub use report::{
     GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict,
 };
