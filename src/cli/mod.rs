@@ -3,6 +3,7 @@
 mod campaign;
 mod dataset;
 mod eval;
+mod gap;
 mod gap_bench;
 mod predict;
 mod progress;
@@ -59,6 +60,8 @@ enum Command {
     /// Hide effects in generated trials and score what is said of them
     #[command(hide = true)]
     GapBench(gap_bench::GapBench),
+    /// Find where a model and measured trials disagree, and name the missing effect
+    Gap(gap::Gap),
     /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
@@ -77,6 +80,7 @@ impl Cli {
             Command::Eval(command) => command.run(),
             Command::Validate(command) => command.run(),
             Command::GapBench(command) => command.run(),
+            Command::Gap(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }
     }

@@ -20,7 +20,10 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
         let drag = |u: &Vec3| panel.windward(u).component_mul(u) * -u.norm();
         let scale = 0.25 * wet * input.half_density();
         for point in panel.points(part) {
-            let local = input.local_velocity(&point);
+            // a strip has one velocity across the hull; its two sides share it
+            let across = panel.facing_plus.y + panel.facing_minus.y > 0.0 && shape[0] <= 0.5;
+            let at = if across { Vec3::new(point.x, 0.0, point.z) } else { point };
+            let local = input.local_velocity(&at);
             let force: Vec3 = (drag(&local) - drag(&velocity)) * scale;
             let along = if shape[0] > 0.5 { force.x } else { 0.0 };
             emit(0, Part::Panel(index), input.at(Vec3::new(along, force.y, force.z), &point));

@@ -169,6 +169,7 @@ pub(super) struct Fitted {
 
 impl Design {
     /// Fills the columns of every candidate; columns without any excitation are left out.
+    #[allow(clippy::too_many_arguments, reason = "called in two places, each with its own of all of them")]
     pub fn new(
         all: &[Series],
         trials: Vec<usize>,
@@ -224,7 +225,7 @@ impl Design {
             self.trials.iter().map(|&trial| columns(effect, shape, &all[trial], trial, setting)).collect();
         let place = |trial: usize| self.trials.iter().position(|&t| t == trial).unwrap_or_default();
         let mut found = Vec::new();
-        for coefficient in 0..effect.coefficients().len() {
+        for (coefficient, _) in effect.coefficients().iter().enumerate() {
             let of = |trial: usize| raw[place(trial)][coefficient].clone();
             let mut column = to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
             let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();

@@ -14,6 +14,9 @@ use super::{Config, Named};
 use crate::random::Random;
 use crate::trials::WRENCH;
 
+/// True for the features of a sample inside a region.
+type IsInside = Box<dyn Fn(&[f64; 9]) -> bool>;
+
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
@@ -150,7 +153,7 @@ pub(super) fn worse(
         let after = size(&|i, c| series.gap[i][c] - added[i][c]);
         points.extend(of_bins(series).into_iter().zip(before).zip(after).map(|((f, b), a)| (f, b, a)));
     }
-    let mut places: Vec<(String, Box<dyn Fn(&[f64; 9]) -> bool>)> = Vec::new();
+    let mut places: Vec<(String, IsInside)> = Vec::new();
     for region in regions {
         let limits: Vec<(usize, f64, f64)> = region
             .conditions

@@ -52,7 +52,7 @@ pub(super) fn floors(all: &[Series], manifest: &Manifest, components: &[usize]) 
         if !components.contains(&component) {
             return floor;
         }
-        floor.sample = high_frequency(all, component);
+        floor.sample = high_frequency(all.iter(), component);
         if let Some(repeats) = repeats(all, manifest, component) {
             floor = Floor { sample: repeats, source: FloorSource::Repeats, ..floor };
         }
@@ -66,12 +66,30 @@ pub(super) fn floors(all: &[Series], manifest: &Manifest, components: &[usize]) 
     })
 }
 
-fn high_frequency(all: &[Series], component: usize) -> f64 {
-    let mut variances: Vec<f64> = all
-        .iter()
-        .map(|series| white_variance(&series.gap.iter().map(|gap| gap[component]).collect::<Vec<_>>()))
-        .collect();
-    median(&mut variances).sqrt()
+fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for series in all {
+        let values: Vec<f64> = series.gap.iter().map(|gap| gap[component]).collect();
+        sum += white_variance(&values) * values.len() as f64;
+        count += values.len() as f64;
+    }
+    (sum / f64::max(count, 1.0)).sqrt()
+}
+
+/// The floors of some trials alone, where they come from the trials themselves: noise may differ from trial to trial.
+pub(super) fn floors_of(
+    all: &[Series],
+    trials: &[usize],
+    floors: &[Floor; 6],
+    components: &[usize],
+) -> [Floor; 6] {
+    let mut own = *floors;
+    for &component in components {
+        if own[component].source == FloorSource::HighFrequency && !trials.is_empty() {
+            own[component].sample = high_frequency(trials.iter().map(|&trial| &all[trial]), component);
+        }
+    }
+    own
 }
 
 /// Half the variance of the difference of two trials that repeat each other, at the same time since their start.

@@ -156,6 +156,8 @@ pub struct Report {
     pub excitation: Vec<Excitation>,
     /// Ranges of the state in which the effects were seen: least and largest.
     pub validity: BTreeMap<&'static str, [f64; 2]>,
+    /// Drag of the model itself as coefficients along x, y, z: some effects scale with it.
+    pub base_drag: [f64; 3],
     /// Trials used.
     pub trials: usize,
     /// Samples used.

@@ -12,7 +12,7 @@ use super::experiment::separating;
 use super::features::{General, Structure, energy};
 use super::fit::{Fit, Parameter, fit};
 use super::holdout::{closures, explained, worse};
-use super::noise::{Floor, floors, row_noise, smoothing};
+use super::noise::{Floor, floors, floors_of, row_noise, smoothing};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 use super::select::{Judge, Member};
 use super::series::{Series, series};
@@ -383,9 +383,10 @@ fn report(
         let effects = |set: &[Member]| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
         separating(&effects(&found.members), &effects(rival))
     });
+    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
     let unexplained = unexplained(judge, &found);
     let gap = GapReport {
-        held_out: closures(&named, all, &held, setting, judge.floors, config),
+        held_out: closures(&named, all, &held, setting, &held_floors, config),
         size: detect::sizes(all, judge.floors, &setting.components, config),
         shares: shares(judge, &found),
         floors: setting.components.iter().map(|&c| (WRENCH[c], judge.floors[c])).collect(),
@@ -408,6 +409,7 @@ fn report(
         gap,
         excitation,
         validity: validity(all),
+        base_drag: setting.base_drag.into(),
         trials: all.len(),
         samples: all.iter().map(|s| s.t.len()).sum(),
         remarks: trials.remarks().iter().map(ToString::to_string).collect(),

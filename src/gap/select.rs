@@ -399,7 +399,7 @@ impl Judge<'_> {
         for (index, &first) in library.iter().enumerate() {
             let Some(a) = self.judge(&[], first) else { continue };
             for &second in &library[index + 1..] {
-                let Some(b) = self.judge_quick(&[a.member.clone()], second) else { continue };
+                let Some(b) = self.judge_quick(std::slice::from_ref(&a.member), second) else { continue };
                 let pair = vec![a.member.clone(), b];
                 let score = self.set_score(&pair);
                 if score < best.as_ref().map_or(now, |(score, _)| *score) - 1e-6 * now.abs() {

@@ -1,0 +1,289 @@
+//! `wade gap`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand};
+use serde_json::json;
+use sha2::{Digest, Sha256};
+use wade::effects::Body;
+use wade::forces::Forces;
+use wade::gap::{self, Config, GapError, Predicted, Report, Verdict, effects_toml};
+use wade::model::{Model, Workspace};
+use wade::trials::Trials;
+
+use super::{Vehicles, emit, usage_error};
+
+/// Find where a model and measured trials disagree, name the missing effect, and show the gap shrink
+///
+/// Says `nothing_missing`, `named`, `ambiguous` (with the trial that would tell the candidates apart) or
+/// `no_candidate_fits`. Trials with sim_fx ... columns are held against that simulator, on any body that trials.toml
+/// describes; others against the vehicle's bundle. Exit status 1: --apply was asked for and there is nothing to trust.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(after_help = "Examples:
+  wade gap --vehicle warthog --trials trials/ --out gap/
+  wade gap --vehicle warthog --trials trials/ --out gap/ --apply
+  wade gap locate --vehicle warthog --trials trials/ --json
+
+OUT holds report.json and index.html, with --apply effects.toml too: the physical effects with their standard errors and the
+ranges in which they were seen. Faults of sensors and drive are never in it.")]
+pub struct Gap {
+    #[command(subcommand)]
+    step: Option<Step>,
+    #[command(flatten)]
+    source: Option<Source>,
+    /// Folder for report.json and index.html; those of an earlier run are replaced
+    #[arg(long, value_name = "DIR", required = true)]
+    out: Option<PathBuf>,
+    /// Write the physical effects to effects.toml
+    #[arg(long)]
+    apply: bool,
+}
+
+/// One step of the workflow; each looks at the trials anew and writes nothing but the last.
+#[derive(Debug, Subcommand)]
+enum Step {
+    /// Where the gap is: regions of the state space
+    Locate(Source),
+    /// Which effects explain it, what else could, and what would tell them apart
+    Name(Source),
+    /// The parameters of the named effects with their intervals
+    Fit(Source),
+    /// The report on trials that took no part, as files
+    Report {
+        #[command(flatten)]
+        source: Source,
+        /// Folder for report.json and index.html; those of an earlier run are replaced
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+}
+
+#[derive(Debug, Args)]
+struct Source {
+    /// Name of the vehicle
+    #[arg(long)]
+    vehicle: String,
+    /// Folder of trials
+    #[arg(long, value_name = "DIR")]
+    trials: PathBuf,
+    /// Settings, TOML: seed, bin_s, block_s, folds, held_out, significance, ...
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    vehicles: Vehicles,
+}
+
+impl Gap {
+    /// Reads and checks everything before anything is written.
+    pub fn run(self) -> Result<ExitCode> {
+        match (self.step, self.source, self.out) {
+            (Some(Step::Locate(source)), ..) => source.locate(),
+            (Some(Step::Name(source)), ..) => source.name(),
+            (Some(Step::Fit(source)), ..) => source.fit(),
+            (Some(Step::Report { source, out }), ..) => source.report(&out, false),
+            (None, Some(source), Some(out)) => source.report(&out, self.apply),
+            _ => usage_error("give --vehicle, --trials and --out, or a step"),
+        }
+    }
+}
+
+impl Source {
+    fn settings(&self) -> Result<Config> {
+        let Some(path) = &self.config else { return Ok(Config::default()) };
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let config: Config = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        config.check().with_context(|| path.display().to_string())?;
+        Ok(config)
+    }
+
+    fn run(&self) -> Result<Report> {
+        let config = self.settings()?;
+        let trials = Trials::read(&self.trials)?;
+        trials.remarks().iter().for_each(|remark| eprintln!("{remark}"));
+        if trials.manifest.vehicle != self.vehicle {
+            let (trials, asked) = (trials.manifest.vehicle.clone(), self.vehicle.clone());
+            return Err(GapError::Vehicle { trials, asked }.into());
+        }
+        let bundle = self.vehicles.bundle(&self.vehicle);
+        let mut report = if bundle.is_dir() {
+            let model = self.vehicles.model(&self.vehicle)?;
+            let body = Body::of_vehicle(model.vehicle());
+            gap::run(&trials, &body, &mut predictor(&model), &config)?
+        } else {
+            let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
+            if let Some(trial) = alone {
+                let (trial, vehicle) = (trial.name.clone(), self.vehicle.clone());
+                return Err(GapError::NoPrediction { trial, vehicle }.into());
+            }
+            gap::run(&trials, &gap::body_of(&trials)?, &mut |_| Predicted::default(), &config)?
+        };
+        let simulated = trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some));
+        report.sources.model =
+            if simulated { "the sim_ columns of the trials".into() } else { bundle_hash(&bundle)? };
+        report.sources.tool = format!("wade {} ({})", env!("CARGO_PKG_VERSION"), env!("WADE_COMMIT"));
+        Ok(report)
+    }
+
+    fn locate(&self) -> Result<ExitCode> {
+        let report = self.run()?;
+        let text = match self.json {
+            true => pretty(&json!({ "regions": report.regions, "regions_tried": report.regions_tried }))?,
+            false => regions(&report),
+        };
+        emit(&text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn name(&self) -> Result<ExitCode> {
+        let report = self.run()?;
+        let names: Vec<&str> = report.effects.iter().map(|effect| effect.name).collect();
+        let text = match self.json {
+            true => pretty(&json!({
+                "verdict": report.verdict,
+                "effects": names,
+                "alternatives": report.alternatives,
+                "separating_experiment": report.separating_experiment,
+                "not_testable": report.not_testable,
+                "rejected": report.rejected,
+            }))?,
+            false => verdict(&report),
+        };
+        emit(&text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn fit(&self) -> Result<ExitCode> {
+        let report = self.run()?;
+        let text = match self.json {
+            true => pretty(&json!({ "verdict": report.verdict, "effects": report.effects }))?,
+            false => parameters(&report),
+        };
+        emit(&text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn report(&self, out: &Path, apply: bool) -> Result<ExitCode> {
+        let report = self.run()?;
+        let json = serde_json::to_string_pretty(&report)? + "\n";
+        let page = report.page()?;
+        let applied = apply && report.is_applicable();
+        std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+        write(&out.join("report.json"), Some(&json))?;
+        write(&out.join("index.html"), Some(&page))?;
+        // one from an earlier run would pass for this one's
+        let effects = applied.then(|| effects_toml(&report));
+        write(&out.join("effects.toml"), effects.as_deref())?;
+        let text = format!(
+            "{}{}{}{}\n",
+            verdict(&report),
+            regions(&report),
+            parameters(&report),
+            out.join("index.html").display()
+        );
+        emit(if self.json { &json } else { &text })?;
+        if apply && !applied {
+            eprintln!("nothing applied: {}", not_applied(&report));
+        }
+        let failed = apply && !applied && report.verdict != Verdict::NothingMissing;
+        Ok(ExitCode::from(u8::from(failed)))
+    }
+}
+
+fn not_applied(report: &Report) -> &'static str {
+    match report.verdict {
+        Verdict::NothingMissing => "nothing is missing",
+        Verdict::Named => "no named effect is one of the water",
+        Verdict::Ambiguous => "other effects explain the gap as well",
+        Verdict::NoCandidateFits => "no effect of the library explains the gap",
+    }
+}
+
+/// The model's answers with its uncertainty.
+fn predictor(model: &Model) -> impl FnMut(&wade::condition::Condition) -> Predicted {
+    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    move |condition| {
+        model.evaluate(condition, &mut workspace, &mut forces);
+        let u = forces.uncertainty;
+        Predicted { wrench: forces.wrench, uncertainty: [u.x, u.y, u.z, 0.0, 0.0, 0.0] }
+    }
+}
+
+/// The hash of a bundle's own list of hashes.
+fn bundle_hash(bundle: &Path) -> Result<String> {
+    let path = bundle.join("SHA256SUMS");
+    let sums = std::fs::read(&path).with_context(|| path.display().to_string())?;
+    Ok(Sha256::digest(&sums).iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Puts a file in its place as a whole, or takes it away.
+fn write(path: &Path, text: Option<&str>) -> Result<()> {
+    let context = || path.display().to_string();
+    match text {
+        Some(text) => {
+            let staged = path.with_extension("partial");
+            std::fs::write(&staged, text).with_context(context)?;
+            std::fs::rename(&staged, path).with_context(context)
+        }
+        None => match std::fs::remove_file(path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error).with_context(context),
+            _ => Ok(()),
+        },
+    }
+}
+
+fn pretty(value: &serde_json::Value) -> Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}
+
+fn verdict(report: &Report) -> String {
+    let mut text = format!("{}\n", report.summary);
+    if let Some(experiment) = &report.separating_experiment {
+        text += &format!("To tell them apart: {experiment}.\n");
+    }
+    if let Some(left) = &report.gap.unexplained {
+        text += &format!("Left without a name: {left}.\n");
+    }
+    for missing in &report.not_testable {
+        text += &format!("not testable: {}, {}\n", missing.name, missing.why);
+    }
+    text
+}
+
+fn regions(report: &Report) -> String {
+    if report.regions.is_empty() {
+        return "The gap stands out in no region.\n".into();
+    }
+    let line = |region: &gap::Region| {
+        format!(
+            "where {}: {:.0} % of the gap in {:.0} % of the samples, {} trials\n",
+            region.place,
+            100.0 * region.share_of_gap,
+            100.0 * region.share_of_samples,
+            region.trials
+        )
+    };
+    report.regions.iter().map(line).collect()
+}
+
+fn parameters(report: &Report) -> String {
+    let mut text = String::new();
+    for effect in &report.effects {
+        for (name, p) in &effect.parameters {
+            let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+            text += &format!(
+                "{} {name} = {:.4} +- {:.4}{unit}{}\n",
+                effect.name,
+                p.value,
+                p.std,
+                if effect.provisional { " (provisional: one condition only)" } else { "" }
+            );
+        }
+    }
+    text
+}
