@@ -39,8 +39,8 @@ pub mod soak;
 pub mod states;
 
 pub mod cfd;
-pub mod train;
 pub mod gap;
+pub mod train;
 pub mod validate;
 
 pub mod config;

@@ -44,7 +44,8 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let (v, omega) = (state.velocity, state.angular_velocity);
     let center = input.immersion.center_of_buoyancy;
     let u = v + omega.cross(&center);
-    let rate = state.acceleration - omega.cross(&state.ground_velocity) + state.angular_acceleration.cross(&center);
+    let rate =
+        state.acceleration - omega.cross(&state.ground_velocity) + state.angular_acceleration.cross(&center);
     let unit = coefficients(input.body, input.immersion, state.density);
     for axis in 0..3 {
         let e = Vec3::ith(axis, 1.0);

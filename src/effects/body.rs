@@ -99,7 +99,8 @@ impl Body {
         let panels = vehicle.surfaces.iter().enumerate();
         let panels: Vec<Panel> = panels.map(|(index, _)| mesh_panel(vehicle, index)).collect();
         let radius = |panel: &Panel| panel.wheel.map(|_| panel.centroid.z - vehicle.z0);
-        let wheel_radius = panels.iter().find_map(radius).unwrap_or(BOX_WHEELS[0] * vehicle.dimensions.length);
+        let wheel_radius =
+            panels.iter().find_map(radius).unwrap_or(BOX_WHEELS[0] * vehicle.dimensions.length);
         Self {
             name: vehicle.name.clone(),
             length: vehicle.dimensions.length,
@@ -167,9 +168,10 @@ fn mesh_panel(vehicle: &Vehicle, index: usize) -> Panel {
         plus += area.sup(&Vec3::zeros());
         minus -= area.inf(&Vec3::zeros());
     }
-    let spread = vehicle.hull.patch(index).map_or_else(Vec3::zeros, |patch| {
-        patch.spread.diagonal().map(|variance| variance.max(0.0).sqrt())
-    });
+    let spread = vehicle
+        .hull
+        .patch(index)
+        .map_or_else(Vec3::zeros, |patch| patch.spread.diagonal().map(|variance| variance.max(0.0).sqrt()));
     let wheel = (surface.kind == SurfaceKind::Wheel)
         .then(|| wheel_at(surface.centroid.x >= 0.0, surface.centroid.y >= 0.0));
     Panel {

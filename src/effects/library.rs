@@ -176,74 +176,99 @@ impl Effect {
         match self {
             // surge, sway, heave and roll, pitch, yaw over the displaced water's mass and inertia; sway and heave in
             // shallow water reach a few times the deep-water value (Zhou, Lo, Tan 2005)
-            Self::AddedMass => const { &[
-                l("surge", 0.0, 6.0, [0.05, 1.5]),
-                l("sway", 0.0, 8.0, [0.2, 2.5]),
-                l("heave", 0.0, 10.0, [0.3, 3.0]),
-                l("roll", 0.0, 10.0, [0.02, 2.0]),
-                l("pitch", 0.0, 10.0, [0.05, 2.0]),
-                l("yaw", 0.0, 10.0, [0.05, 2.0]),
-            ] },
-            Self::LinearDamping => const { &[
-                l("surge", 0.0, 5.0, [0.0, 0.5]),
-                l("sway", 0.0, 5.0, [0.0, 0.5]),
-                l("heave", 0.0, 5.0, [0.0, 0.5]),
-            ] },
+            Self::AddedMass => {
+                const {
+                    &[
+                        l("surge", 0.0, 6.0, [0.05, 1.5]),
+                        l("sway", 0.0, 8.0, [0.2, 2.5]),
+                        l("heave", 0.0, 10.0, [0.3, 3.0]),
+                        l("roll", 0.0, 10.0, [0.02, 2.0]),
+                        l("pitch", 0.0, 10.0, [0.05, 2.0]),
+                        l("yaw", 0.0, 10.0, [0.05, 2.0]),
+                    ]
+                }
+            }
+            Self::LinearDamping => {
+                const {
+                    &[
+                        l("surge", 0.0, 5.0, [0.0, 0.5]),
+                        l("sway", 0.0, 5.0, [0.0, 0.5]),
+                        l("heave", 0.0, 5.0, [0.0, 0.5]),
+                    ]
+                }
+            }
             // the difference of two coefficients that each lie in 0 to 4
-            Self::DragCoefficientError => const { &[
-                l("surge", -4.0, 4.0, [-1.0, 1.0]),
-                l("sway", -4.0, 4.0, [-1.0, 1.0]),
-                l("heave", -4.0, 4.0, [-1.0, 1.0]),
-            ] },
+            Self::DragCoefficientError => {
+                const {
+                    &[
+                        l("surge", -4.0, 4.0, [-1.0, 1.0]),
+                        l("sway", -4.0, 4.0, [-1.0, 1.0]),
+                        l("heave", -4.0, 4.0, [-1.0, 1.0]),
+                    ]
+                }
+            }
             Self::Rotation => const { &[l("drag_coefficient", 0.0, 6.0, [0.4, 2.1])] },
             Self::Current => const { &[c("east", "m/s", -3.0, 3.0), c("north", "m/s", -3.0, 3.0)] },
             Self::WaterLevelOffset => const { &[c("offset", "m", -0.2, 0.2)] },
             Self::DensityError => const { &[c("relative_error", "1", -0.3, 1.0)] },
             Self::HullFlooding => const { &[c("flooded_share", "1", 0.0, 1.0), c("arm_x", "m", -2.0, 2.0)] },
             // von Karman's blow has no reserve: Wagner's is pi/2 of it
-            Self::WaterEntrySlamming => const { &[
-                l("vertical", 0.0, 8.0, [0.3, 2.0]),
-                l("horizontal", 0.0, 8.0, [0.3, 2.0]),
-            ] },
-            Self::WaveMemory => const { &[
-                c("surge", "1", -10.0, 10.0),
-                c("sway", "1", -10.0, 10.0),
-                c("heave", "1", -10.0, 10.0),
-            ] },
+            Self::WaterEntrySlamming => {
+                const { &[l("vertical", 0.0, 8.0, [0.3, 2.0]), l("horizontal", 0.0, 8.0, [0.3, 2.0])] }
+            }
+            Self::WaveMemory => {
+                const { &[c("surge", "1", -10.0, 10.0), c("sway", "1", -10.0, 10.0), c("heave", "1", -10.0, 10.0)] }
+            }
             Self::ChannelBlockage => const { &[l("strength", 0.0, 5.0, [0.5, 1.5])] },
             Self::Squat => const { &[l("sinkage", 0.0, 4.0, [0.1, 1.5]), c("trim", "1", -2.0, 2.0)] },
             Self::WheelPaddleThrust => const { &[l("thrust", 0.0, 6.0, [0.1, 2.0])] },
             Self::BedMotion => const { &[c("drag", "1", -4.0, 4.0), c("lift", "1", -4.0, 4.0)] },
             Self::SensorDelay => const { &[c("delay", "s", 0.0, 1.0)] },
-            Self::SensorBias | Self::SensorBiasStep => const { &[
-                c("fx", "N", -ANY, ANY),
-                c("fy", "N", -ANY, ANY),
-                c("fz", "N", -ANY, ANY),
-                c("mx", "N m", -ANY, ANY),
-                c("my", "N m", -ANY, ANY),
-                c("mz", "N m", -ANY, ANY),
-            ] },
-            Self::SensorDrift => const { &[
-                c("fx", "N/s", -ANY, ANY),
-                c("fy", "N/s", -ANY, ANY),
-                c("fz", "N/s", -ANY, ANY),
-                c("mx", "N m/s", -ANY, ANY),
-                c("my", "N m/s", -ANY, ANY),
-                c("mz", "N m/s", -ANY, ANY),
-            ] },
-            Self::SensorGain => const { &[
-                c("fx", "1", -0.9, 3.0),
-                c("fy", "1", -0.9, 3.0),
-                c("fz", "1", -0.9, 3.0),
-                c("mx", "1", -0.9, 3.0),
-                c("my", "1", -0.9, 3.0),
-                c("mz", "1", -0.9, 3.0),
-            ] },
-            Self::AxisMisalignment => const { &[
-                c("about_x", "rad", -0.5, 0.5),
-                c("about_y", "rad", -0.5, 0.5),
-                c("about_z", "rad", -0.5, 0.5),
-            ] },
+            Self::SensorBias | Self::SensorBiasStep => {
+                const {
+                    &[
+                        c("fx", "N", -ANY, ANY),
+                        c("fy", "N", -ANY, ANY),
+                        c("fz", "N", -ANY, ANY),
+                        c("mx", "N m", -ANY, ANY),
+                        c("my", "N m", -ANY, ANY),
+                        c("mz", "N m", -ANY, ANY),
+                    ]
+                }
+            }
+            Self::SensorDrift => {
+                const {
+                    &[
+                        c("fx", "N/s", -ANY, ANY),
+                        c("fy", "N/s", -ANY, ANY),
+                        c("fz", "N/s", -ANY, ANY),
+                        c("mx", "N m/s", -ANY, ANY),
+                        c("my", "N m/s", -ANY, ANY),
+                        c("mz", "N m/s", -ANY, ANY),
+                    ]
+                }
+            }
+            Self::SensorGain => {
+                const {
+                    &[
+                        c("fx", "1", -0.9, 3.0),
+                        c("fy", "1", -0.9, 3.0),
+                        c("fz", "1", -0.9, 3.0),
+                        c("mx", "1", -0.9, 3.0),
+                        c("my", "1", -0.9, 3.0),
+                        c("mz", "1", -0.9, 3.0),
+                    ]
+                }
+            }
+            Self::AxisMisalignment => {
+                const {
+                    &[
+                        c("about_x", "rad", -0.5, 0.5),
+                        c("about_y", "rad", -0.5, 0.5),
+                        c("about_z", "rad", -0.5, 0.5),
+                    ]
+                }
+            }
             Self::RollingResistance => const { &[l("coefficient", 0.0, 0.5, [0.01, 0.15])] },
             Self::DriveGain => const { &[c("relative_error", "1", -0.9, 3.0)] },
             Self::MassError => const { &[c("relative_error", "1", -0.5, 1.0)] },

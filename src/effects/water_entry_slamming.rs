@@ -12,7 +12,11 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let up = state.up.into_inner();
     let entering = state.density * immersion.waterplane_area * input.wetting_rate.max(0.0);
     // the rate of the level is the entry speed, whatever carries the hull down
-    emit(0, Part::Hull, input.at(up * (entering * input.wetting_rate.max(0.0)), &immersion.waterplane_center));
+    emit(
+        0,
+        Part::Hull,
+        input.at(up * (entering * input.wetting_rate.max(0.0)), &immersion.waterplane_center),
+    );
     let across = state.velocity - up * state.velocity.dot(&up);
     emit(1, Part::Hull, input.at(across * -entering, &immersion.waterplane_center));
 }

@@ -31,7 +31,12 @@ pub(super) struct Setting<'a> {
 pub(super) type Column = Vec<[f64; 6]>;
 
 /// Why an effect cannot be looked for in these trials at all.
-pub(super) fn unavailable(effect: Effect, setting: &Setting, manifest: &Manifest, all: &[Series]) -> Option<String> {
+pub(super) fn unavailable(
+    effect: Effect,
+    setting: &Setting,
+    manifest: &Manifest,
+    all: &[Series],
+) -> Option<String> {
     let has_wheels = || all.iter().any(|s| s.wheels.iter().any(|w| w.iter().any(Option::is_some)));
     match effect {
         Effect::ChannelBlockage if setting.channel_width.is_none() => {

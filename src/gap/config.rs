@@ -81,7 +81,8 @@ impl Config {
             ("most_effects", self.most_effects, 1),
             ("bootstrap", self.bootstrap, 20),
         ];
-        if let Some((key, value)) = positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
+        if let Some((key, value)) =
+            positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
         {
             return Err(GapError::Config { key, value, expected: "positive" });
         }
@@ -89,9 +90,7 @@ impl Config {
             return Err(GapError::Config { key, value, expected: "from 0 to below 1" });
         }
         match counts.into_iter().find(|(_, value, least)| value < least) {
-            Some((key, value, _)) => {
-                Err(GapError::Config { key, value: value as f64, expected: "larger" })
-            }
+            Some((key, value, _)) => Err(GapError::Config { key, value: value as f64, expected: "larger" }),
             None => Ok(()),
         }
     }

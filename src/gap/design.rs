@@ -220,17 +220,13 @@ impl Design {
         effect: Effect,
         shape: &Shape,
     ) -> Vec<(usize, Vec<f64>, f64)> {
-        let raw: Vec<Vec<Column>> = self
-            .trials
-            .iter()
-            .map(|&trial| columns(effect, shape, &all[trial], trial, setting))
-            .collect();
+        let raw: Vec<Vec<Column>> =
+            self.trials.iter().map(|&trial| columns(effect, shape, &all[trial], trial, setting)).collect();
         let place = |trial: usize| self.trials.iter().position(|&t| t == trial).unwrap_or_default();
         let mut found = Vec::new();
         for coefficient in 0..effect.coefficients().len() {
             let of = |trial: usize| raw[place(trial)][coefficient].clone();
-            let mut column =
-                to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
+            let mut column = to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
             let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();
             if scale > 1e-9 && scale.is_finite() {
                 column.iter_mut().for_each(|value| *value /= scale);
@@ -312,8 +308,7 @@ impl Design {
         for fold in 0..self.folds.len() {
             let rows: Vec<usize> = (0..self.y.len()).filter(|&row| self.fold_of(row) == fold).collect();
             for other in 0..self.scale.len() {
-                let product: f64 =
-                    rows.iter().map(|&row| self.x[(row, column)] * self.x[(row, other)]).sum();
+                let product: f64 = rows.iter().map(|&row| self.x[(row, column)] * self.x[(row, other)]).sum();
                 self.folds[fold].xx[(column, other)] = product;
                 self.folds[fold].xx[(other, column)] = product;
             }
@@ -335,8 +330,7 @@ impl Design {
     /// Least squares with a cross-validated loss.
     pub fn fit(&self, columns: &[usize]) -> Option<Fitted> {
         let (beta, loss) = self.solve(columns)?;
-        let mut fitted =
-            Fitted { beta, loss, cv_loss: 0.0, fold_losses: Vec::new(), fold_betas: Vec::new() };
+        let mut fitted = Fitted { beta, loss, cv_loss: 0.0, fold_losses: Vec::new(), fold_betas: Vec::new() };
         for fold in &self.folds {
             let (beta, _) = solve(&self.total, Some(fold), columns)?;
             let loss = fold_loss(fold, columns, &beta);

@@ -97,10 +97,8 @@ impl General {
         }
         // hats over the range of a quantity follow any shape that a polynomial does not
         for (name, quantity) in quantities() {
-            let mut values: Vec<f64> = all
-                .iter()
-                .flat_map(|s| (0..s.t.len()).step_by(7).map(|i| quantity(s, i)))
-                .collect();
+            let mut values: Vec<f64> =
+                all.iter().flat_map(|s| (0..s.t.len()).step_by(7).map(|i| quantity(s, i))).collect();
             let (low, high) = (quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995));
             let width = (high - low) / HATS as f64;
             for hat in (0..=HATS).filter(|_| width > 1e-6) {
@@ -151,7 +149,11 @@ impl General {
     ) {
         use nalgebra::DMatrix;
         let count = self.columns.len();
-        let fold_of = |row: usize| design.block_fold[design.rows.rows[row].block];
+        // whole trials are left out: parts of one would teach the zero of the others
+        let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
+        let fold_of_trial: Vec<usize> =
+            (0..gains.len()).map(|trial| place(trial) % folds.min(design.trials.len())).collect();
+        let fold_of = |row: usize| fold_of_trial[design.rows.rows[row].trial];
         let x = DMatrix::from_fn(rows.len(), count, |i, j| self.columns[j].1[rows[i]]);
         let scale: Vec<f64> =
             (0..count).map(|j| (x.column(j).norm_squared() / rows.len() as f64).sqrt().max(1e-12)).collect();
@@ -168,7 +170,8 @@ impl General {
             shares[j] += xy[j].powi(2) / xx[(j, j)].max(1e-12);
         }
         let freedom = (rows.len() as f64 / (rows.len() as f64 - count as f64).max(1.0)).max(1.0);
-        sum.loss += solve(&xx, &xy).map_or(y.norm_squared(), |beta| (&y - &x * beta).norm_squared()) * freedom;
+        sum.loss +=
+            solve(&xx, &xy).map_or(y.norm_squared(), |beta| (&y - &x * beta).norm_squared()) * freedom;
         for fold in 0..folds {
             let inside: Vec<usize> = (0..rows.len()).filter(|&i| fold_of(rows[i]) == fold).collect();
             let part = DMatrix::from_fn(inside.len(), count, |i, j| x[(inside[i], j)]);
@@ -203,8 +206,16 @@ fn quantities() -> [(&'static str, Quantity); 3] {
 pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> (f64, &'static str, f64) {
     let blocks = design.rows.blocks;
     let mut series: Vec<[Vec<f64>; 6]> = vec![Default::default(); blocks];
+    // the zero of a trial is no force that comes and goes
+    let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+    let mut zero = vec![[(0.0, 0.0); 6]; trials];
     for (row, place) in design.rows.rows.iter().enumerate() {
-        series[place.block][place.component].push(target[row]);
+        let (sum, count) = &mut zero[place.trial][place.component];
+        (*sum, *count) = (*sum + target[row], *count + 1.0);
+    }
+    for (row, place) in design.rows.rows.iter().enumerate() {
+        let (sum, count) = zero[place.trial][place.component];
+        series[place.block][place.component].push(target[row] - sum / count);
     }
     let excess: Vec<f64> = series
         .iter()
@@ -271,7 +282,9 @@ fn functions() -> Vec<(&'static str, Function)> {
         ("forward velocity squared with its sign", |s, i, _| {
             s.conditions[i].velocity.x * s.conditions[i].velocity.norm()
         }),
-        ("lateral velocity times speed", |s, i, _| s.conditions[i].velocity.y * s.conditions[i].velocity.norm()),
+        ("lateral velocity times speed", |s, i, _| {
+            s.conditions[i].velocity.y * s.conditions[i].velocity.norm()
+        }),
         ("speed squared", |s, i, _| s.conditions[i].velocity.norm_squared()),
         ("speed cubed", |s, i, _| s.conditions[i].velocity.norm().powi(3)),
         ("forward velocity times speed squared", |s, i, _| {

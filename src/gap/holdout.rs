@@ -92,7 +92,9 @@ pub(super) fn closures(
         .collect();
     let mut random = Random::new(config.seed ^ 0xc105);
     let draws: Vec<Vec<Sums>> = (0..config.bootstrap)
-        .map(|_| (0..sums.len()).map(|_| sums[(random.unit() * sums.len() as f64) as usize].clone()).collect())
+        .map(|_| {
+            (0..sums.len()).map(|_| sums[(random.unit() * sums.len() as f64) as usize].clone()).collect()
+        })
         .collect();
     let closure = |components: &[usize], floor: f64, unit: bool| {
         let weight = |c: usize| if unit { 1.0 } else { floors[c].total().max(1e-12).powi(-2) };
@@ -104,19 +106,18 @@ pub(super) fn closures(
             };
             (rms(&|s, c| s.before[c]), rms(&|s, c| s.after[c]))
         };
-        let share = |(before, after): (f64, f64)| (before > 1.02 * floor).then(|| (before - after) / (before - floor));
+        let share = |(before, after): (f64, f64)| {
+            (before > 1.02 * floor).then(|| (before - after) / (before - floor))
+        };
         let (before, after) = sizes(&sums);
         let mut found: Vec<f64> = draws.iter().filter_map(|draw| share(sizes(draw))).collect();
-        let interval = share((before, after)).filter(|_| found.len() * 2 > draws.len()).map(|_| {
-            [quantile(&mut found.clone(), 0.05), quantile(&mut found, 0.95)]
-        });
+        let interval = share((before, after))
+            .filter(|_| found.len() * 2 > draws.len())
+            .map(|_| [quantile(&mut found.clone(), 0.05), quantile(&mut found, 0.95)]);
         Closure { before, after, noise_floor: floor, closure: share((before, after)), interval }
     };
-    let mut closures: BTreeMap<&'static str, Closure> = setting
-        .components
-        .iter()
-        .map(|&c| (WRENCH[c], closure(&[c], floors[c].total(), true)))
-        .collect();
+    let mut closures: BTreeMap<&'static str, Closure> =
+        setting.components.iter().map(|&c| (WRENCH[c], closure(&[c], floors[c].total(), true))).collect();
     closures.insert("all", closure(&setting.components, 1.0, false));
     closures
 }
@@ -169,7 +170,10 @@ pub(super) fn worse(
         let cuts = [quantile(&mut values.clone(), 1.0 / 3.0), quantile(&mut values, 2.0 / 3.0)];
         let limits = [(f64::NEG_INFINITY, cuts[0]), (cuts[0], cuts[1]), (cuts[1], f64::INFINITY)];
         for (third, (low, high)) in ["lowest", "middle", "highest"].into_iter().zip(limits) {
-            places.push((format!("{third} third of {name}"), Box::new(move |f| f[feature] > low && f[feature] <= high)));
+            places.push((
+                format!("{third} third of {name}"),
+                Box::new(move |f| f[feature] > low && f[feature] <= high),
+            ));
         }
     }
     let mut worse = Vec::new();

@@ -181,7 +181,8 @@ fn best_split(points: &[&Point], tried: &mut usize) -> Option<(usize, f64)> {
 
 fn region(limits: &Limits, check: &[&Point], trials: usize, random: &mut Random) -> Option<Region> {
     let whole: f64 = check.iter().map(|p| p.excess).sum();
-    let (within, without): (Vec<&Point>, Vec<&Point>) = check.iter().partition(|p| inside(limits, &p.features));
+    let (within, without): (Vec<&Point>, Vec<&Point>) =
+        check.iter().partition(|p| inside(limits, &p.features));
     if within.is_empty() || without.is_empty() || whole <= 0.0 {
         return None;
     }
@@ -232,7 +233,8 @@ fn permuted(limits: &Limits, points: &[&Point], observed: f64, random: &mut Rand
                 side[1] += 1.0;
             }
         }
-        as_large += usize::from(here[0] / f64::max(here[1], 1.0) - there[0] / f64::max(there[1], 1.0) >= observed);
+        as_large +=
+            usize::from(here[0] / f64::max(here[1], 1.0) - there[0] / f64::max(there[1], 1.0) >= observed);
     }
     (1 + as_large) as f64 / (1 + DRAWS) as f64
 }

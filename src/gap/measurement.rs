@@ -13,7 +13,8 @@ use crate::trials::{Manifest, Method, Trial, Trials, WRENCH};
 /// The measured wrench of each sample; `None` for a component that was not measured [N, N m].
 pub(super) fn measured(trials: &Trials, trial: &Trial, mass: f64) -> Result<[Option<Vec<f64>>; 6], GapError> {
     let direct = trial.measured.clone();
-    if trials.manifest.measured.method != Some(Method::InverseDynamics) || direct.iter().any(Option::is_some) {
+    if trials.manifest.measured.method != Some(Method::InverseDynamics) || direct.iter().any(Option::is_some)
+    {
         return Ok(direct);
     }
     let mass = trials.manifest.mass.unwrap_or(mass);

@@ -38,9 +38,7 @@ pub use holdout::{Closure, Worse};
 pub use locate::{Condition as RegionCondition, Region};
 pub use noise::{Floor, FloorSource};
 pub use plot::PlotError;
-pub use report::{
-    GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict,
-};
+pub use report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 pub use run::{body_of, run};
 pub use select::Refusal;
 

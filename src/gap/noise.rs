@@ -77,7 +77,12 @@ fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -
 }
 
 /// The floors of some trials alone, where they come from the trials themselves: noise may differ from trial to trial.
-pub(super) fn floors_of(all: &[Series], trials: &[usize], floors: &[Floor; 6], components: &[usize]) -> [Floor; 6] {
+pub(super) fn floors_of(
+    all: &[Series],
+    trials: &[usize],
+    floors: &[Floor; 6],
+    components: &[usize],
+) -> [Floor; 6] {
     let mut own = *floors;
     for &component in components {
         if own[component].source == FloorSource::HighFrequency && !trials.is_empty() {

@@ -30,11 +30,16 @@ pub(super) fn page(report: &Report) -> Result<String, PlotError> {
         report.gap.held_out_trials.len(),
     );
     if let Some(how) = &report.generated {
-        let _ = write!(text, "<div class=\"verdict note\"><b>Generated, not measured.</b> {}</div>", escape(how));
+        let _ =
+            write!(text, "<div class=\"verdict note\"><b>Generated, not measured.</b> {}</div>", escape(how));
     }
     let _ = writeln!(text, "<div class=\"verdict {verdict}\">{}</div>", escape(&report.summary));
     if let Some(experiment) = &report.separating_experiment {
-        let _ = writeln!(text, "<div class=\"verdict note\"><b>To tell them apart:</b> {}</div>", escape(experiment));
+        let _ = writeln!(
+            text,
+            "<div class=\"verdict note\"><b>To tell them apart:</b> {}</div>",
+            escape(experiment)
+        );
     }
     text.push_str(&shares(report));
     text.push_str(&effects(report));
@@ -140,8 +145,16 @@ fn effects(report: &Report) -> String {
             ]
         })
     });
-    let heads =
-        ["effect", "fault of", "parameter", "value", "90 % interval", "published", "share of gap", "best placebo"];
+    let heads = [
+        "effect",
+        "fault of",
+        "parameter",
+        "value",
+        "90 % interval",
+        "published",
+        "share of gap",
+        "best placebo",
+    ];
     let mut text = format!(
         "<h2>Named effects</h2>{}<p class=\"small\">Share of gap: what comes back when the effect alone is left out. Best \
          placebo: the most that the same effect, shifted in time within each trial, explains of what the real one does. \
@@ -153,9 +166,13 @@ fn effects(report: &Report) -> String {
         let _ = writeln!(text, "<p>Explains as much: {}.</p>", escape(&sets.join("; ")));
     }
     for effect in report.effects.iter().filter(|effect| !effect.surfaces.is_empty()) {
-        let surfaces: Vec<String> =
-            effect.surfaces.iter().map(|(name, share)| format!("{} {}", escape(name), percent(*share))).collect();
-        let _ = writeln!(text, "<p class=\"small\">{} is carried by: {}.</p>", effect.name, surfaces.join(", "));
+        let surfaces: Vec<String> = effect
+            .surfaces
+            .iter()
+            .map(|(name, share)| format!("{} {}", escape(name), percent(*share)))
+            .collect();
+        let _ =
+            writeln!(text, "<p class=\"small\">{} is carried by: {}.</p>", effect.name, surfaces.join(", "));
     }
     text
 }
@@ -203,7 +220,12 @@ fn traces(report: &Report) -> Result<String, PlotError> {
     for one in &report.traces {
         let held = report.gap.held_out_trials.contains(&one.trial);
         let part = if held { "took no part in naming" } else { "took part in naming" };
-        let _ = writeln!(text, "<p>{} ({part})</p>{}", escape(&one.trial), trace(one, !report.effects.is_empty())?);
+        let _ = writeln!(
+            text,
+            "<p>{} ({part})</p>{}",
+            escape(&one.trial),
+            trace(one, !report.effects.is_empty())?
+        );
     }
     Ok(text)
 }
@@ -258,9 +280,16 @@ fn excitation(report: &Report) -> String {
         let smallest: Vec<String> = e
             .minimum_detectable
             .iter()
-            .map(|(name, d)| format!("{name} {} {}", number(d.value), if d.unit == "1" { "" } else { d.unit }))
+            .map(|(name, d)| {
+                format!("{name} {} {}", number(d.value), if d.unit == "1" { "" } else { d.unit })
+            })
             .collect();
-        vec![e.name.into(), e.trials.to_string(), smallest.join(", "), e.not_testable.clone().unwrap_or_default()]
+        vec![
+            e.name.into(),
+            e.trials.to_string(),
+            smallest.join(", "),
+            e.not_testable.clone().unwrap_or_default(),
+        ]
     });
     let heads = ["effect", "trials that excite it", "smallest that would have shown", "not testable because"];
     format!("<h2>What these trials can show</h2>{}", table(&heads, &[2, 3], rows))

@@ -26,8 +26,9 @@ use crate::trials::{Trials, WRENCH};
 
 /// Deviates that structure without a name needs.
 const STRUCTURE: f64 = 5.0;
-/// Deviates that energy without a phase needs; with a trial a score it cannot exceed the root of their number.
-const ENERGY: f64 = 3.0;
+/// Deviates that energy without a phase needs; with a score a trial it cannot exceed the root of their number, so that
+/// few trials need this share of the root.
+const ENERGY: [f64; 2] = [4.5, 0.8];
 
 /// The body that `trials.toml` describes, for another simulator's prediction.
 pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
@@ -80,8 +81,7 @@ pub fn run(
         .collect();
     let noise = row_noise(&all, &naming, &setting.components, &floors, smoothing(&all, &naming));
     let deal = |rows: &super::design::Rows| folds(&all, rows, config);
-    let mut design =
-        Design::new(&all, naming, &setting, &forms, noise, config.block_s, deal, config.folds);
+    let mut design = Design::new(&all, naming, &setting, &forms, noise, config.block_s, deal, config.folds);
     if design.rows.blocks < 2 * config.folds {
         let (blocks, block_s, folds) = (design.rows.blocks, config.block_s, config.folds);
         return Err(GapError::TooShort { blocks, block_s, folds });
@@ -96,7 +96,8 @@ pub fn run(
     };
     refine(&mut design, &all, &setting, &members);
     // what stood in for a shape that was not yet right has no place any more
-    members = Judge { design: &design, setting: &setting, config, floors: &floors, floor_loss }.confirmed(&members);
+    members =
+        Judge { design: &design, setting: &setting, config, floors: &floors, floor_loss }.confirmed(&members);
     let judge = Judge { design: &design, setting: &setting, config, floors: &floors, floor_loss };
     let found = Found::of(&judge, &members, &library, &general, &gap_structure, config, &all);
     Ok(report(trials, &all, &judge, found, held, &library))
@@ -132,14 +133,8 @@ impl Found {
         let whole = design.empty_loss() - judge.floor_loss;
         let coverage = if whole > 0.0 { (design.empty_loss() - loss) / whole } else { 1.0 };
         let alternatives = judge.alternatives(members, library);
-        let mut found = Self {
-            verdict: Verdict::Named,
-            members: members.to_vec(),
-            alternatives,
-            residual,
-            left,
-            loss,
-        };
+        let mut found =
+            Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
         found.verdict = if members.is_empty() {
             match found.is_structured(judge, gap_structure, config, all) {
                 true => Verdict::NoCandidateFits,
@@ -170,7 +165,8 @@ impl Found {
         let size = (structure.gain / rows).sqrt();
         // a force that comes and goes with no phase of its own shows in its energy alone
         let (deviate, _, energy) = energy(all, design, &design.y);
-        structure.deviate > STRUCTURE && size > least || deviate > ENERGY && energy > 2.0 * least.max(0.5)
+        let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
+        structure.deviate > STRUCTURE && size > least || deviate > bar && energy > 2.0 * least.max(0.5)
     }
 }
 
@@ -263,7 +259,8 @@ fn iterate(
 ) {
     for _ in 0..times {
         let own = design.candidates[candidate].columns.clone();
-        let columns: Vec<usize> = own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
+        let columns: Vec<usize> =
+            own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
         let Some((beta, _)) = design.solve(&columns) else { return };
         let effect = design.candidates[candidate].effect;
         let mut shape = design.candidates[candidate].shape;
@@ -377,15 +374,8 @@ fn report(
         Verdict::NothingMissing => (Vec::new(), 0),
         _ => locate::locate(all, &design.trials, gap_excess, config),
     };
-    let excitation = detect::excitations(
-        design,
-        all,
-        setting,
-        &trials.manifest,
-        &found.residual,
-        &Effect::ALL,
-        config,
-    );
+    let excitation =
+        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &Effect::ALL, config);
     let not_testable = excitation.iter().filter_map(not_testable).collect();
     let alternatives: Vec<Vec<&'static str>> = match holds {
         true => found.alternatives.iter().map(|set| names(judge, set)).collect(),
@@ -459,8 +449,10 @@ fn named_effects(
             let spec = &specs[coefficient];
             let std = fitted.covariance[(first + i, first + i)].max(0.0).sqrt();
             let interval = fitted.intervals[first + i];
-            parameters
-                .insert(spec.name, Parameter { value, std, unit: spec.unit, interval, literature: spec.literature });
+            parameters.insert(
+                spec.name,
+                Parameter { value, std, unit: spec.unit, interval, literature: spec.literature },
+            );
         }
         for (axis, &(name, unit)) in one.effect.shape_names().iter().enumerate() {
             let (value, std) = (one.shape[axis], fitted.shape_std[index][axis]);
@@ -502,7 +494,8 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
                 effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
             }
             effects::basis(named.effect, &named.shape, &memory, &input, |coefficient, part, load| {
-                let value = named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
+                let value =
+                    named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
                 let name = match part {
                     Part::Panel(panel) => setting.body.panels[panel].name.clone(),
                     Part::Hull => "hull".to_owned(),
@@ -548,7 +541,11 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
     let loss = if holds { found.loss } else { judge.design.empty_loss() };
     let noise = judge.floor_loss.min(loss) / whole;
     let explained = (1.0 - loss / whole).max(0.0);
-    BTreeMap::from([("noise", noise), ("explained", explained), ("unexplained", (1.0 - noise - explained).max(0.0))])
+    BTreeMap::from([
+        ("noise", noise),
+        ("explained", explained),
+        ("unexplained", (1.0 - noise - explained).max(0.0)),
+    ])
 }
 
 fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
@@ -654,16 +651,15 @@ fn traces(named: &[Named], all: &[Series], setting: &Setting, floors: &[Floor; 6
 }
 
 fn summary(report: &Report) -> String {
-    let names = |effects: &[NamedEffect]| {
-        effects.iter().map(|e| e.name).collect::<Vec<_>>().join(" and ")
-    };
+    let names = |effects: &[NamedEffect]| effects.iter().map(|e| e.name).collect::<Vec<_>>().join(" and ");
     let closed = report.gap.held_out.get("all").and_then(|all| all.closure);
     let closed = closed.map_or_else(String::new, |c| {
         format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c)
     });
     match report.verdict {
         Verdict::NothingMissing => {
-            "Nothing is missing that these trials can show: the gap holds no structure beyond its noise.".into()
+            "Nothing is missing that these trials can show: the gap holds no structure beyond its noise."
+                .into()
         }
         Verdict::Named => format!("The gap is {}.{closed}", names(&report.effects)),
         Verdict::Ambiguous => format!(
@@ -672,8 +668,8 @@ fn summary(report: &Report) -> String {
             report.alternatives.iter().map(|set| set.join(" and ")).collect::<Vec<_>>().join(", or "),
         ),
         Verdict::NoCandidateFits => {
-            "There is a gap with structure, and no effect of the library explains it; nothing is applied.".into()
+            "There is a gap with structure, and no effect of the library explains it; nothing is applied."
+                .into()
         }
     }
 }
-

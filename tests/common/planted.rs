@@ -216,7 +216,14 @@ pub fn planted(name: &str, motion: &[State]) -> Vec<[f64; 6]> {
             "linear_damping" => {
                 let scale = RHO * (G * LENGTH).sqrt() * d * 2.0;
                 let (fx, fy) = (-scale * WIDTH * s.v.x, -scale * LENGTH * s.v.y);
-                [fx, fy, 0.0, -arm * fy, arm * fx, -scale * s.w.z * LENGTH.powi(3) / 12.0 - scale * s.w.z * WIDTH.powi(3) / 12.0]
+                [
+                    fx,
+                    fy,
+                    0.0,
+                    -arm * fy,
+                    arm * fx,
+                    -scale * s.w.z * LENGTH.powi(3) / 12.0 - scale * s.w.z * WIDTH.powi(3) / 12.0,
+                ]
             }
             "drag_coefficient_error" => at_center(-0.5 * RHO * WIDTH * d * speed * s.v.x),
             "rotation" => {
@@ -241,7 +248,12 @@ pub fn planted(name: &str, motion: &[State]) -> Vec<[f64; 6]> {
             }
             "water_level_offset" => {
                 // a level only counts where there is water
-                if d < 0.005 { [0.0; 6] } else { let up = simulate_at(s.v, d + 0.01); std::array::from_fn(|c| (up[c] - sim[c]) / 0.01) }
+                if d < 0.005 {
+                    [0.0; 6]
+                } else {
+                    let up = simulate_at(s.v, d + 0.01);
+                    std::array::from_fn(|c| (up[c] - sim[c]) / 0.01)
+                }
             }
             "density_error" => sim,
             "hull_flooding" => {
@@ -254,7 +266,9 @@ pub fn planted(name: &str, motion: &[State]) -> Vec<[f64; 6]> {
                 memory += (dv.x - memory / 1.5) / RATE;
                 at_center(-RHO * area * d * (G / LENGTH).sqrt() * memory)
             }
-            "squat" => [0.0, 0.0, -0.5 * RHO * speed * speed * area * f64::from(u8::from(d > 0.005)), 0.0, 0.0, 0.0],
+            "squat" => {
+                [0.0, 0.0, -0.5 * RHO * speed * speed * area * f64::from(u8::from(d > 0.005)), 0.0, 0.0, 0.0]
+            }
             "sensor_delay" => sim,
             "sensor_bias" => [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             "sensor_drift" => [s.t, 0.0, 0.0, 0.0, 0.0, 0.0],
