@@ -8,7 +8,20 @@ use wade::gap::{self, Config, Predicted};
 
 const NOISE: [f64; 6] = [8.0, 8.0, 12.0, 4.0, 4.0, 4.0];
 
-fn scaled(name: &str, strength: f64, motions: &[Vec<planted::State>]) -> (Vec<Vec<[f64; 6]>>, f64) {
+fn scaled(names: &str, strength: f64, motions: &[Vec<planted::State>]) -> (Vec<Vec<[f64; 6]>>, f64) {
+    let mut sum: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
+    let mut last = 0.0;
+    for name in names.split('+') {
+        let (one, factor) = scaled_one(name, strength, motions);
+        last = factor;
+        for (sum, one) in sum.iter_mut().flatten().zip(one.iter().flatten()) {
+            (0..6).for_each(|c| sum[c] += one[c]);
+        }
+    }
+    (sum, last)
+}
+
+fn scaled_one(name: &str, strength: f64, motions: &[Vec<planted::State>]) -> (Vec<Vec<[f64; 6]>>, f64) {
     let unit: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| plant(name, m)).collect();
     let size = rms(&unit);
     // the strongest measured component is `strength` times its noise
@@ -70,4 +83,105 @@ fn survey() {
             }
         }
     }
+}
+
+#[test]
+#[ignore = "a survey for people, not a promise"]
+fn nulls() {
+    let seeds: u64 = std::env::var("SEEDS").ok().and_then(|v| v.parse().ok()).unwrap_or(8);
+    let (mut named, mut structured, mut all) = (0, 0, 0);
+    for seed in 0..seeds {
+        for kind in [
+            "white",
+            "colored 0.3 s",
+            "colored 1 s",
+            "offset stated",
+            "offset not stated",
+            "quantized",
+            "dropouts",
+            "still air of a mocap",
+        ] {
+            let motions = motions(24, 900, 100 + seed);
+            let (added, _) = scaled("none", 1.0, &motions);
+            let mut noise = Noise::white(NOISE);
+            match kind {
+                "colored 0.3 s" => noise.colored = 0.3,
+                "colored 1 s" => noise.colored = 1.0,
+                "offset stated" | "offset not stated" => noise.offset = 1.0,
+                "still air of a mocap" => (noise.velocity, noise.depth) = (0.03, 0.002),
+                _ => {}
+            }
+            let mut trials = trials(&motions, &added, &noise, seed);
+            if kind == "offset stated" {
+                trials.manifest.trial_offset = [("fx", 8.0), ("fz", 12.0), ("my", 4.0), ("mz", 4.0)]
+                    .map(|(n, v)| (n.to_owned(), v))
+                    .into();
+            }
+            for trial in &mut trials.trials {
+                if kind == "quantized" {
+                    for column in trial.measured.iter_mut().flatten() {
+                        column.iter_mut().for_each(|v| *v = (*v / 10.0).round() * 10.0);
+                    }
+                }
+                if kind == "dropouts" {
+                    let keep = |i: usize| !(200..260).contains(&i) && i % 97 != 3;
+                    let cut = |column: &mut Vec<f64>| {
+                        let mut i = 0;
+                        column.retain(|_| {
+                            i += 1;
+                            keep(i - 1)
+                        });
+                    };
+                    let cut3 = |column: &mut Vec<wade::frame::Vec3>| {
+                        let mut i = 0;
+                        column.retain(|_| {
+                            i += 1;
+                            keep(i - 1)
+                        });
+                    };
+                    for c in [
+                        &mut trial.t,
+                        &mut trial.roll,
+                        &mut trial.pitch,
+                        &mut trial.yaw,
+                        &mut trial.depth,
+                        &mut trial.density,
+                    ] {
+                        cut(c);
+                    }
+                    for c in [
+                        &mut trial.velocity,
+                        &mut trial.angular_velocity,
+                        &mut trial.acceleration,
+                        &mut trial.angular_acceleration,
+                    ] {
+                        cut3(c);
+                    }
+                    trial.measured.iter_mut().flatten().for_each(cut);
+                    trial.simulated.iter_mut().flatten().for_each(cut);
+                    let count = trial.t.len();
+                    trial.rows.truncate(count);
+                }
+            }
+            let body = gap::body_of(&trials).expect("a body");
+            let report =
+                gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs");
+            all += 1;
+            if !report.effects.is_empty() {
+                named += 1;
+            }
+            if report.verdict == gap::Verdict::NoCandidateFits {
+                structured += 1;
+            }
+            if report.verdict != gap::Verdict::NothingMissing {
+                println!(
+                    "{kind} seed {seed}: {:?} {:?} {:?}",
+                    report.verdict,
+                    report.effects.iter().map(|e| (e.name, &e.parameters)).collect::<Vec<_>>(),
+                    report.gap.unexplained
+                );
+            }
+        }
+    }
+    println!("{all} nulls, {named} named, {structured} called structure ->");
 }

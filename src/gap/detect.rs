@@ -138,7 +138,7 @@ fn of_effect(
     let mut excited = false;
     for &(column, coefficient) in &candidate.columns {
         let (signal, trials) = signal(&raw, coefficient, all, setting, design);
-        let smooth = signal.max(0.0);
+        let smooth = signal.min(kinematic_signal(effect, all, &setting.components)).max(0.0);
         found.trials = found.trials.max(if smooth > LEAST_SIGNAL { trials } else { 0 });
         excited |= smooth > LEAST_SIGNAL;
         let Some(error) = errors(design, &[column], residual).map(|errors| errors[0]) else { continue };
@@ -198,6 +198,42 @@ fn signal(
     let most = by_trial.iter().copied().fold(0.0, f64::max);
     let trials = by_trial.iter().filter(|e| **e > EXCITED * most && **e > 0.0).count();
     (if total > 0.0 { 1.0 - noise / total } else { 0.0 }, trials)
+}
+
+/// Share of signal in the rates that an effect lives on, which are smoothed: their noise does not show in differences.
+pub(super) fn kinematic_signal(effect: Effect, all: &[Series], components: &[usize]) -> f64 {
+    let (mut noise, mut power) = (0.0, 0.0);
+    for series in all {
+        let count = series.t.len() as f64;
+        let mut add = |index: usize, of: &dyn Fn(usize) -> f64| {
+            noise += series.rate_noise[index] * count;
+            power += (0..series.t.len()).map(|i| of(i).powi(2)).sum::<f64>();
+        };
+        match effect {
+            Effect::AddedMass | Effect::MassError | Effect::WaveMemory => {
+                // pitch comes with surge, roll with sway
+                let felt = [[0, 4], [1, 3], [2, 2]];
+                for (axis, with) in felt.into_iter().enumerate() {
+                    if with.iter().any(|c| components.contains(c)) {
+                        add(axis, &|i| series.conditions[i].acceleration[axis]);
+                    }
+                }
+            }
+            Effect::WaterEntrySlamming => add(6, &|i| series.wetting_rate[i]),
+            Effect::SensorDelay => {
+                for &c in components {
+                    let values = series.binned(|i| series.predicted[i][c]);
+                    let white = white_variance(&values);
+                    let changes = values.windows(4).map(|w| (w[3] - w[0]).powi(2));
+                    // the difference of two bins has twice their noise
+                    noise += 2.0 * white * values.len() as f64 / white.max(1e-12);
+                    power += changes.sum::<f64>() / white.max(1e-12);
+                }
+            }
+            _ => return 1.0,
+        }
+    }
+    if power > 0.0 { 1.0 - noise / power } else { 0.0 }
 }
 
 /// Above this a coefficient is no longer an error that somebody makes.

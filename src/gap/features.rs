@@ -149,7 +149,11 @@ impl General {
     ) {
         use nalgebra::DMatrix;
         let count = self.columns.len();
-        let fold_of = |row: usize| design.block_fold[design.rows.rows[row].block];
+        // whole trials are left out: parts of one would teach the zero of the others
+        let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
+        let fold_of_trial: Vec<usize> =
+            (0..gains.len()).map(|trial| place(trial) % folds.min(design.trials.len())).collect();
+        let fold_of = |row: usize| fold_of_trial[design.rows.rows[row].trial];
         let x = DMatrix::from_fn(rows.len(), count, |i, j| self.columns[j].1[rows[i]]);
         let scale: Vec<f64> =
             (0..count).map(|j| (x.column(j).norm_squared() / rows.len() as f64).sqrt().max(1e-12)).collect();
@@ -202,8 +206,16 @@ fn quantities() -> [(&'static str, Quantity); 3] {
 pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> (f64, &'static str, f64) {
     let blocks = design.rows.blocks;
     let mut series: Vec<[Vec<f64>; 6]> = vec![Default::default(); blocks];
+    // the zero of a trial is no force that comes and goes
+    let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+    let mut zero = vec![[(0.0, 0.0); 6]; trials];
     for (row, place) in design.rows.rows.iter().enumerate() {
-        series[place.block][place.component].push(target[row]);
+        let (sum, count) = &mut zero[place.trial][place.component];
+        (*sum, *count) = (*sum + target[row], *count + 1.0);
+    }
+    for (row, place) in design.rows.rows.iter().enumerate() {
+        let (sum, count) = zero[place.trial][place.component];
+        series[place.block][place.component].push(target[row] - sum / count);
     }
     let excess: Vec<f64> = series
         .iter()

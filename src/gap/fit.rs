@@ -8,12 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::Config;
-use super::candidates::{Setting, columns};
+use super::candidates::Setting;
 use super::design::Design;
 use super::robust::errors;
 use super::select::Member;
 use super::series::Series;
-use super::statistics::{quantile, white_variance};
+use super::statistics::quantile;
 use crate::effects::{Effect, Shape};
 use crate::random::Random;
 
@@ -67,8 +67,7 @@ pub(super) fn fit(
         .flat_map(|(m, member)| member.columns.iter().map(move |&(column, k)| (m, column, k)))
         .collect();
     let columns: Vec<usize> = used.iter().map(|(_, column, _)| *column).collect();
-    let mut noise: Vec<f64> =
-        used.iter().map(|&(m, _, k)| noise_share(design, &set[m], k, all, setting)).collect();
+    let mut noise: Vec<f64> = used.iter().map(|&(m, _, k)| noise_share(design, &set[m], k, all)).collect();
     let (beta, _) = design.solve(&columns)?;
     let errors = errors(design, &columns, &design.residual(&columns, &beta))?;
     // a nonlinear parameter moves the rows like one more column; its draws are changes of its logarithm
@@ -198,34 +197,26 @@ fn bootstrap(groups: &[Group], noise: &[f64], config: &Config) -> Vec<DVector<f6
     (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random), noise)).collect()
 }
 
-/// Share of noise in the variance of a column of accelerations, after the design's smoothing.
-fn noise_share(
-    design: &Design,
-    member: &Member,
-    coefficient: usize,
-    all: &[Series],
-    setting: &Setting,
-) -> f64 {
+/// Share of noise in the variance of a column of accelerations.
+fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Series]) -> f64 {
     let candidate = &design.candidates[member.candidate];
-    if !matches!(candidate.effect, Effect::AddedMass | Effect::MassError) {
-        return 0.0;
-    }
-    let passes = design.noise.smoothing;
-    let gain = if passes == 0 { 1.0 } else { (std::f64::consts::TAU * passes as f64).sqrt().recip() };
-    let (mut noise, mut total) = (0.0, 0.0);
+    let axes = match candidate.effect {
+        Effect::AddedMass => coefficient..coefficient + 1,
+        Effect::MassError => 0..3,
+        _ => return 0.0,
+    };
+    let (mut noise, mut power) = (0.0, 0.0);
     for &trial in &design.trials {
         let series = &all[trial];
-        let column = columns(candidate.effect, &candidate.shape, series, trial, setting);
-        for &component in &setting.components {
-            let values = series.binned(|sample| column[coefficient][sample][component]);
-            let weight = design.noise.bin[component].powi(-2);
-            for run in series.runs.iter().filter(|run| run.len() >= 8) {
-                noise += weight * white_variance(&values[run.clone()]) * gain * run.len() as f64;
-                let mut smoothed = values[run.clone()].to_vec();
-                super::design::smooth(&mut smoothed, passes);
-                total += weight * smoothed.iter().map(|v| v * v).sum::<f64>();
-            }
+        for axis in axes.clone() {
+            let of = |c: &crate::condition::Condition| match axis {
+                0..3 => c.acceleration[axis],
+                _ => c.angular_acceleration[axis - 3],
+            };
+            noise += series.rate_noise[axis] * series.t.len() as f64;
+            power += series.conditions.iter().map(|c| of(c).powi(2)).sum::<f64>();
         }
     }
-    if total > 0.0 { (noise / total).min(0.5) } else { 0.0 }
+    // an axis that does not move has no coefficient worth a correction
+    if power > 0.0 { (noise / power).min(0.2) } else { 0.0 }
 }

@@ -1,25 +1,28 @@
 //! Standard errors that hold where the noise of a trial hangs together.
 //!
-//! The sandwich over clusters (Liang and Zeger, Biometrika 1986): rows of one cluster may depend on each other in any way.
-//! Clusters are trials where enough of them excite a column, else blocks, since a column that one trial alone excites has
-//! no scatter between trials. Student's degrees of freedom are the effective number of clusters, so that a column carried
-//! by few is trusted little.
+//! Where enough trials excite a column: the sandwich over trials (Liang and Zeger, Biometrika 1986); rows of one trial may
+//! depend on each other in any way, and Student's degrees of freedom are the effective number of trials. A column that few
+//! trials excite has hardly any scatter between trials to be judged by. There the noise is judged by the autocovariance of
+//! the residual of all trials together, up to two seconds (Newey and West, Econometrica 1987, with pooled covariances), or
+//! by the sandwich over blocks where that is larger.
 
 use nalgebra::DVector;
 
 use super::design::Design;
 use super::statistics::{normal_from_student, normal_tails};
 
-/// Trials that must excite a column, in effect, before they are the clusters.
+/// Trials that must excite a column, in effect, before the scatter between them is trusted.
 const ENOUGH_TRIALS: f64 = 8.0;
+/// Bins over which noise may hang together.
+const LAGS: usize = 20;
 
 /// What is known of a scaled coefficient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Error {
     /// Standard error.
     pub std: f64,
-    /// Effective number of clusters.
-    pub clusters: f64,
+    /// Degrees of freedom that the standard error itself has.
+    pub freedom: f64,
     /// Effective number of trials that excite the column.
     pub trials: f64,
 }
@@ -30,7 +33,7 @@ impl Error {
         if self.std <= 0.0 {
             return 0.0;
         }
-        normal_from_student((estimate / self.std).abs(), self.clusters - 1.0)
+        normal_from_student((estimate / self.std).abs(), self.freedom)
     }
 
     /// Probability of such an estimate where nothing is there.
@@ -42,43 +45,16 @@ impl Error {
 /// Standard errors of a fit.
 pub(super) fn errors(design: &Design, columns: &[usize], residual: &DVector<f64>) -> Option<Vec<Error>> {
     let inverse = design.inverse(columns)?;
-    let count = columns.len();
-    let rows = &design.rows;
-    let mut block_scores = vec![0.0; rows.blocks * count];
-    let mut block_energy = vec![0.0; rows.blocks * count];
-    for (index, &column) in columns.iter().enumerate() {
-        let values = design.x.column(column);
-        for (row, place) in rows.rows.iter().enumerate() {
-            let value = values[row];
-            block_scores[place.block * count + index] += value * residual[row];
-            block_energy[place.block * count + index] += value * value;
-        }
-    }
-    let by_trial = |values: &[f64]| {
-        let trials = rows.block_trial.iter().max().map_or(0, |last| last + 1);
-        let mut sums = vec![0.0; trials * count];
-        for (block, &trial) in rows.block_trial.iter().enumerate() {
-            (0..count).for_each(|i| sums[trial * count + i] += values[block * count + i]);
-        }
-        sums
-    };
-    let (trial_scores, trial_energy) = (by_trial(&block_scores), by_trial(&block_energy));
-    let variance = |scores: &[f64], index: usize| {
-        let clusters = scores.chunks(count).filter(|s| s.iter().any(|v| *v != 0.0)).count().max(2) as f64;
-        let influence =
-            |s: &[f64]| (0..count).map(|other| inverse[(index, other)] * s[other]).sum::<f64>().powi(2);
-        scores.chunks(count).map(influence).sum::<f64>() * clusters / (clusters - 1.0)
-    };
+    let noise = Noise::of(design, residual);
     let of = |index: usize| {
-        let trials = effective(trial_energy.iter().skip(index).step_by(count));
-        let blocks = effective(block_energy.iter().skip(index).step_by(count));
-        if trials >= ENOUGH_TRIALS {
-            Error { std: variance(&trial_scores, index).sqrt(), clusters: trials, trials }
-        } else {
-            Error { std: variance(&block_scores, index).sqrt(), clusters: blocks, trials }
+        // the weight of each row in the estimate
+        let mut weights = DVector::zeros(residual.len());
+        for (other, &column) in columns.iter().enumerate() {
+            weights.axpy(inverse[(index, other)], &design.x.column(column), 1.0);
         }
+        noise.error(design, &weights, &design.x.column(columns[index]).into_owned(), residual)
     };
-    Some((0..count).map(of).collect())
+    Some((0..columns.len()).map(of).collect())
 }
 
 /// The error of the sum that a group of columns adds, as one column of coefficient 1 beside a base: what a group says as a
@@ -97,30 +73,108 @@ pub(super) fn group(
         let weights = design.inverse(base)? * cross;
         base.iter().enumerate().for_each(|(i, &c)| sum.axpy(-weights[i], &design.x.column(c), 1.0));
     }
-    let rows = &design.rows;
-    let (mut scores, mut energy) = (vec![0.0; rows.blocks], vec![0.0; rows.blocks]);
-    for (row, place) in rows.rows.iter().enumerate() {
-        scores[place.block] += sum[row] * residual[row];
-        energy[place.block] += sum[row] * sum[row];
+    let weights = &sum / sum.norm_squared().max(f64::MIN_POSITIVE);
+    Some(Noise::of(design, residual).error(design, &weights, &sum, residual))
+}
+
+/// Variance of a weighted sum of rows under the autocovariance of a residual.
+pub(super) fn noise_of(design: &Design, residual: &DVector<f64>, weights: &DVector<f64>) -> f64 {
+    Noise::of(design, residual).pooled(design, weights)
+}
+
+/// Autocovariance of a residual by component and lag, over all trials.
+struct Noise {
+    covariance: Vec<[f64; LAGS]>,
+    /// Rows between a bin and the next.
+    width: usize,
+}
+
+impl Noise {
+    fn of(design: &Design, residual: &DVector<f64>) -> Self {
+        let rows = &design.rows.rows;
+        let width =
+            rows.iter().take_while(|row| row.bin == rows[0].bin && row.trial == rows[0].trial).count();
+        let mut sums = vec![[0.0; LAGS]; width];
+        let mut counts = vec![[0.0; LAGS]; width];
+        for (start, end) in trials(design) {
+            for row in start..end {
+                for lag in 0..LAGS.min((end - row).div_ceil(width)) {
+                    let place = (row - start) % width;
+                    sums[place][lag] += residual[row] * residual[row + lag * width];
+                    counts[place][lag] += 1.0;
+                }
+            }
+        }
+        // Bartlett's weights keep the sum positive
+        let taper = |lag: usize| 1.0 - lag as f64 / LAGS as f64;
+        let covariance = sums
+            .iter()
+            .zip(&counts)
+            .map(|(s, n)| std::array::from_fn(|lag| taper(lag) * s[lag] / f64::max(n[lag], 1.0)))
+            .collect();
+        Self { covariance, width }
     }
-    let trials = rows.block_trial.iter().max().map_or(0, |last| last + 1);
-    let by_trial = |values: &[f64]| {
-        let mut sums = vec![0.0; trials];
-        values.iter().zip(&rows.block_trial).for_each(|(value, &trial)| sums[trial] += value);
-        sums
-    };
-    let trial_energy = by_trial(&energy);
-    let (in_trials, in_blocks) = (effective(trial_energy.iter()), effective(energy.iter()));
-    let (scores, clusters) =
-        if in_trials >= ENOUGH_TRIALS { (by_trial(&scores), in_trials) } else { (scores, in_blocks) };
-    let whole: f64 = energy.iter().sum();
-    let used = scores.iter().filter(|s| **s != 0.0).count().max(2) as f64;
-    let variance = scores.iter().map(|s| s * s).sum::<f64>() * used / (used - 1.0);
-    Some(Error { std: variance.sqrt() / whole.max(f64::MIN_POSITIVE), clusters, trials: in_trials })
+
+    fn error(
+        &self,
+        design: &Design,
+        weights: &DVector<f64>,
+        column: &DVector<f64>,
+        residual: &DVector<f64>,
+    ) -> Error {
+        let rows = &design.rows;
+        let count = rows.block_trial.iter().max().map_or(0, |last| last + 1);
+        let (mut by_trial, mut by_block) = (vec![0.0; count], vec![0.0; rows.blocks]);
+        let mut energy = vec![0.0; count];
+        for (row, place) in rows.rows.iter().enumerate() {
+            let part = weights[row] * residual[row];
+            by_trial[place.trial] += part;
+            by_block[place.block] += part;
+            energy[place.trial] += column[row] * column[row];
+        }
+        let trials = effective(&energy);
+        if trials >= ENOUGH_TRIALS {
+            return Error { std: sandwich(&by_trial).sqrt(), freedom: trials - 1.0, trials };
+        }
+        let variance = self.pooled(design, weights).max(sandwich(&by_block));
+        Error { std: variance.sqrt(), freedom: rows.blocks as f64 - 1.0, trials }
+    }
+
+    /// Variance of a weighted sum of noise with the pooled autocovariance.
+    fn pooled(&self, design: &Design, weights: &DVector<f64>) -> f64 {
+        let mut variance = 0.0;
+        for (start, end) in trials(design) {
+            for row in start..end {
+                if weights[row] == 0.0 {
+                    continue;
+                }
+                let covariance = &self.covariance[(row - start) % self.width];
+                for lag in 0..LAGS.min((end - row).div_ceil(self.width)) {
+                    let both = if lag == 0 { 1.0 } else { 2.0 };
+                    variance += both * covariance[lag] * weights[row] * weights[row + lag * self.width];
+                }
+            }
+        }
+        variance.max(0.0)
+    }
+}
+
+/// First row of each trial and that after its last.
+fn trials(design: &Design) -> Vec<(usize, usize)> {
+    let rows = &design.rows.rows;
+    let starts: Vec<usize> =
+        (0..rows.len()).filter(|&row| row == 0 || rows[row].trial != rows[row - 1].trial).collect();
+    let ends = starts.iter().skip(1).copied().chain([rows.len()]);
+    starts.iter().copied().zip(ends).collect()
+}
+
+fn sandwich(parts: &[f64]) -> f64 {
+    let used = parts.iter().filter(|part| **part != 0.0).count().max(2) as f64;
+    parts.iter().map(|part| part * part).sum::<f64>() * used / (used - 1.0)
 }
 
 /// `(sum e)^2 / sum e^2`: as many clusters of equal energy would scatter as much.
-fn effective<'a>(energies: impl Iterator<Item = &'a f64>) -> f64 {
-    let (sum, squares) = energies.fold((0.0, 0.0), |(s, q), e| (s + e, q + e * e));
+fn effective(energies: &[f64]) -> f64 {
+    let (sum, squares) = energies.iter().fold((0.0, 0.0), |(s, q), e| (s + e, q + e * e));
     if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }

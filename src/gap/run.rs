@@ -26,8 +26,9 @@ use crate::trials::{Trials, WRENCH};
 
 /// Deviates that structure without a name needs.
 const STRUCTURE: f64 = 5.0;
-/// Deviates that energy without a phase needs; with a trial a score it cannot exceed the root of their number.
-const ENERGY: f64 = 3.0;
+/// Deviates that energy without a phase needs; with a score a trial it cannot exceed the root of their number, so that
+/// few trials need this share of the root.
+const ENERGY: [f64; 2] = [4.5, 0.8];
 
 /// The body that `trials.toml` describes, for another simulator's prediction.
 pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
@@ -164,7 +165,8 @@ impl Found {
         let size = (structure.gain / rows).sqrt();
         // a force that comes and goes with no phase of its own shows in its energy alone
         let (deviate, _, energy) = energy(all, design, &design.y);
-        structure.deviate > STRUCTURE && size > least || deviate > ENERGY && energy > 2.0 * least.max(0.5)
+        let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
+        structure.deviate > STRUCTURE && size > least || deviate > bar && energy > 2.0 * least.max(0.5)
     }
 }
 

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::design::{Design, Fitted};
 use super::noise::Floor;
-use super::robust::{Error, errors, group};
+use super::robust::{Error, errors, group, noise_of};
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
 use crate::random::Random;
@@ -296,12 +296,19 @@ impl Judge<'_> {
         set
     }
 
-    /// The search: adds the best effect that passes, then swaps and deletes until nothing changes.
+    /// The search: adds the best effect that passes, or the best two that pass only beside each other, then swaps and
+    /// deletes until nothing changes.
     pub fn select(&self, library: &[Effect]) -> Vec<Member> {
         let mut set: Vec<Member> = Vec::new();
         while set.len() < self.config.most_effects {
-            let Some(best) = self.best_addition(&set, library) else { break };
-            set.push(best.member);
+            let before = set.len();
+            match self.best_addition(&set, library) {
+                Some(best) => set.push(best.member),
+                None => set.extend(self.best_pair(&set, library)),
+            }
+            if set.len() == before {
+                break;
+            }
             self.improve(&mut set, library);
         }
         if set.len() == 1 {
@@ -395,28 +402,45 @@ impl Judge<'_> {
     /// One effect may stand for the sum of two that are both needed: every pair is looked at once.
     fn try_pairs(&self, set: &mut Vec<Member>, library: &[Effect]) {
         let now = self.set_score(set);
-        let mut best: Option<(f64, Vec<Member>)> = None;
-        for (index, &first) in library.iter().enumerate() {
-            let Some(a) = self.judge(&[], first) else { continue };
-            for &second in &library[index + 1..] {
-                let Some(b) = self.judge_quick(std::slice::from_ref(&a.member), second) else { continue };
-                let pair = vec![a.member.clone(), b];
-                let score = self.set_score(&pair);
-                if score < best.as_ref().map_or(now, |(score, _)| *score) - 1e-6 * now.abs() {
-                    best = Some((score, pair));
-                }
+        let pair = self.best_pair(&[], library);
+        if pair.len() == 2 && self.set_score(&pair) < now - 1e-6 * now.abs() {
+            *set = pair;
+            self.improve(set, library);
+        }
+    }
+
+    /// Two effects that both pass beside a set and each other; none where no pair does. Each hides the other where they
+    /// pull in opposite directions, so that neither passes alone.
+    fn best_pair(&self, set: &[Member], library: &[Effect]) -> Vec<Member> {
+        const LOOKED_AT: usize = 6;
+        if set.len() + 2 > self.config.most_effects {
+            return Vec::new();
+        }
+        let free: Vec<Effect> = library.iter().filter(|effect| !self.taken(set, **effect)).copied().collect();
+        let mut pairs: Vec<(f64, Effect, Effect)> = Vec::new();
+        for &first in &free {
+            let Some(a) = self.judge_quick(set, first) else { continue };
+            let mut beside = set.to_vec();
+            beside.push(a);
+            for &second in free.iter().filter(|second| **second != first) {
+                let Some(b) = self.judge_quick(&beside, second) else { continue };
+                let mut whole = beside.clone();
+                whole.push(b);
+                pairs.push((self.set_score(&whole), first, second));
             }
         }
-        if let Some((_, pair)) = best {
-            let effects: Vec<Effect> = pair.iter().map(|member| self.effect(member)).collect();
-            let Some(a) = self.passes(&pair[1..], effects[0]) else { return };
-            let Some(b) = self.passes(std::slice::from_ref(&a.member), effects[1]) else { return };
-            let found = vec![a.member, b.member];
-            if self.set_score(&found) < now {
-                *set = found;
-                self.improve(set, library);
-            }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        for (_, first, second) in pairs.into_iter().take(2 * LOOKED_AT) {
+            let Some(a) = self.judge_quick(set, first) else { continue };
+            let mut beside = set.to_vec();
+            beside.push(a);
+            let Some(b) = self.passes(&beside, second) else { continue };
+            let mut beside = set.to_vec();
+            beside.push(b.member.clone());
+            let Some(a) = self.passes(&beside, first) else { continue };
+            return vec![a.member, b.member];
         }
+        Vec::new()
     }
 
     /// The best form of an effect beside a set by least squares alone.
@@ -437,11 +461,12 @@ impl Judge<'_> {
     pub fn alternatives(&self, set: &[Member], library: &[Effect]) -> Vec<Vec<Member>> {
         let columns = self.columns(set);
         let Some(fitted) = self.design.fit(&columns) else { return Vec::new() };
-        let explained = (self.design.empty_loss() - fitted.loss).max(0.0);
         let mut found = Vec::new();
         for index in 0..set.len() {
             let mut others = set.to_vec();
             let out = others.remove(index);
+            let without = self.design.solve(&self.columns(&others)).map_or(fitted.loss, |(_, loss)| loss);
+            let explained = (without - fitted.loss).max(0.0);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
                 let Some(judged) = self.passes(&others, effect) else { continue };
                 // what needs more numbers to say the same is no rival
@@ -450,15 +475,38 @@ impl Judge<'_> {
                 }
                 let mut rival = others.clone();
                 rival.push(judged.member);
-                let Some((difference, error)) = self.difference(&rival, set) else { continue };
-                if difference <= (2.0 * error).max(0.01 * explained) {
+                let Some((difference, open)) = self.difference(&rival, set, explained) else { continue };
+                if difference <= open {
                     rival.sort_by_key(|member| self.effect(member));
                     found.push((difference, rival));
                 }
             }
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        found.into_iter().map(|(_, rival)| rival).collect()
+        let mut rivals: Vec<Vec<Member>> = found.into_iter().map(|(_, rival)| rival).collect();
+        // where one could stand for the other, both may be there
+        if let (&[ours], Some(&[theirs])) =
+            (&self.effects(set)[..], rivals.first().map(|r| self.effects(r)).as_deref())
+        {
+            rivals.extend(self.both(ours, theirs));
+        }
+        rivals
+    }
+
+    fn effects(&self, set: &[Member]) -> Vec<Effect> {
+        set.iter().map(|member| self.effect(member)).collect()
+    }
+
+    /// Two rivals together, where each is significant beside the other.
+    fn both(&self, ours: Effect, theirs: Effect) -> Option<Vec<Member>> {
+        let significant =
+            |judged: &Judged| !matches!(judged.refused, Some(refused) if refused != Refusal::SmallShare);
+        let a = self.judge(&[], ours)?;
+        let b = self.judge(std::slice::from_ref(&a.member), theirs).filter(significant)?;
+        let a = self.judge(std::slice::from_ref(&b.member), ours).filter(significant)?;
+        let mut both = vec![a.member, b.member];
+        both.sort_by_key(|member| self.effect(member));
+        Some(both)
     }
 
     /// Numbers that a member was fitted with, nonlinear ones included.
@@ -472,29 +520,42 @@ impl Judge<'_> {
         member.columns.len() + shape
     }
 
-    /// Cross-validated loss of one set over another, and its standard error from trial to trial.
-    fn difference(&self, rival: &[Member], set: &[Member]) -> Option<(f64, f64)> {
-        let (a, b) = (self.trial_losses(rival)?, self.trial_losses(set)?);
-        let differences: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
-        let count = differences.len() as f64;
-        let mean = differences.iter().sum::<f64>() / count;
-        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        Some((mean * count, (variance * count).sqrt()))
+    /// Cross-validated loss of one set over another, and how much of it two standard errors and the formulas' own
+    /// uncertainty leave open, for a member that explains `explained`.
+    ///
+    /// The scatter from trial to trial, and a hundredth for the formula. Where few trials tell the two apart that scatter
+    /// says nothing: there the noise alone counts, through what the two predict differently, and a twentieth.
+    fn difference(&self, rival: &[Member], set: &[Member], explained: f64) -> Option<(f64, f64)> {
+        const ENOUGH: f64 = 8.0;
+        let (a, b) = (self.predictions(rival)?, self.predictions(set)?);
+        let design = self.design;
+        let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
+        let mut trials = vec![0.0; design.trials.len()];
+        for (row, part) in design.rows.rows.iter().enumerate() {
+            trials[place(part.trial)] += (design.y[row] - a[row]).powi(2) - (design.y[row] - b[row]).powi(2);
+        }
+        let count = trials.len() as f64;
+        let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), d| (s + d.abs(), q + d * d));
+        let total: f64 = trials.iter().sum();
+        if sum * sum >= ENOUGH * squares {
+            let variance = trials.iter().map(|d| (d - total / count).powi(2)).sum::<f64>() / (count - 1.0);
+            return Some((total, (2.0 * (variance * count).sqrt()).max(0.01 * explained)));
+        }
+        // the loss of the rival has the noise twice as often as the predictions differ
+        let noise = 2.0 * noise_of(design, &(&design.y - &b), &(&a - &b)).sqrt();
+        Some((total, (2.0 * noise).max(0.05 * explained)))
     }
 
-    fn trial_losses(&self, set: &[Member]) -> Option<Vec<f64>> {
+    /// What a set predicts of each row by the fit without the row's fold.
+    fn predictions(&self, set: &[Member]) -> Option<DVector<f64>> {
         let columns = self.columns(set);
         let fitted = self.design.fit(&columns)?;
         let design = self.design;
-        let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
-        let mut losses = vec![0.0; trials];
-        for (row, place) in design.rows.rows.iter().enumerate() {
-            let beta = &fitted.fold_betas[design.block_fold[place.block]];
-            let sum: f64 = columns.iter().enumerate().map(|(i, &c)| beta[i] * design.x[(row, c)]).sum();
-            losses[place.trial] += (design.y[row] - sum).powi(2);
-        }
-        let used: Vec<f64> = design.trials.iter().map(|&trial| losses[trial]).collect();
-        Some(used)
+        let of = |row: usize| {
+            let beta = &fitted.fold_betas[design.block_fold[design.rows.rows[row].block]];
+            columns.iter().enumerate().map(|(i, &c)| beta[i] * design.x[(row, c)]).sum()
+        };
+        Some(DVector::from_fn(design.y.len(), |row, _| of(row)))
     }
 }
 

@@ -31,6 +31,8 @@ pub(super) struct Series {
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one.
     pub other: Vec<[f64; 6]>,
+    /// Noise that is left in the acceleration, the angular acceleration and the wetting rate: variance of a sample.
+    pub rate_noise: [f64; 7],
     /// Samples of each bin.
     pub bins: Vec<Range<usize>>,
     /// Bins of each run without a hole.
@@ -138,7 +140,9 @@ fn of_trial(
         immersions.push(immersion);
         conditions.push(condition);
     }
-    smooth_accelerations(&trial.t, &mut conditions);
+    let mut rate_noise = [0.0; 7];
+    smooth_accelerations(&trial.t, &mut conditions, &mut rate_noise);
+    let wetting_rate = wetting_rate(&trial.t, &trial.depth, &mut rate_noise[6]);
     let other: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| other_force(trial, c));
     let gap = (0..count).map(|i| {
         std::array::from_fn(|c| match (&measured[c], present[c]) {
@@ -151,7 +155,8 @@ fn of_trial(
         name: trial.name.clone(),
         gap: gap.collect(),
         other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
-        wetting_rate: wetting_rate(&trial.t, &trial.depth),
+        wetting_rate,
+        rate_noise,
         wheels: (0..count)
             .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
             .collect(),
@@ -172,7 +177,7 @@ fn of_trial(
 const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
 
 /// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
-fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
+fn smooth_accelerations(t: &[f64], conditions: &mut [Condition], noise: &mut [f64; 7]) {
     let pieces = pieces(t);
     for (angular, axis) in
         [false, true].into_iter().flat_map(|angular| (0..3).map(move |axis| (angular, axis)))
@@ -180,7 +185,10 @@ fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
         let read = |c: &Condition| if angular { c.angular_acceleration[axis] } else { c.acceleration[axis] };
         let values: Vec<f64> = conditions.iter().map(read).collect();
         let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
-        let share = white_variance(&values) / power.max(f64::MIN_POSITIVE);
+        let white = white_variance(&values);
+        let left = &mut noise[axis + if angular { 3 } else { 0 }];
+        *left = white;
+        let share = white / power.max(f64::MIN_POSITIVE);
         let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else {
             continue;
         };
@@ -189,6 +197,8 @@ fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
             let step = span / (piece.len().max(2) - 1) as f64;
             let odd = (piece.len() - 1) / 2 * 2 + 1;
             let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
+            // the middle weight of a parabola over w samples is about 9 / 4w, and so is its gain of variance
+            *left = white * (2.25 / window as f64).min(1.0);
             let smooth = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
             for (sample, value) in piece.clone().zip(smooth.into_iter().flatten()) {
                 let condition = &mut conditions[sample];
@@ -204,13 +214,14 @@ fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
 
 /// Rate of the depth, smoothed over at most a third of a second: noise must not look like entry, nor smoothing take its
 /// peak off.
-fn wetting_rate(t: &[f64], depth: &[f64]) -> Vec<f64> {
+fn wetting_rate(t: &[f64], depth: &[f64], noise: &mut f64) -> Vec<f64> {
     let mut rate = Vec::with_capacity(t.len());
     for piece in pieces(t) {
         let (times, depth) = (&t[piece.clone()], &depth[piece]);
         let count = times.len();
         let step = (times[count - 1] - times[0]) / (count.max(2) - 1) as f64;
         let window = rate_window(depth, step).min((count.max(1) - 1) / 2 * 2 + 1);
+        *noise = white_variance(depth) * 12.0 / (window as f64).powi(3) / (step * step).max(1e-12);
         // jitter of the stamps moves the rate by less than noise does
         let derivative = SavitzkyGolay::new(window, 2.min(window.saturating_sub(1)))
             .and_then(|filter| filter.derivative(depth, 1, step))

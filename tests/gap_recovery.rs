@@ -1,0 +1,234 @@
+//! Promise: the gap workflow names what is missing, says when nothing is, when two things cannot be told apart and when no
+//! effect of the library fits; the same whatever the order of the trials and for a mirrored vehicle.
+//!
+//! Effects are planted by formulas of `common/planted.rs`, on a box with another simulator's prediction.
+
+#[path = "common/planted.rs"]
+mod planted;
+
+use planted::{Noise, State, motions, planted as plant, rms, trials};
+use wade::frame::Vec3;
+use wade::gap::{self, Config, GapError, Predicted, Report, Verdict};
+use wade::trials::Trials;
+
+const NOISE: [f64; 6] = [8.0, 8.0, 12.0, 4.0, 4.0, 4.0];
+const TRIALS: usize = 20;
+const SAMPLES: usize = 800;
+
+/// Trials with effects planted so that the strongest component of each is `strength` times its noise, and their factors.
+fn with(names: &[&str], strength: f64, seed: u64) -> (Trials, Vec<f64>) {
+    let motions = motions(TRIALS, SAMPLES, seed);
+    let mut sum: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
+    let mut factors = Vec::new();
+    for name in names {
+        let unit: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| plant(name, m)).collect();
+        let size = rms(&unit);
+        let ratio = [0, 2, 4, 5].map(|c| size[c] / NOISE[c]).into_iter().fold(0.0, f64::max);
+        // a delay and a current are planted at one size
+        let factor = if matches!(*name, "sensor_delay" | "current") { 1.0 } else { strength / ratio };
+        for (sum, unit) in sum.iter_mut().flatten().zip(unit.iter().flatten()) {
+            (0..6).for_each(|c| sum[c] += factor * unit[c]);
+        }
+        factors.push(factor);
+    }
+    (trials(&motions, &sum, &Noise::white(NOISE), seed), factors)
+}
+
+fn run(trials: &Trials) -> Report {
+    let body = gap::body_of(trials).expect("a body");
+    gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs")
+}
+
+fn names(report: &Report) -> Vec<&'static str> {
+    report.effects.iter().map(|effect| effect.name).collect()
+}
+
+/// The planted value lies within the stated errors and 5 %, and the gap of the trials kept back closes.
+fn recovered(name: &str, parameter: &str, per_factor: f64, strength: f64) {
+    let (trials, factors) = with(&[name], strength, 11);
+    let report = run(&trials);
+    assert_eq!(report.verdict, Verdict::Named, "{name}: {} {:?}", report.summary, report.rejected);
+    assert_eq!(names(&report), [name]);
+    let found = &report.effects[0].parameters[parameter];
+    let truth = factors[0] * per_factor;
+    let room = 3.0 * found.std + 0.05 * truth.abs();
+    assert!((found.value - truth).abs() < room, "{name}: {found:?}, planted {truth}");
+    let closure = report.gap.held_out["all"].closure.expect("a gap");
+    assert!(closure > 0.85, "{name}: {closure}");
+    assert!(report.gap.worse_regions.is_empty(), "{name}: {:?}", report.gap.worse_regions);
+}
+
+#[test]
+fn effects_of_the_water_are_named_with_their_size() {
+    for (name, parameter, strength) in [
+        ("added_mass", "surge", 1.0),
+        ("linear_damping", "surge", 1.0),
+        ("drag_coefficient_error", "surge", 3.0),
+        ("rotation", "drag_coefficient", 3.0),
+        ("water_level_offset", "offset", 3.0),
+        ("water_entry_slamming", "vertical", 1.0),
+        ("wave_memory", "surge", 3.0),
+        ("squat", "sinkage", 1.0),
+        ("density_error", "relative_error", 1.0),
+        ("hull_flooding", "flooded_share", 3.0),
+    ] {
+        recovered(name, parameter, 1.0, strength);
+    }
+    recovered("current", "east", 0.3, 1.0);
+}
+
+#[test]
+fn faults_of_sensors_are_named_as_such_and_never_applied() {
+    for (name, parameter, value) in [
+        ("sensor_bias", "fz", 1.0),
+        ("sensor_drift", "fx", 1.0),
+        ("axis_misalignment", "about_y", 1.0),
+        ("sensor_delay", "delay", 0.08),
+    ] {
+        recovered(name, parameter, value, 1.0);
+        let report = run(&with(&[name], 1.0, 11).0);
+        assert!(!report.is_applicable(), "{name}");
+        assert!(!gap::effects_toml(&report).contains(name));
+    }
+}
+
+#[test]
+fn two_and_three_effects_are_told_apart() {
+    for set in [
+        &["added_mass", "sensor_delay"][..],
+        &["linear_damping", "sensor_bias"],
+        &["added_mass", "rotation", "squat"],
+    ] {
+        let report = run(&with(set, 3.0, 12).0);
+        assert_eq!(report.verdict, Verdict::Named, "{set:?}: {}", report.summary);
+        assert_eq!(names(&report), set, "in the order of the library");
+    }
+}
+
+#[test]
+fn where_nothing_is_missing_nothing_is_named() {
+    for (seed, colored, offset) in [(1, 0.0, 0.0), (2, 0.5, 0.0), (3, 0.0, 1.0)] {
+        let motions = motions(TRIALS, SAMPLES, seed);
+        let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
+        let noise = Noise { colored, offset, ..Noise::white(NOISE) };
+        let report = run(&trials(&motions, &nothing, &noise, seed));
+        assert_eq!(report.verdict, Verdict::NothingMissing, "{}", report.summary);
+        assert!(report.effects.is_empty() && report.regions.is_empty());
+        let smallest = report.excitation.iter().find(|e| e.name == "added_mass").expect("looked for");
+        assert!(smallest.minimum_detectable["surge"].value < 0.1, "{smallest:?}");
+    }
+}
+
+#[test]
+fn a_pair_that_these_trials_cannot_tell_apart_is_ambiguous_and_the_trial_that_would_is_named() {
+    // the simulator's fx is drag and nothing else, so a wrong gain of fx is a wrong coefficient
+    let report = run(&with(&["sensor_gain"], 3.0, 13).0);
+    assert_eq!(report.verdict, Verdict::Ambiguous, "{}", report.summary);
+    let sets: Vec<Vec<&str>> = std::iter::once(names(&report)).chain(report.alternatives.clone()).collect();
+    assert!(
+        sets.contains(&vec!["sensor_gain"]) && sets.contains(&vec!["drag_coefficient_error"]),
+        "{sets:?}"
+    );
+    assert!(report.separating_experiment.is_some_and(|text| text.contains("known weights")));
+}
+
+#[test]
+fn a_force_of_no_effect_has_no_name() {
+    for name in ["outside_sine", "outside_vibration"] {
+        let report = run(&with(&[name], 3.0, 14).0);
+        assert_eq!(report.verdict, Verdict::NoCandidateFits, "{name}: {}", report.summary);
+        assert!(report.effects.is_empty() && report.gap.unexplained.is_some());
+    }
+}
+
+#[test]
+fn what_is_not_excited_is_said() {
+    // steady straight runs in open water at one depth
+    let steady: Vec<Vec<State>> = (0..12)
+        .map(|index| {
+            let speed = 0.5 + 0.2 * f64::from(index);
+            let state = |i: u32| State {
+                t: f64::from(i) / planted::RATE,
+                v: Vec3::new(speed, 0.0, 0.0),
+                w: Vec3::zeros(),
+                a: Vec3::zeros(),
+                al: Vec3::zeros(),
+                depth: 0.2,
+                depth_rate: 0.0,
+                yaw: 0.0,
+            };
+            (0..600).map(state).collect()
+        })
+        .collect();
+    let nothing: Vec<Vec<[f64; 6]>> = steady.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
+    let report = run(&trials(&steady, &nothing, &Noise::white(NOISE), 3));
+    let silent: Vec<&str> = report.not_testable.iter().map(|missing| missing.name).collect();
+    for name in [
+        "added_mass",
+        "rotation",
+        "water_entry_slamming",
+        "sensor_delay",
+        "channel_blockage",
+        "wheel_paddle_thrust",
+        "mass_error",
+    ] {
+        assert!(silent.contains(&name), "{name} {silent:?}");
+    }
+    assert!(!silent.contains(&"drag_coefficient_error"), "{silent:?}");
+}
+
+#[test]
+fn the_order_of_the_trials_and_the_side_of_the_vehicle_do_not_matter() {
+    let (trials, _) = with(&["added_mass", "rotation"], 3.0, 15);
+    let report = run(&trials);
+    let mut shuffled = trials.clone();
+    shuffled.trials.reverse();
+    assert_eq!(run(&shuffled), report);
+    let mirrored = run(&mirrored(trials));
+    assert_eq!((mirrored.verdict, names(&mirrored)), (report.verdict, names(&report)));
+    for (a, b) in mirrored.effects.iter().zip(&report.effects) {
+        for (name, p) in &a.parameters {
+            assert!((p.value - b.parameters[name].value).abs() < 1e-6 * p.value.abs().max(1e-6), "{name}");
+        }
+    }
+}
+
+/// Left becomes right.
+fn mirrored(mut trials: Trials) -> Trials {
+    for trial in &mut trials.trials {
+        trial.velocity.iter_mut().chain(&mut trial.acceleration).for_each(|v| v.y = -v.y);
+        let turning = trial.angular_velocity.iter_mut().chain(&mut trial.angular_acceleration);
+        turning.for_each(|w| (w.x, w.z) = (-w.x, -w.z));
+        trial.yaw.iter_mut().for_each(|yaw| *yaw = -*yaw);
+        for wrench in [&mut trial.measured, &mut trial.simulated] {
+            for component in [1, 3, 5] {
+                wrench[component].iter_mut().flatten().for_each(|v| *v = -*v);
+            }
+        }
+    }
+    trials
+}
+
+#[test]
+fn bad_input_is_named() {
+    let (good, _) = with(&["squat"], 3.0, 16);
+    let body = gap::body_of(&good).expect("a body");
+    let run = |trials: &Trials| {
+        gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).expect_err("refused")
+    };
+    let mut few = good.clone();
+    few.trials.truncate(3);
+    assert_eq!(run(&few), GapError::TooFewTrials { trials: 3, least: 4 });
+    let mut silent = good.clone();
+    silent.trials[4].measured = Default::default();
+    assert_eq!(run(&silent), GapError::NothingMeasured { trial: "run04".into() });
+    let mut uneven = good.clone();
+    uneven.trials[4].measured[0] = None;
+    assert_eq!(run(&uneven), GapError::Components { trial: "run04".into(), component: "fx" });
+    let mut other = good.clone();
+    other.manifest.vehicle = "boat".into();
+    assert!(matches!(run(&other), GapError::Vehicle { .. }));
+    let mut bodiless = good;
+    bodiless.manifest.body = None;
+    assert!(matches!(gap::body_of(&bodiless), Err(GapError::NoBody { .. })));
+}
