@@ -44,7 +44,9 @@ pub mod soak;
 pub mod states;
 
 pub mod cfd;
+pub mod evaluate;
 pub mod gap;
+pub mod gap_bench;
 pub mod train;
 pub mod validate;
 
