@@ -1,0 +1,151 @@
+"""What lies in shared memory: the counterpart of the server's src/service/shm_layout.rs, to which the tests hold it.
+
+Little-endian as the machine is. The version is part of the services' names.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+
+import numpy as np
+
+VERSION = "v1"
+MAX_BATCH = 256
+MAX_SURFACES = 64
+
+#: Flag of a query: no water pressure under the contact patches.
+DRY_CONTACT = 1
+#: Flag of an answer: the server polls, so that waking it is of no use.
+SERVER_POLLS = 1
+
+STATUS_OK = 0
+STATUS_INVALID_STATE = 1
+
+QUERY = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("wake_key", "<u8"),
+        ("flags", "<u4"),
+        ("depth_m", "<f4"),
+        ("density_kgpm3", "<f4"),
+        ("velocity_mps", "<f4", 3),
+        ("current_mps", "<f4", 3),
+        ("angular_velocity_radps", "<f4", 3),
+        ("acceleration_mps2", "<f4", 3),
+        ("angular_acceleration_radps2", "<f4", 3),
+        ("gravity_direction", "<f4", 3),
+        ("reserved", "<u4"),
+    ]
+)
+
+ANSWER = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("compute_ns", "<u8"),
+        ("status", "<u4"),
+        ("field", "<u4"),
+        ("problem", "<u4"),
+        ("flags", "<u4"),
+        ("bundle_version", "<u4"),
+        ("surface_count", "<u4"),
+        ("force_n", "<f4", 3),
+        ("moment_nm", "<f4", 3),
+        ("about_m", "<f4", 3),
+        ("uncertainty_n", "<f4", 3),
+        ("outside", "<f4", 7),
+        ("provenance", "S32"),
+        ("surface_force_n", "<f4", (MAX_SURFACES, 3)),
+        ("surface_point_m", "<f4", (MAX_SURFACES, 3)),
+        ("wetted_fraction", "<f4", MAX_SURFACES),
+        ("reserved", "<u4"),
+    ]
+)
+
+BATCH_HEADER = np.dtype([("sequence", "<u8"), ("wake_key", "<u8"), ("count", "<u4"), ("reserved", "<u4")])
+
+BATCH_QUERY = np.dtype([("header", BATCH_HEADER), ("queries", QUERY, MAX_BATCH)])
+
+BATCH_ANSWER = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("compute_ns", "<u8"),
+        ("status", "<u4"),
+        ("index", "<u4"),
+        ("count", "<u4"),
+        ("flags", "<u4"),
+        ("answers", ANSWER, MAX_BATCH),
+    ]
+)
+
+#: Names of the fields that an answer may find wrong, by code.
+FIELDS = {
+    1: "velocity_mps",
+    2: "current_mps",
+    3: "angular_velocity_radps",
+    4: "acceleration_mps2",
+    5: "angular_acceleration_radps2",
+    6: "gravity_direction",
+    7: "depth_m",
+    8: "density_kgpm3",
+    9: "world_from_body",
+    10: "roll_pitch",
+    11: "ground_contact",
+}
+
+#: What is wrong with them, by code.
+PROBLEMS = {
+    1: "must be finite",
+    2: "must not be that large",
+    3: "must not be negative",
+    4: "must be greater than zero",
+    5: "must have length 1",
+    6: "must be one of the values of its enumeration",
+}
+
+
+def _pack_format(dtype: np.dtype) -> str:
+    codes = {"<u8": "Q", "<u4": "I", "<f4": "f"}
+    fields = (dtype.fields[name][0] for name in dtype.names)
+    return "<" + "".join(codes[field.base.str] * int(np.prod(field.shape)) for field in fields)
+
+
+#: A query as bytes: several times faster than through a numpy record.
+QUERY_STRUCT = struct.Struct(_pack_format(QUERY))
+
+
+def _payload(name: str, dtype: np.dtype) -> type[ctypes.Structure]:
+    """What iceoryx2 needs to know of a type: its name, size and alignment, which must be those of the server's."""
+    fields = [("words", ctypes.c_uint64 * (dtype.itemsize // 8))]
+    return type(name, (ctypes.Structure,), {"_fields_": fields, "type_name": staticmethod(lambda: f"wade::v1::{name}")})
+
+
+Query = _payload("Query", QUERY)
+Answer = _payload("Answer", ANSWER)
+BatchQuery = _payload("BatchQuery", BATCH_QUERY)
+BatchAnswer = _payload("BatchAnswer", BATCH_ANSWER)
+
+
+def evaluate_name(namespace: str, vehicle: str) -> str:
+    """Name of a vehicle's service for single states."""
+    return f"{namespace}/{VERSION}/evaluate/{vehicle}"
+
+
+def evaluate_batch_name(namespace: str, vehicle: str) -> str:
+    """Name of a vehicle's service for batches."""
+    return f"{namespace}/{VERSION}/evaluate_batch/{vehicle}"
+
+
+def wake_name(namespace: str) -> str:
+    """Name of the event service on which clients wake the server."""
+    return f"{namespace}/{VERSION}/wake"
+
+
+def done_name(namespace: str) -> str:
+    """Name of the event service on which the server wakes the client whose listener is called `listener_name`."""
+    return f"{namespace}/{VERSION}/done"
+
+
+def listener_name(wake_key: int) -> str:
+    """Name of the listener of a client with this wake key."""
+    return f"{wake_key:016x}"
