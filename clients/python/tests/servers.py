@@ -10,7 +10,7 @@ import time
 import uuid
 from pathlib import Path
 
-import wade
+import grpc
 
 ROOT = Path(__file__).resolve().parents[3]
 VEHICLES = ROOT / "vehicles"
@@ -58,20 +58,36 @@ class Server:
         with (self.folder / "log").open("ab") as log:
             self.process = subprocess.Popen(command, env=environment(), stderr=log)
         end = time.monotonic() + 30
-        with wade.GrpcClient(self.address) as client:
-            while True:
-                try:
-                    client.vehicles()
-                    return
-                except wade.WadeError as error:
-                    log_text = (self.folder / "log").read_text()
-                    assert self.process.poll() is None and time.monotonic() < end, f"{error}\n{log_text}"
-                    time.sleep(0.05)
+        while not self._is_healthy():
+            log_text = (self.folder / "log").read_text()
+            assert self.process.poll() is None and time.monotonic() < end, log_text
+            time.sleep(0.05)
+
+    def _is_healthy(self) -> bool:
+        with grpc.insecure_channel(self.address) as channel:
+            check = channel.unary_unary("/grpc.health.v1.Health/Check")
+            try:
+                # an empty request means the server as a whole; the answer's one field is 1 where it serves
+                return bool(check(b"", timeout=1) == b"\x08\x01")
+            except grpc.RpcError:
+                return False
 
     def send(self, number: signal.Signals) -> None:
         """Sends a signal to the server."""
         assert self.process is not None
         self.process.send_signal(number)
+
+    def freeze(self) -> None:
+        """Stops it as a debugger would; returns when every thread stands still."""
+        assert self.process is not None
+        self.send(signal.SIGSTOP)
+        threads = Path(f"/proc/{self.process.pid}/task")
+        while any(") T " not in (thread / "stat").read_text() for thread in threads.iterdir()):
+            time.sleep(0.001)
+
+    def thaw(self) -> None:
+        """Lets it go on."""
+        self.send(signal.SIGCONT)
 
     def kill(self) -> None:
         """Ends it as a crash would."""
@@ -81,7 +97,7 @@ class Server:
     def stop(self) -> None:
         """Ends it if it runs."""
         if self.process is not None and self.process.poll() is None:
-            self.send(signal.SIGCONT)
+            self.thaw()
             self.send(signal.SIGTERM)
             self.wait()
 

@@ -15,6 +15,9 @@ from .forces import Forces
 from .state import State
 from .vehicle import Vehicle
 
+#: What grpc.aio puts in the place of a call's status where it could not write a message.
+_NOT_WRITTEN = "Internal error from Core"
+
 
 class GrpcClient:
     """As `wade.GrpcClient`, with every call a coroutine and `async with` for `with`."""
@@ -71,7 +74,11 @@ class GrpcClient:
             raise self._failed(calls, failure, timeout_s) from None
 
     def _timeout(self, timeout_s: float | None) -> float:
-        return self._timeout_s if timeout_s is None else checked_timeout(timeout_s)
+        timeout_s = self._timeout_s if timeout_s is None else checked_timeout(timeout_s)
+        if timeout_s == 0.0:
+            # grpcio would take it for the next full millisecond
+            raise DeadlineExceeded(timeout_s)
+        return timeout_s
 
     def _connected(self) -> dict[str, Any]:
         if not self._calls:
@@ -115,7 +122,7 @@ class GrpcStream:
             await call.write(request)
             answer = await call.read()
         except (grpc.RpcError, asyncio.InvalidStateError):
-            # the latter where the call had ended before this state was written; its status says why
+            # the latter where the call had ended before this state was written
             answer = grpc.aio.EOF
         except asyncio.CancelledError:
             self.close()
@@ -125,9 +132,7 @@ class GrpcStream:
         finally:
             timer.cancel()
         if answer is grpc.aio.EOF:
-            self._call = None
-            status = (await call.code(), await call.initial_metadata(), await call.trailing_metadata(), await call.details())
-            raise self._client._failed(self._calls, grpc.aio.AioRpcError(*status), timeout_s)
+            raise await self._ended(call, timeout_s)
         return messages.forces(answer)
 
     def close(self) -> None:
@@ -141,3 +146,11 @@ class GrpcStream:
 
     async def __aexit__(self, *exception: object) -> None:
         self.close()
+
+    async def _ended(self, call: Any, timeout_s: float) -> WadeError:
+        """What ended a call, by its status."""
+        self._call = None
+        status = (await call.code(), await call.initial_metadata(), await call.trailing_metadata(), await call.details())
+        if status[-1] == _NOT_WRITTEN:
+            status = (grpc.StatusCode.UNAVAILABLE, *status[1:-1], "the connection broke")
+        return self._client._failed(self._calls, grpc.aio.AioRpcError(*status), timeout_s)

@@ -79,7 +79,11 @@ class GrpcClient:
             raise self._failed(calls, failure, timeout_s) from None
 
     def _timeout(self, timeout_s: float | None) -> float:
-        return self._timeout_s if timeout_s is None else checked_timeout(timeout_s)
+        timeout_s = self._timeout_s if timeout_s is None else checked_timeout(timeout_s)
+        if timeout_s == 0.0:
+            # grpcio would take it for the next full millisecond
+            raise DeadlineExceeded(timeout_s)
+        return timeout_s
 
     def _connected(self) -> dict[str, Any]:
         with self._lock:
