@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from servers import Server
+
 import wade
 import wade.aio
-from servers import Server
 
 CLIENTS = ("tcp", "unix", "shm_block", "shm_spin", "asyncio")
 

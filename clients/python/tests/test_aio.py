@@ -6,9 +6,10 @@ import asyncio
 
 import numpy as np
 import pytest
+from servers import Server
+
 import wade
 import wade.aio
-from servers import Server
 
 
 def test_calls_run_beside_each_other(server: Server) -> None:
@@ -28,7 +29,10 @@ def test_a_call_that_is_given_up_leaves_the_client_whole(mortal_server: Server) 
     state = wade.State(depth_m=0.15)
 
     async def main() -> None:
-        async with wade.aio.GrpcClient(mortal_server.address, timeout_s=20.0) as client, client.stream("husky") as stream:
+        async with (
+            wade.aio.GrpcClient(mortal_server.address, timeout_s=20.0) as client,
+            client.stream("husky") as stream,
+        ):
             expected = await stream.evaluate(state)
             mortal_server.freeze()
             for call in (stream.evaluate, lambda s: client.evaluate("husky", s)):

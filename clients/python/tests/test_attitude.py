@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 import wade
 
 QUARTER = np.pi / 2
@@ -30,4 +31,6 @@ def test_rows_are_taken_alone() -> None:
     np.testing.assert_array_equal(rows[1], wade.gravity_from_roll_pitch(-0.2, 0.25))
     quaternions = np.random.default_rng(3).normal(size=(4, 4))
     np.testing.assert_allclose(np.linalg.norm(wade.gravity_from_quaternion(quaternions), axis=1), 1.0)
-    np.testing.assert_array_equal(wade.gravity_from_quaternion(quaternions)[2], wade.gravity_from_quaternion(quaternions[2]))
+    np.testing.assert_array_equal(
+        wade.gravity_from_quaternion(quaternions)[2], wade.gravity_from_quaternion(quaternions[2])
+    )

@@ -13,9 +13,10 @@ import grpc
 import iceoryx2 as iox
 import numpy as np
 import pytest
-import wade
 from conftest import connect
 from servers import VEHICLES, Server
+
+import wade
 from wade import shm_layout
 from wade.v1 import admin_pb2, admin_pb2_grpc
 
@@ -52,8 +53,11 @@ def test_an_absent_server(kind: str, mortal_server: Server, loop: asyncio.Abstra
         ]
         for call in calls:
             error = failing(call, wade.ServerUnavailable, within_s=1.0)
-            assert isinstance(error, ConnectionError)
-            assert error.at in (mortal_server.address, f"unix:{mortal_server.socket}") or mortal_server.namespace in error.at
+            assert isinstance(error, ConnectionError) and isinstance(error, wade.ServerUnavailable)
+            assert (
+                error.at in (mortal_server.address, f"unix:{mortal_server.socket}")
+                or mortal_server.namespace in error.at
+            )
         mortal_server.start()
         assert client.evaluate("husky", STATE, timeout_s=20).force_n[2] > 0
         assert stream.evaluate(STATE, timeout_s=20).force_n[2] > 0
@@ -96,7 +100,10 @@ def test_a_server_killed_while_it_is_asked(kind: str, mortal_server: Server, loo
         stream.evaluate(STATE, timeout_s=20)
         client.evaluate("husky", STATE, timeout_s=20)
         mortal_server.freeze()
-        for call in (lambda: client.evaluate("husky", STATE, timeout_s=0.2), lambda: stream.evaluate(STATE, timeout_s=0.2)):
+        for call in (
+            lambda: client.evaluate("husky", STATE, timeout_s=0.2),
+            lambda: stream.evaluate(STATE, timeout_s=0.2),
+        ):
             error = failing(call, wade.DeadlineExceeded, within_s=0.2)
             assert "200 ms" in str(error)
         mortal_server.kill()

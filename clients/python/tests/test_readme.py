@@ -17,7 +17,11 @@ def test_the_ten_lines(server: Server) -> None:
     assert match
     code, shown = match.groups()
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
-    for at in (f'GrpcClient("{server.address}"', f'GrpcClient("unix:{server.socket}"', f'ShmClient("{server.namespace}"'):
+    for at in (
+        f'GrpcClient("{server.address}"',
+        f'GrpcClient("unix:{server.socket}"',
+        f'ShmClient("{server.namespace}"',
+    ):
         program = code.replace('GrpcClient("127.0.0.1:50051"', at)
         run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=30)
         assert run.stdout == shown, "the README shows the numbers of other weights"

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 import wade
 
 NAN, INFINITY = float("nan"), float("inf")
@@ -123,6 +124,6 @@ def test_a_time_that_is_none_is_refused(client: Any, timeout_s: Any) -> None:
 
 def test_the_servers_limit_on_batches_is_an_error_of_the_batch(server: Any) -> None:
     with wade.GrpcClient(server.address, timeout_s=20.0) as client:
-        with pytest.raises(wade.InvalidState, match="4097.*4096") as caught:
+        with pytest.raises(wade.InvalidState, match=r"4097.*4096") as caught:
             client.evaluate_batch("husky", wade.State(depth_m=np.full(4097, 0.1)))
     assert caught.value.violations[0].field == "depth_m"

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import wade
 from servers import ROOT
+
+import wade
 from wade import shm_layout
 from wade.state import SCALARS, VECTORS
 from wade.v1 import hydrodynamics_pb2
@@ -56,7 +57,7 @@ def rust_fields(struct: str) -> list[tuple[str, str]]:
     return re.findall(r"^    pub (\w+): (.+),$", body.group(1), re.MULTILINE)
 
 
-def rust_type(dtype: np.dtype) -> str:
+def rust_type(dtype: np.dtype[Any]) -> str:
     """How Rust writes a field of this type."""
     names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|S32": "[u8; PROVENANCE_LEN]"}
     lengths = {shm_layout.MAX_SURFACES: "MAX_SURFACES", shm_layout.MAX_BATCH: "MAX_BATCH"}
@@ -77,8 +78,8 @@ def rust_type(dtype: np.dtype) -> str:
         ("BatchAnswer", shm_layout.BATCH_ANSWER),
     ],
 )
-def test_the_layout_is_the_servers(struct: str, dtype: np.dtype) -> None:
-    fields = [(name, rust_type(dtype.fields[name][0])) for name in dtype.names]
+def test_the_layout_is_the_servers(struct: str, dtype: np.dtype[Any]) -> None:
+    fields = [(name, rust_type(field)) for name, (field, _) in shm_layout.fields(dtype).items()]
     assert fields == rust_fields(struct)
     name = re.search(rf'#\[type_name\("(.*)"\)\]\npub struct {struct} ', LAYOUT)
     assert name
@@ -101,7 +102,9 @@ def test_the_codes_and_limits_are_the_servers() -> None:
     assert (status["Ok"], status["InvalidState"]) == (shm_layout.STATUS_OK, shm_layout.STATUS_INVALID_STATE)
     fields = re.search(r"pub enum Field \{(.*?)\n\}", WIRE, re.DOTALL)
     assert fields
-    assert shm_layout.FIELDS == {int(n): name for name, n in re.findall(r"/// `(\w+)`\n    \w+ = (\d+),", fields.group(1))}
+    assert shm_layout.FIELDS == {
+        int(n): name for name, n in re.findall(r"/// `(\w+)`\n    \w+ = (\d+),", fields.group(1))
+    }
     problems = re.search(r"pub enum Problem \{(.*?)\n\}", WIRE, re.DOTALL)
     assert problems
     assert list(shm_layout.PROBLEMS) == [int(n) for n in re.findall(r"\w+ = (\d+),", problems.group(1))]

@@ -11,8 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-import wade
 from servers import Server
+
+import wade
 
 STATE = wade.State(depth_m=0.15)
 
@@ -39,7 +40,11 @@ def pump(source: socket.socket, target: socket.socket) -> None:
 
 def relay(plain: socket.socket, context: ssl.SSLContext, server: tuple[str, int]) -> None:
     """One connection: what is secure on one side is plain on the other."""
-    with suppress(OSError), context.wrap_socket(plain, server_side=True) as secure, socket.create_connection(server) as target:
+    with (
+        suppress(OSError),
+        context.wrap_socket(plain, server_side=True) as secure,
+        socket.create_connection(server) as target,
+    ):
         back = threading.Thread(target=pump, args=(target, secure))
         back.start()
         pump(secure, target)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import subprocess
-import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import grpc
 import numpy as np
 import pytest
-import wade
+import tomllib
 from servers import VEHICLES, Server, binary, environment
+
+import wade
 from wade.v1 import hydrodynamics_pb2, hydrodynamics_pb2_grpc
 
 TILTED = wade.gravity_from_roll_pitch(0.1, -0.2)
@@ -47,7 +50,7 @@ ARRAYS = ("force_n", "moment_nm", "uncertainty_n", "surface_force_n", "surface_p
 
 
 def query(vehicle: str, arguments: list[str]) -> dict[str, Any]:
-    command = [binary(), "query", "--vehicle", vehicle, "--vehicles", VEHICLES, "--json", *arguments]
+    command: list[str | Path] = [binary(), "query", "--vehicle", vehicle, "--vehicles", VEHICLES, "--json", *arguments]
     return dict(json.loads(subprocess.run(command, capture_output=True, check=True, env=environment()).stdout))
 
 
@@ -166,12 +169,14 @@ def test_the_vehicles_are_listed(client: Any) -> None:
 
 
 def test_threads_may_share_a_client(server: Server) -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
     depths = np.linspace(0.05, 0.2, 40)
-    with wade.GrpcClient(server.address, timeout_s=20.0) as rpc, wade.ShmClient(server.namespace, timeout_s=20.0) as shm:
+    with (
+        wade.GrpcClient(server.address, timeout_s=20.0) as rpc,
+        wade.ShmClient(server.namespace, timeout_s=20.0) as shm,
+    ):
         alone = [rpc.evaluate("husky", wade.State(depth_m=depth)).force_n[2] for depth in depths]
-        for client in (rpc, shm):
+        clients: tuple[wade.Client, wade.Client] = (rpc, shm)
+        for client in clients:
             with ThreadPoolExecutor(4) as pool:
                 lifts = pool.map(lambda d, c=client: c.evaluate("husky", wade.State(depth_m=d)).force_n[2], depths)
                 assert list(lifts) == alone

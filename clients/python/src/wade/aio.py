@@ -150,7 +150,12 @@ class GrpcStream:
     async def _ended(self, call: Any, timeout_s: float) -> WadeError:
         """What ended a call, by its status."""
         self._call = None
-        status = (await call.code(), await call.initial_metadata(), await call.trailing_metadata(), await call.details())
+        status = (
+            await call.code(),
+            await call.initial_metadata(),
+            await call.trailing_metadata(),
+            await call.details(),
+        )
         if status[-1] == _NOT_WRITTEN:
             status = (grpc.StatusCode.UNAVAILABLE, *status[1:-1], "the connection broke")
         return self._client._failed(self._calls, grpc.aio.AioRpcError(*status), timeout_s)

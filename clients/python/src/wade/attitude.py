@@ -7,14 +7,14 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def gravity_from_roll_pitch(roll_rad: ArrayLike, pitch_rad: ArrayLike) -> NDArray[np.float64]:
-    """Unit vector along gravity, `[3]` or `[N, 3]`. Positive roll lowers the right side, positive pitch the nose (REP-103)."""
+    """Unit vector along gravity, `[3]` or `[N, 3]`. Positive roll lowers the right side, positive pitch the nose."""
     roll, pitch = np.broadcast_arrays(np.asarray(roll_rad, float), np.asarray(pitch_rad, float))
     up = (-np.sin(pitch), np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch))
     return -np.stack(up, axis=-1)
 
 
 def gravity_from_quaternion(world_from_body: ArrayLike) -> NDArray[np.float64]:
-    """Unit vector along gravity, `[3]` or `[N, 3]`, from the quaternion (w, x, y, z) that takes body vectors to the world.
+    """Unit vector along gravity, `[3]` or `[N, 3]`, from the quaternion (w, x, y, z) that takes body to world vectors.
 
     It is the negated last row of the rotation's matrix. The quaternion is normalized first.
     """

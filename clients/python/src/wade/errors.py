@@ -57,11 +57,13 @@ class DeadlineExceeded(WadeError, TimeoutError):
 
 
 class LayoutMismatch(WadeError):
-    """The server's shared memory has another layout than this client knows: install the client of the server's version."""
+    """The server's shared memory has another layout than this client's: install the one of the server's version."""
 
     def __init__(self, expected: str, found: str):
         self.expected, self.found = expected, found
-        super().__init__(f"shared memory of layout {expected} expected, found {found}; client and server must be of one version")
+        super().__init__(
+            f"shared memory of layout {expected} expected, found {found}; client and server must be of one version"
+        )
 
 
 class ResourceExhausted(WadeError):

@@ -34,7 +34,7 @@ class Quantity(IntEnum):
 class Forces:
     """What the water does to the vehicle, body frame, in single precision; arrays may be read-only.
 
-    Shapes are those of a single state with K surfaces, in the order of `Vehicle.surfaces`; in the answer to a batch of N
+    Shapes are those of a single state with K surfaces, in the order of `Vehicle.surfaces`; in the answer to a batch
     each array has N rows of them. The bits are the same whatever the transport, alone or in a batch.
     """
 
@@ -64,4 +64,5 @@ class Forces:
     @property
     def in_domain(self) -> NDArray[np.bool_] | np.bool_:
         """True where no quantity lies outside the training domain: one value, or `[N]` for a batch."""
-        return ~np.any(self.outside, axis=-1)
+        inside: NDArray[np.bool_] | np.bool_ = np.logical_not(np.any(self.outside, axis=-1))
+        return inside

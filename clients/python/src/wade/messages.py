@@ -45,7 +45,8 @@ def _with_arrays_as_bytes(file: FileDescriptor) -> dict[str, type[Message]]:
     # a pool of its own: in the default one the names are taken by the generated messages
     pool = descriptor_pool.DescriptorPool()
     pool.Add(proto)
-    return message_factory.GetMessageClassesForFiles([proto.name], pool)
+    classes: dict[str, type[Message]] = message_factory.GetMessageClassesForFiles([proto.name], pool)
+    return classes
 
 
 _SERVICE = hydrodynamics_pb2.DESCRIPTOR.services_by_name["Hydrodynamics"]
@@ -89,7 +90,9 @@ def evaluate_request(vehicle: str, state: State) -> Message:
 def evaluate_batch_request(vehicle: str, states: State, surfaces: bool) -> tuple[Message, int]:
     """A batch and its length; raises `InvalidState` for a wrong shape."""
     rows = states.rows()
-    arrays = {name: row.astype("<f4", copy=False).tobytes() for name, row in rows.items() if not states.is_default(name)}
+    arrays = {
+        name: row.astype("<f4", copy=False).tobytes() for name, row in rows.items() if not states.is_default(name)
+    }
     request = _new(
         "EvaluateBatchRequest",
         vehicle=vehicle,

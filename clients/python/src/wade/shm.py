@@ -1,7 +1,7 @@
 """The client over shared memory, for programs of the server's user on the server's machine. Linux.
 
-iceoryx2 does not tell a client that its server was killed, so that every wait here has its own end, and a wait that ends
-without an answer gives up the ports: the next call opens new ones and finds a server that was restarted.
+iceoryx2 does not tell a client that its server was killed, so that every wait here has its own end, and a wait that
+ends without an answer gives up the ports: the next call opens new ones and finds a server that was restarted.
 """
 
 from __future__ import annotations
@@ -185,12 +185,11 @@ def _query(sequence: int, wake_key: int, flags: int, floats: list[float]) -> byt
 
 
 def _read(address: int) -> np.void:
-    return np.frombuffer(ctypes.string_at(address, layout.ANSWER.itemsize), layout.ANSWER)[0]
+    answer: np.void = np.frombuffer(ctypes.string_at(address, layout.ANSWER.itemsize), layout.ANSWER)[0]
+    return answer
 
 
-def _write_batch(
-    address: int, sequence: int, wake_key: int, flags: int, rows: dict[str, Array], chunk: slice
-) -> None:
+def _write_batch(address: int, sequence: int, wake_key: int, flags: int, rows: dict[str, Array], chunk: slice) -> None:
     batch = np.frombuffer(memory(address, layout.BATCH_QUERY.itemsize), layout.BATCH_QUERY)[0]
     count = chunk.stop - chunk.start
     batch["header"] = (sequence, wake_key, count, 0)

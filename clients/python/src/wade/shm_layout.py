@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from typing import Any
 
 import numpy as np
 
@@ -104,20 +105,26 @@ PROBLEMS = {
 }
 
 
-def _pack_format(dtype: np.dtype) -> str:
+def fields(dtype: np.dtype[Any]) -> dict[str, tuple[np.dtype[Any], int]]:
+    """Type and offset of each field of a struct, in order."""
+    assert dtype.fields is not None, "a struct has fields"
+    return {name: (field[0], field[1]) for name, field in dtype.fields.items()}
+
+
+def _pack_format(dtype: np.dtype[Any]) -> str:
     codes = {"<u8": "Q", "<u4": "I", "<f4": "f"}
-    fields = (dtype.fields[name][0] for name in dtype.names)
-    return "<" + "".join(codes[field.base.str] * int(np.prod(field.shape)) for field in fields)
+    types = (field for field, _ in fields(dtype).values())
+    return "<" + "".join(codes[field.base.str] * int(np.prod(field.shape)) for field in types)
 
 
 #: A query as bytes: several times faster than through a numpy record.
 QUERY_STRUCT = struct.Struct(_pack_format(QUERY))
 
 
-def _payload(name: str, dtype: np.dtype) -> type[ctypes.Structure]:
+def _payload(name: str, dtype: np.dtype[Any]) -> type[ctypes.Structure]:
     """What iceoryx2 needs to know of a type: its name, size and alignment, which must be those of the server's."""
-    fields = [("words", ctypes.c_uint64 * (dtype.itemsize // 8))]
-    return type(name, (ctypes.Structure,), {"_fields_": fields, "type_name": staticmethod(lambda: f"wade::v1::{name}")})
+    words = [("words", ctypes.c_uint64 * (dtype.itemsize // 8))]
+    return type(name, (ctypes.Structure,), {"_fields_": words, "type_name": staticmethod(lambda: f"wade::v1::{name}")})
 
 
 Query = _payload("Query", QUERY)

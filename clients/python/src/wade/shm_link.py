@@ -25,7 +25,8 @@ _FAILURES = (
     iox.RequestResponseOpenError,
 )
 
-_FLAGS_AT = {False: layout.ANSWER.fields["flags"][1], True: layout.BATCH_ANSWER.fields["flags"][1]}
+# where the flags of an answer lie, by whether it is a batch's
+_FLAGS_AT = {False: layout.fields(layout.ANSWER)["flags"][1], True: layout.fields(layout.BATCH_ANSWER)["flags"][1]}
 
 # its log would go to standard output, and says of every server that is not there that it is not there
 iox.set_log_level_from_env_or(iox.LogLevel.Fatal)
@@ -50,7 +51,9 @@ class Link:
             builder = iox.NodeBuilder.new().signal_handling_mode(iox.SignalHandlingMode.Disabled)
             self._node = builder.create(iox.ServiceType.Ipc)
         except _FAILURES as failure:
-            raise ServerUnavailable(self._at(), f"no node: {failure}; /tmp/iceoryx2 serves the user who owns it") from None
+            raise ServerUnavailable(
+                self._at(), f"no node: {failure}; /tmp/iceoryx2 serves the user who owns it"
+            ) from None
         self._wake: Any = None
         self._listener: Any = None
 

@@ -94,7 +94,9 @@ class State:
         """
         depth = _array("depth_m", self.depth_m)
         if depth.ndim != 1 or depth.size == 0:
-            raise _wrong("depth_m", f"must have one value a state, [N] with N at least 1, got {_describe(self.depth_m)}")
+            raise _wrong(
+                "depth_m", f"must have one value a state, [N] with N at least 1, got {_describe(self.depth_m)}"
+            )
         rows = {"depth_m": depth}
         for name in (*SCALARS[1:], *VECTORS):
             shape = (depth.size, 3) if name in VECTORS else (depth.size,)
