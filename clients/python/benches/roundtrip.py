@@ -25,6 +25,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from queue import SimpleQueue
@@ -194,7 +195,7 @@ def cases(stack: ExitStack, binary: Path, placement: str) -> dict[str, Case]:
     found = echo_cases(channel, message_lengths(address))
     found |= {"gRPC unary": timed(lambda: rpc.evaluate(VEHICLE, STATE))}
     for name, stream in streams.items():
-        found[name] = timed(lambda stream=stream: stream.evaluate(STATE))
+        found[name] = timed(partial(stream.evaluate, STATE))
     found |= {
         "gRPC stream, asyncio": awaited(loop.run_until_complete(open_stream()), loop),
         "shared memory, blocking": timed(lambda: shm.evaluate(VEHICLE, STATE)),
@@ -278,9 +279,8 @@ def main() -> None:
         results[placement] = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
         print(f"{placement:34} {'p50 least':>10} {'median':>8} {'p99':>9} {'client CPU':>11}  [us]")
         for name, row in results[placement].items():
-            print(
-                f"{name:34} {row['p50_us_least']:10.1f} {row['p50_us_median']:8.1f} {row['p99_us']:9.1f} {row['client_cpu_us']:11.1f}"
-            )
+            figures = [row[key] for key in ("p50_us_least", "p50_us_median", "p99_us", "client_cpu_us")]
+            print(f"{name:34} {{:10.1f}} {{:8.1f}} {{:9.1f}} {{:11.1f}}".format(*figures))
     if arguments.out:
         report = {"machine": machine(), "note": arguments.note, "vehicle": VEHICLE, "results": results}
         arguments.out.write_text(json.dumps(report, indent=2) + "\n")

@@ -2,9 +2,10 @@
 
     python clients/python/examples/mujoco_wading.py --plot wading.png     # with wade serve running on this machine
 
-MuJoCo has no free surface. Here each step of 1 ms asks the server for the net wrench at the present depth, attitude and
-velocity, over shared memory, and puts it on the body that carries the wheels. Not in it yet, since it is not served yet:
-added mass, and damping in heave, pitch and roll; `stand_in_damping` puts a plain damping in the place of the latter.
+MuJoCo has no free surface. Here each step of 1 ms asks the server for the net wrench at the present depth, attitude
+and velocity, over shared memory, and puts it on the body that carries the wheels. Not in it yet, since it is not served
+yet: added mass, and damping in heave, pitch and roll; `stand_in_damping` puts a plain damping in the place of the
+latter. A depth below zero cannot be asked for: the water begins when it reaches the ground under the body's origin.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -58,7 +60,7 @@ def build(
     fluid: str = "",
 ) -> mujoco.MjModel:
     """The vehicle with its origin at (x, 0, z) over a ground profile; `fluid` are attributes of MuJoCo's own model."""
-    slabs = "".join(slab(*start, *end) for start, end in zip(ground, ground[1:], strict=False))
+    slabs = "".join(slab(*start, *end) for start, end in pairwise(ground))
     wheels = "".join(WHEEL.format(name=name, x=place[0], y=place[1]) for name, place in WHEELS.items())
     motors = "".join(f'<velocity joint="wheel_{name}" kv="80" forcerange="-250 250"/>' for name in WHEELS)
     return mujoco.MjModel.from_xml_string(f"""

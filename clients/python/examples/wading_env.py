@@ -1,4 +1,4 @@
-"""Thousands of Warthogs that learn to cross a river, as one vectorised gymnasium environment with one batch call a step.
+"""Thousands of Warthogs that learn to cross a river: a vectorised gymnasium environment, one batch call a step.
 
     python clients/python/examples/wading_env.py        # with wade serve running on this machine
 
@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 
 
 class WadingVectorEnv(VectorEnv[Any, Any, Any]):
-    """Observations `[N, 10]`: x and y over the size of the ford, cosine and sine of the heading, surge, sway and yaw rate,
-    depth, share of the weight on the wheels, current across the river. Actions `[N, 2]`: drive of the left and right
-    wheels, -1 to 1. The reward is the way made [m] less a little for effort, and 5 for the far shore.
+    """Observations `[N, 10]`: x and y over the size of the ford, cosine and sine of the heading, surge, sway and yaw
+    rate, depth, share of the weight on the wheels, current across the river. Actions `[N, 2]`: drive of the left and
+    right wheels, -1 to 1. The reward is the way made [m] less a little for effort, and 5 for the far shore.
     """
 
     metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012, as gymnasium declares it
@@ -53,11 +53,12 @@ class WadingVectorEnv(VectorEnv[Any, Any, Any]):
         self.pose, self.rates = np.zeros((num_envs, 3)), np.zeros((num_envs, 3))
         self.river_depth, self.current = np.zeros(num_envs), np.zeros(num_envs)
         self._load, self._ages = np.ones(num_envs), np.zeros(num_envs, int)
-        self._done = np.ones(num_envs, bool)
+        self._done = np.zeros(num_envs, bool)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new river for each vehicle."""
         super().reset(seed=seed)
+        self._done[:] = False
         self._begin(np.ones(self.num_envs, bool))
         return self._observe(), {}
 
@@ -123,7 +124,16 @@ class WadingVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _observe(self) -> Any:
         x, y, yaw = self.pose.T
-        columns = (x / LENGTH, y / HALF_WIDTH, np.cos(yaw), np.sin(yaw), *self.rates.T, self.depth(), self._load, self.current)
+        columns = (
+            x / LENGTH,
+            y / HALF_WIDTH,
+            np.cos(yaw),
+            np.sin(yaw),
+            *self.rates.T,
+            self.depth(),
+            self._load,
+            self.current,
+        )
         return np.stack(columns, axis=1, dtype=np.float32, casting="same_kind")
 
 

@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,7 @@ def volume_below(z: float) -> float:
                 polygon.append(a)
             if (a[2] < 0) != (b[2] < 0):
                 polygon.append(a + (b - a) * a[2] / (a[2] - b[2]))
-        volume += sum(prism(np.array([(polygon[0], b, c) for b, c in zip(polygon[1:], polygon[2:], strict=False)])))
+        volume += sum(prism(np.array([(polygon[0], b, c) for b, c in pairwise(polygon[1:])])))
     return float(volume)
 
 
