@@ -4,8 +4,8 @@
 
 MuJoCo's fluid model fills all space and has no surface, so the cases do not answer the same question; they cost what
 a user of each would pay. The MuJoCo cases step one vehicle after the other on one core, by 1 ms, in the ford.
-Repeats alternate between the cases; the most and the median are reported, and the client's CPU time, which what else the
-machine does changes least.
+Repeats alternate between the cases; the most and the median are reported, and the client's CPU time, which what else
+the machine does changes least.
 """
 
 from __future__ import annotations

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
+import itertools
+import re
+import shutil
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -225,3 +231,44 @@ def test_more_clients_than_there_is_room_for(mortal_server: Server) -> None:
             with pytest.raises(wade.ResourceExhausted, match="max_clients"):
                 second.evaluate("husky", STATE)
         assert second.evaluate("husky", STATE).force_n[2] > 0
+
+
+def test_a_batch_never_mixes_two_bundles(kind: str, mortal_server: Server, loop: asyncio.AbstractEventLoop) -> None:
+    vehicles = mortal_server.folder / "vehicles"
+    vehicles.mkdir()
+    lower, higher = VEHICLES / "husky", mortal_server.folder / "higher"
+    shutil.copytree(lower, higher)
+    text = (higher / "vehicle.toml").read_text()
+    moved = re.sub(r"center_of_mass_m = .*", "center_of_mass_m = [0.0, 0.0, 0.1]", text)
+    (higher / "vehicle.toml").write_text(re.sub(r"\nversion = .*", "\nversion = 900", moved))
+    digest = sha256((higher / "vehicle.toml").read_bytes()).hexdigest()
+    sums = re.sub(r"\S+(?=\s+vehicle.toml)", digest, (higher / "SHA256SUMS").read_text())
+    (higher / "SHA256SUMS").write_text(sums)
+    (vehicles / "husky").symlink_to(lower)
+    mortal_server.start(vehicles)
+    states = wade.State(depth_m=np.full(1024, 0.15), velocity_mps=(0.5, 0.2, 0))
+    done = threading.Event()
+
+    def exchange() -> None:
+        with grpc.insecure_channel(mortal_server.address) as channel:
+            admin, next_link = admin_pb2_grpc.AdminStub(channel), vehicles.parent / "next"
+            for target in itertools.cycle((higher, lower)):
+                if done.wait(0.05):
+                    return
+                next_link.symlink_to(target)
+                next_link.replace(vehicles / "husky")
+                assert admin.Reload(admin_pb2.ReloadRequest(), timeout=20).vehicles[0].refusal == ""
+
+    seen: dict[int, tuple[float, ...]] = {}
+    with connect(kind, mortal_server, loop, timeout_s=20.0) as client, ThreadPoolExecutor(1) as pool:
+        exchanging = pool.submit(exchange)
+        try:
+            # until both were seen, and a while longer
+            for _ in itertools.takewhile(lambda turn: len(seen) < 2 or turn < 20, itertools.count()):
+                forces = client.evaluate_batch("husky", states)
+                assert len(np.unique(forces.moment_nm, axis=0)) == 1
+                seen[forces.bundle_version] = tuple(forces.moment_nm[0])
+        finally:
+            done.set()
+        exchanging.result()
+    assert len(set(seen.values())) == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
 from typing import Protocol
 
 from .forces import Forces
@@ -14,7 +15,7 @@ DEFAULT_TIMEOUT_S = 1.0
 
 def checked_timeout(timeout_s: float) -> float:
     """A time to wait: zero or more; zero never waits, so that the call ends in `DeadlineExceeded`."""
-    if not (isinstance(timeout_s, (int, float)) and math.isfinite(timeout_s) and timeout_s >= 0):
+    if not (isinstance(timeout_s, Real) and math.isfinite(timeout_s) and timeout_s >= 0):
         raise ValueError(f"timeout_s must be a finite number of seconds, zero or more, got {timeout_s!r}")
     return float(timeout_s)
 

@@ -15,13 +15,10 @@ class Violation:
     """A field that is wrong, by the name that `State` gives it."""
 
     field: str
+    #: A sentence that names the field, and in a batch the state.
     description: str
     #: Which state of a batch; None for a single state or where the whole array is meant.
     index: int | None = None
-
-    def __str__(self) -> str:
-        at = "" if self.index is None else f" (state {self.index} of the batch)"
-        return f"{self.field}: {self.description}{at}"
 
 
 class InvalidState(WadeError, ValueError):
@@ -29,7 +26,7 @@ class InvalidState(WadeError, ValueError):
 
     def __init__(self, violations: Sequence[Violation]):
         self.violations = tuple(violations)
-        super().__init__("; ".join(map(str, self.violations)))
+        super().__init__("; ".join(violation.description for violation in self.violations))
 
 
 class UnknownVehicle(WadeError, LookupError):

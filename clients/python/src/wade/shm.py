@@ -262,5 +262,6 @@ def _check(status: int, answer: np.void, index: int | None) -> None:
     field = layout.FIELDS.get(int(answer["field"]))
     problem = layout.PROBLEMS.get(int(answer["problem"]))
     if status == layout.STATUS_INVALID_STATE and field and problem:
-        raise InvalidState([Violation(field, problem, index)])
+        at = "" if index is None else f" (state {index} of the batch)"
+        raise InvalidState([Violation(field, f"{field} {problem}{at}", index)])
     raise Refused(f"status {status}", "this client does not know it; is it of the server's version?")

@@ -37,7 +37,7 @@ VECTORS = (
 )
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True, eq=False)
 class State:
     """One state, or N of them for a batch. Body frame: x forward, y left, z up; SI units.
 
@@ -125,4 +125,4 @@ def _describe(value: Any) -> str:
 
 
 def _wrong(name: str, description: str) -> InvalidState:
-    return InvalidState([Violation(name, description)])
+    return InvalidState([Violation(name, f"{name} {description}")])
