@@ -1,6 +1,6 @@
 """Round trips from Python, one after the other, each beside a bare grpcio echo in the same run.
 
-    python clients/python/benches/roundtrip.py --out clients/python/benches/results.json
+    python clients/python/benches/roundtrip.py --out benches/results/DATE/python-client.json
 
 The echo server is Python's: it gives back bytes of the length that the server's answer has, without serialization on
 either side. Blocks of calls alternate between the cases, so that what else the machine does hits all of them; the least

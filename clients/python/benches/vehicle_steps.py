@@ -1,6 +1,6 @@
 """Vehicle-steps a second: MuJoCo with its own fluid model, with the server's forces, and the environment in numpy.
 
-    python clients/python/benches/vehicle_steps.py --out clients/python/benches/vehicle_steps.json
+    python clients/python/benches/vehicle_steps.py --out benches/results/DATE/vehicle-steps.json
 
 MuJoCo's fluid model fills all space and has no surface, so the cases do not answer the same question; they cost what
 a user of each would pay. The MuJoCo cases step one vehicle after the other on one core, by 1 ms, in the ford.
