@@ -234,8 +234,8 @@ def measure(cases: dict[str, Case], blocks: int, calls: int) -> dict[str, dict[s
     return rows
 
 
-def machine() -> dict[str, Any]:
-    """Where and with what this ran."""
+def machine(binary: Path) -> dict[str, Any]:
+    """Where and with what this runs; to be asked at the start. The server may be of another commit than the client."""
     models = [
         line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line
     ]
@@ -247,6 +247,7 @@ def machine() -> dict[str, Any]:
         "load_average": os.getloadavg(),
         "niceness": os.nice(0),
         "commit": head + ("-dirty" if changes else ""),
+        "server": subprocess.run([binary, "--version"], capture_output=True, text=True).stdout.strip(),
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "command": shlex.join(["python", *sys.argv]),
         "python": platform.python_version(),
@@ -273,7 +274,7 @@ def main() -> None:
             found = cases(stack, arguments.wade.resolve(), arguments.placement)
             print(json.dumps(measure(found, arguments.blocks, arguments.calls)))
         return
-    results = {}
+    results, started = {}, machine(arguments.wade)
     for placement in PLACEMENTS:
         command = [sys.executable, __file__, *sys.argv[1:], "--placement", placement]
         results[placement] = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
@@ -282,7 +283,7 @@ def main() -> None:
             figures = [row[key] for key in ("p50_us_least", "p50_us_median", "p99_us", "client_cpu_us")]
             print(f"{name:34} {{:10.1f}} {{:8.1f}} {{:9.1f}} {{:11.1f}}".format(*figures))
     if arguments.out:
-        report = {"machine": machine(), "note": arguments.note, "vehicle": VEHICLE, "results": results}
+        report = {"machine": started, "note": arguments.note, "vehicle": VEHICLE, "results": results}
         arguments.out.write_text(json.dumps(report, indent=2) + "\n")
 
 

@@ -134,7 +134,7 @@ def main() -> None:
     parser.add_argument("--note", default="", help="what else the machine does, for the results")
     parser.add_argument("--out", type=Path, help="JSON file for the results")
     arguments = parser.parse_args()
-    cpus = sorted(os.sched_getaffinity(0))
+    cpus, started = sorted(os.sched_getaffinity(0)), machine(arguments.wade)
     with ExitStack() as stack:
         _, _, namespace = stack.enter_context(served(arguments.wade.resolve(), "block", cpus[0]))
         os.sched_setaffinity(0, {cpus[-1]})
@@ -154,7 +154,7 @@ def main() -> None:
     if arguments.out:
         versions = {"mujoco": mujoco.__version__}
         report = {
-            "machine": machine() | versions,
+            "machine": started | versions,
             "note": arguments.note,
             "vehicle": wading.VEHICLE,
             "results": results,
