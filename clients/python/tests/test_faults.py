@@ -196,7 +196,7 @@ class LongerQuery(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "wade::v1::Query"
+        return f"wade::{shm_layout.VERSION}::Query"
 
 
 def test_another_layout_version_is_told(mortal_server: Server) -> None:

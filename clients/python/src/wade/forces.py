@@ -28,6 +28,8 @@ class Quantity(IntEnum):
     VERTICAL_SPEED = 5
     #: [rad/s]
     ANGULAR_SPEED = 6
+    #: Distance to the nearest state that was learnt from, over what is usual among these [-].
+    DISTANCE = 7
 
 
 @dataclass(slots=True, eq=False)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-VERSION = "v1"
+VERSION = "v2"
 MAX_BATCH = 256
 MAX_SURFACES = 64
 
@@ -54,12 +54,11 @@ ANSWER = np.dtype(
         ("moment_nm", "<f4", 3),
         ("about_m", "<f4", 3),
         ("uncertainty_n", "<f4", 3),
-        ("outside", "<f4", 7),
+        ("outside", "<f4", 8),
         ("provenance", "S32"),
         ("surface_force_n", "<f4", (MAX_SURFACES, 3)),
         ("surface_point_m", "<f4", (MAX_SURFACES, 3)),
         ("wetted_fraction", "<f4", MAX_SURFACES),
-        ("reserved", "<u4"),
     ]
 )
 
@@ -124,7 +123,9 @@ QUERY_STRUCT = struct.Struct(_pack_format(QUERY))
 def _payload(name: str, dtype: np.dtype[Any]) -> type[ctypes.Structure]:
     """What iceoryx2 needs to know of a type: its name, size and alignment, which must be those of the server's."""
     words = [("words", ctypes.c_uint64 * (dtype.itemsize // 8))]
-    return type(name, (ctypes.Structure,), {"_fields_": words, "type_name": staticmethod(lambda: f"wade::v1::{name}")})
+    return type(
+        name, (ctypes.Structure,), {"_fields_": words, "type_name": staticmethod(lambda: f"wade::{VERSION}::{name}")}
+    )
 
 
 Query = _payload("Query", QUERY)

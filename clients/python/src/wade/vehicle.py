@@ -43,7 +43,7 @@ class Vehicle:
     #: About the center of mass, `[3, 3]`.
     inertia_kgm2: NDArray[np.float64]
     surfaces: tuple[Surface, ...]
-    #: Range of each quantity in the training data.
+    #: Range in the training data of each quantity that has one.
     domain: dict[Quantity, tuple[float, float]]
     #: Binary STL of the hull, empty unless asked for.
     mesh_stl: bytes

@@ -23,6 +23,7 @@ class Quantity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     QUANTITY_TILT: _ClassVar[Quantity]
     QUANTITY_VERTICAL_SPEED: _ClassVar[Quantity]
     QUANTITY_ANGULAR_SPEED: _ClassVar[Quantity]
+    QUANTITY_DISTANCE: _ClassVar[Quantity]
 GROUND_CONTACT_UNSPECIFIED: GroundContact
 GROUND_CONTACT_WETTED: GroundContact
 GROUND_CONTACT_DRY: GroundContact
@@ -34,6 +35,7 @@ QUANTITY_DEPTH: Quantity
 QUANTITY_TILT: Quantity
 QUANTITY_VERTICAL_SPEED: Quantity
 QUANTITY_ANGULAR_SPEED: Quantity
+QUANTITY_DISTANCE: Quantity
 
 class Vector3(_message.Message):
     __slots__ = ("x", "y", "z")
