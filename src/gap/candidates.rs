@@ -121,10 +121,10 @@ pub(super) fn columns(
 fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Column]) {
     let mut memory = Memory::default();
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);
-    for sample in 0..series.t.len() {
+    for (sample, &t) in series.t.iter().enumerate() {
         let input = series.input(sample, setting.body, setting.base_drag, setting.channel_width);
         if effect.has_memory() && sample > 0 {
-            effects::advance(effect, shape, &mut memory, &input, series.t[sample] - series.t[sample - 1]);
+            effects::advance(effect, shape, &mut memory, &input, t - series.t[sample - 1]);
         }
         effects::basis(effect, shape, &memory, &input, |coefficient, _, load| {
             let sum = &mut columns[coefficient][sample];
@@ -145,8 +145,7 @@ fn chain(
     columns: &mut [Column],
 ) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
-    for sample in 0..series.t.len() {
-        let p = &series.predicted[sample];
+    for (sample, p) in series.predicted.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();
         let mut own = |value: &dyn Fn(usize) -> f64| {

@@ -6,8 +6,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Config;
 use super::candidates::{Column, Setting, columns};
 use super::series::Series;
+use super::split::folds;
 use crate::effects::{Effect, Shape};
 
 /// An effect of one shape with the columns of its coefficients.
@@ -175,14 +177,12 @@ impl Design {
         setting: &Setting,
         library: &[(Effect, Shape)],
         noise: RowNoise,
-        block_s: f64,
-        block_fold: impl Fn(&Rows) -> Vec<usize>,
-        folds: usize,
+        config: &Config,
     ) -> Self {
-        let rows = Rows::new(all, &trials, &setting.components, block_s);
+        let rows = Rows::new(all, &trials, &setting.components, config.block_s);
         let gap = |trial: usize| all[trial].gap.clone();
         let y = DVector::from_vec(to_rows(all, &rows, &trials, &setting.components, &noise, gap));
-        let block_fold = block_fold(&rows);
+        let block_fold = folds(all, &rows, config);
         let mut this = Self {
             x: DMatrix::zeros(rows.rows.len(), 0),
             trials,
@@ -209,7 +209,7 @@ impl Design {
             }
         }
         this.x = DMatrix::from_vec(this.y.len(), this.scale.len(), values);
-        this.sum(folds);
+        this.sum(config.folds);
         this
     }
 
@@ -224,7 +224,7 @@ impl Design {
             self.trials.iter().map(|&trial| columns(effect, shape, &all[trial], trial, setting)).collect();
         let place = |trial: usize| self.trials.iter().position(|&t| t == trial).unwrap_or_default();
         let mut found = Vec::new();
-        for coefficient in 0..effect.coefficients().len() {
+        for (coefficient, _) in effect.coefficients().iter().enumerate() {
             let of = |trial: usize| raw[place(trial)][coefficient].clone();
             let mut column = to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
             let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();

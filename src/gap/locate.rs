@@ -122,9 +122,9 @@ fn split(
         leaves.push(limits);
         return;
     };
-    let below = |p: &&&Point| p.features[feature] <= at;
-    let (low_grow, high_grow): (Vec<&Point>, Vec<&Point>) = grow.iter().partition(|p| below(&p));
-    let (low_check, high_check): (Vec<&Point>, Vec<&Point>) = check.iter().partition(|p| below(&p));
+    let below = |p: &&Point| p.features[feature] <= at;
+    let (low_grow, high_grow): (Vec<&Point>, Vec<&Point>) = grow.iter().partition(|p| below(p));
+    let (low_check, high_check): (Vec<&Point>, Vec<&Point>) = check.iter().partition(|p| below(p));
     // the other half of the trials must see the same side ahead, clearly
     let sides = [mean(&low_check), mean(&high_check)];
     let ahead = usize::from(mean(&high_grow) > mean(&low_grow));

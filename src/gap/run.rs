@@ -16,7 +16,7 @@ use super::noise::{Floor, floors, floors_of, row_noise, smoothing};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 use super::select::{Judge, Member};
 use super::series::{Series, series};
-use super::split::{folds, hold_out};
+use super::split::hold_out;
 use super::statistics::quantile;
 use super::{Config, GapError, Named, Predicted, locate};
 use crate::condition::Condition;
@@ -80,8 +80,7 @@ pub fn run(
         .flat_map(|&effect| shapes(effect, &all, &setting).into_iter().map(move |shape| (effect, shape)))
         .collect();
     let noise = row_noise(&all, &naming, &setting.components, &floors, smoothing(&all, &naming));
-    let deal = |rows: &super::design::Rows| folds(&all, rows, config);
-    let mut design = Design::new(&all, naming, &setting, &forms, noise, config.block_s, deal, config.folds);
+    let mut design = Design::new(&all, naming, &setting, &forms, noise, config);
     if design.rows.blocks < 2 * config.folds {
         let (blocks, block_s, folds) = (design.rows.blocks, config.block_s, config.folds);
         return Err(GapError::TooShort { blocks, block_s, folds });

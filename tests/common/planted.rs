@@ -62,7 +62,7 @@ pub fn motions(count: usize, samples: usize, seed: u64) -> Vec<Vec<State>> {
 fn motion(index: usize, samples: usize, random: &mut Random) -> Vec<State> {
     let level = [0.1, 0.2, 0.25][index % 3];
     let turns = index % 4 == 1;
-    let enters = index % 2 == 0;
+    let enters = index.is_multiple_of(2);
     let top = 0.6 + 2.2 * random.unit();
     let heading = if index % 5 < 3 { 0.0 } else { std::f64::consts::PI } + 0.2 * (random.unit() - 0.5);
     let (rise, fall) = (0.8 + 0.7 * random.unit(), 6.0 + random.unit());
