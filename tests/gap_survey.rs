@@ -185,3 +185,57 @@ fn nulls() {
     }
     println!("{all} nulls, {named} named, {structured} called structure ->");
 }
+
+#[test]
+#[ignore = "a survey for people, not a promise"]
+fn coverage() {
+    let seeds: u64 = std::env::var("SEEDS").ok().and_then(|v| v.parse().ok()).unwrap_or(10);
+    for (name, parameter) in [
+        ("added_mass", "surge"),
+        ("linear_damping", "surge"),
+        ("drag_coefficient_error", "surge"),
+        ("rotation", "drag_coefficient"),
+        ("water_level_offset", "offset"),
+        ("squat", "sinkage"),
+        ("wave_memory", "surge"),
+        ("water_entry_slamming", "vertical"),
+        ("sensor_bias", "fz"),
+        ("density_error", "relative_error"),
+    ] {
+        for strength in [1.0, 3.0] {
+            let (mut right, mut wrong, mut covered, mut errors) = (0, 0, 0, Vec::new());
+            for seed in 0..seeds {
+                let motions = motions(24, 900, 300 + seed);
+                let (added, factor) = scaled(name, strength, &motions);
+                let trials = trials(&motions, &added, &Noise::white(NOISE), seed);
+                let body = gap::body_of(&trials).expect("a body");
+                let report = gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default())
+                    .expect("runs");
+                let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
+                if report.verdict == gap::Verdict::Named && names == [name] {
+                    right += 1;
+                } else if report.verdict == gap::Verdict::Named {
+                    wrong += 1;
+                    println!("  {name} x{strength} seed {seed}: {names:?} seed");
+                } else {
+                    println!(
+                        "  {name} x{strength} seed {seed}: {:?} {names:?} {:?}",
+                        report.verdict, report.alternatives
+                    );
+                }
+                if let Some(p) =
+                    report.effects.iter().find(|e| e.name == name).and_then(|e| e.parameters.get(parameter))
+                {
+                    covered += usize::from((p.interval[0]..=p.interval[1]).contains(&factor));
+                    errors.push((p.value / factor - 1.0).abs());
+                }
+            }
+            errors.sort_by(f64::total_cmp);
+            println!(
+                "{name:24} x{strength} right {right}/{seeds} wrong {wrong} covered {covered}/{} median error {:.3} ->",
+                errors.len(),
+                errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN)
+            );
+        }
+    }
+}
