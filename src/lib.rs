@@ -6,16 +6,19 @@
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:
-//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`signal`]), the body ([`geometry`], [`vehicle`]), its
-//! inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`]), the network ([`model`]), its
-//! files ([`bundle`]), what serves it ([`engine`], [`metrics`]), measured data ([`trials`]), the doors ([`service`],
-//! [`client`], [`soak`]), what learns it ([`train`]), holds it against measured motion ([`validate`]) and finds what it lacks ([`gap`]), the settings
-//! ([`config`]) and the server as a whole ([`server`]).
+//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`random`], [`signal`]), the body ([`geometry`],
+//! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]),
+//! the network ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and
+//! held against ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from
+//! ([`cfd`]), what learns it ([`train`]), judges it by held-out cases ([`evaluate`]), holds it against measured motion
+//! ([`validate`]), names what it lacks ([`gap`]) and scores tools that name what is missing ([`gap_bench`]), the settings ([`config`]) and the server
+//! as a whole ([`server`]).
 
 pub mod condition;
 pub mod domain;
 pub mod forces;
 pub mod frame;
+pub mod random;
 pub mod signal;
 pub mod wrench;
 
@@ -23,12 +26,14 @@ pub mod geometry;
 pub mod vehicle;
 
 pub mod analytic;
+pub mod anchor;
 pub mod effects;
 pub mod features;
 
 pub mod bundle;
 pub mod model;
 
+pub mod dataset;
 pub mod engine;
 pub mod metrics;
 pub mod trials;
@@ -39,7 +44,9 @@ pub mod soak;
 pub mod states;
 
 pub mod cfd;
+pub mod evaluate;
 pub mod gap;
+pub mod gap_bench;
 pub mod train;
 pub mod validate;
 

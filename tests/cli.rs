@@ -33,6 +33,7 @@ fn every_subcommand_shows_an_example() {
         "vehicle list",
         "vehicle show",
         "train",
+        "eval",
     ];
     for command in commands {
         let arguments: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();

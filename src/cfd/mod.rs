@@ -9,10 +9,13 @@
 //! vehicle is at rest, yawed by its heading, and the water comes along -x.
 
 pub mod case;
+pub mod collect;
 pub mod mesh;
 pub mod openfoam;
 pub mod placement;
 pub mod plan;
 pub mod poly_mesh;
+pub mod report;
 pub mod run;
+pub mod slurm;
 pub mod solve;

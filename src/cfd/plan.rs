@@ -12,8 +12,8 @@ use super::case::Settings;
 use crate::condition::{Condition, GroundContact};
 use crate::domain::Range;
 use crate::frame::{Vec3, up_from_roll_pitch};
+use crate::random::Random;
 use crate::train::plan::Table;
-use crate::train::random::Random;
 use crate::vehicle::Vehicle;
 
 /// File of the settings.
@@ -138,14 +138,14 @@ impl Case {
             Bed::Parked => Vec3::zeros(),
             Bed::Driving => velocity,
         };
-        let ground_contact = if self.is_level() { GroundContact::Dry } else { GroundContact::Wetted };
         Condition {
             velocity,
             ground_velocity,
             acceleration: forward * acceleration,
             density: self.density_kgpm3,
             up: self.up(),
-            ground_contact,
+            // no water reaches under what stands on the bed of a mesh
+            ground_contact: GroundContact::Dry,
             ..Condition::level(velocity, self.depth_m)
         }
     }
@@ -398,8 +398,16 @@ impl Plan {
         let speeds = [0.0, 0.25 * speed_mps.max, 0.5 * speed_mps.max];
         let states = depths.iter().flat_map(|&depth| speeds.map(|speed| (speed, depth, 1.0)));
         let meshes = [0.72, 0.5].map(|scale| (speeds[2], depths[1], scale));
-        states
-            .chain(meshes)
+        let mut all: Vec<(f64, f64, f64)> = states.chain(meshes).collect();
+        // a table of one depth asks for each state three times
+        let mut seen = Vec::new();
+        all.retain(|state| {
+            !seen.contains(state) && {
+                seen.push(*state);
+                true
+            }
+        });
+        all.into_iter()
             .enumerate()
             .map(|(i, (speed, depth, cell_scale))| Case {
                 cell_scale,

@@ -1,6 +1,6 @@
 //! Many cases at a time, resumable: a case is done when its outcome is written.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -293,15 +293,4 @@ fn check_disk(folder: &Path, jobs: usize) -> Result<(), RunError> {
         needed_mib: mib(needed),
         jobs,
     })
-}
-
-/// The cases of a plan that have no outcome yet, by name.
-pub fn open_cases<'a>(cases: &'a [Case], work: &Work) -> Result<BTreeSet<&'a str>, RunError> {
-    let mut open = BTreeSet::new();
-    for case in cases {
-        if work.outcome(case)?.is_none() {
-            open.insert(case.id.as_str());
-        }
-    }
-    Ok(open)
 }

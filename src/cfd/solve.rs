@@ -1,6 +1,5 @@
 //! One case from its files to section averages.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -12,6 +11,9 @@ use super::openfoam::{MeshKind, internal_vectors};
 use super::placement::Placement;
 use super::plan::Case;
 use super::poly_mesh::{MeshHull, PolyMeshError};
+use crate::dataset::CutOff;
+use crate::dataset::history::{History, HistoryError};
+use crate::dataset::openfoam;
 use crate::frame::Vec3;
 
 /// Duration of a section [s], as the source paper averages.
@@ -132,29 +134,29 @@ pub enum SolveError {
     /// The mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] PolyMeshError),
+    /// A force file that cannot be read, or holds what is no number.
+    #[error(transparent)]
+    Forces(#[from] openfoam::OpenFoamError),
+    /// A function object without moments.
+    #[error("{path}: no moments were written")]
+    NoMoments {
+        /// Its folder.
+        path: PathBuf,
+    },
     /// A force history that does not cover the window.
-    #[error("{path}: {problem}")]
+    #[error("{path}: {fault}")]
     History {
-        /// The file.
+        /// The folder of the function object.
         path: PathBuf,
         /// What is wrong.
-        problem: &'static str,
-    },
-    /// A force that is not a number.
-    #[error("surface `{surface}` has a force that is not finite")]
-    NotFinite {
-        /// The surface.
-        surface: String,
+        fault: HistoryError,
     },
 }
 
 impl SolveError {
     /// True where smaller time steps may help.
     pub fn is_divergence(&self) -> bool {
-        matches!(
-            self,
-            Self::Program { program: "interFoam", .. } | Self::TooLong { .. } | Self::NotFinite { .. }
-        )
+        matches!(self, Self::Program { program: "interFoam", .. } | Self::TooLong { .. } | Self::Forces(_))
     }
 }
 
@@ -269,7 +271,7 @@ impl Running<'_> {
         let speeds = internal_vectors(&text).into_iter().map(|u| u[0].hypot(u[1]).hypot(u[2]));
         // NaN is larger than anything here: max() alone would drop it
         let speed = speeds.fold(0.0, |most, speed: f64| if speed <= most { most } else { speed });
-        if inflow > 0.0 && !(speed <= FASTEST * inflow) {
+        if inflow > 0.0 && (speed.is_nan() || speed > FASTEST * inflow) {
             return Err(SolveError::PotentialFlow { speed, inflow });
         }
         let head = text.split("boundaryField").next().unwrap_or_default();
@@ -336,25 +338,20 @@ impl Window {
         let back = placement.cfd_from_body.inverse();
         for surface in &inputs.vehicle.surfaces {
             let post = folder.join("postProcessing").join(&surface.name);
-            let force = read_history(&post, "force.dat")?;
-            let moment = read_history(&post, "moment.dat")?;
+            let history = openfoam::read(&post, CutOff::Refuse)?;
+            let moments =
+                history.moment.as_ref().ok_or_else(|| SolveError::NoMoments { path: post.clone() })?;
             for section in &mut sections {
-                let average = |history: &History, columns: usize| {
-                    let mean = history.average(section.start_s, section.end_s, columns);
-                    mean.map(|mean| back * mean).ok_or_else(|| SolveError::History {
-                        path: post.clone(),
-                        problem: "the history does not cover the window",
-                    })
+                let mean = |history: &History<3>| -> Result<[f64; 3], SolveError> {
+                    let mean = history.mean(section.start_s, section.end_s);
+                    let mean = mean.map_err(|fault| SolveError::History { path: post.clone(), fault })?;
+                    Ok((back * Vec3::from(mean)).into())
                 };
                 let load = Load {
-                    force: average(&force, 0)?.into(),
-                    moment: average(&moment, 0)?.into(),
-                    viscous: average(&force, 6)?.into(),
+                    force: mean(&history.force)?,
+                    moment: mean(moments)?,
+                    viscous: mean(&history.viscous)?,
                 };
-                let all = load.force.iter().chain(&load.moment).chain(&load.viscous);
-                if !all.clone().all(|x| x.is_finite()) {
-                    return Err(SolveError::NotFinite { surface: surface.name.clone() });
-                }
                 section.loads.push(load);
             }
         }
@@ -392,63 +389,19 @@ fn section(inputs: &Inputs, start_s: f64, end_s: f64) -> Section {
     }
 }
 
-/// Rows of numbers against time.
-struct History {
-    times: Vec<f64>,
-    rows: Vec<Vec<f64>>,
-}
-
-impl History {
-    /// Mean of three columns from `first` on over [start, end): each row holds for the step that ends with it.
-    fn average(&self, start: f64, end: f64, first: usize) -> Option<Vec3> {
-        let mut sum = Vec3::zeros();
-        let mut weight = 0.0;
-        let mut before = 0.0;
-        for (time, row) in self.times.iter().zip(&self.rows) {
-            let overlap = time.min(end) - f64::max(before, start);
-            if overlap > 0.0 {
-                sum += Vec3::new(*row.get(first)?, *row.get(first + 1)?, *row.get(first + 2)?) * overlap;
-                weight += overlap;
-            }
-            before = *time;
-        }
-        (weight > 0.5 * (end - start)).then(|| sum / weight)
-    }
-}
-
-/// A history over all restarts: what a later one computed anew replaces the earlier.
-fn read_history(folder: &Path, file: &str) -> Result<History, SolveError> {
-    let entries = std::fs::read_dir(folder).map_err(|source| io(folder, source))?;
-    let mut starts: Vec<(f64, PathBuf)> = entries
-        .flatten()
-        .filter_map(|entry| Some((entry.file_name().to_str()?.parse().ok()?, entry.path().join(file))))
-        .collect();
-    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut rows: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-    for (start, path) in starts {
-        rows.retain(|time, _| f64::from_bits(*time) <= start);
-        let text = std::fs::read_to_string(&path).map_err(|source| io(&path, source))?;
-        for line in text.lines().filter(|line| !line.starts_with('#')) {
-            let clean = line.replace(['(', ')'], " ");
-            let numbers: Option<Vec<f64>> = clean.split_ascii_whitespace().map(|x| x.parse().ok()).collect();
-            let numbers = numbers.filter(|numbers| numbers.len() > 1);
-            let numbers =
-                numbers.ok_or(SolveError::History { path: path.clone(), problem: "a row is damaged" })?;
-            // times are positive, so that their bits sort as they do
-            rows.insert(numbers[0].to_bits(), numbers[1..].to_vec());
-        }
-    }
-    let (times, rows) = rows.into_iter().map(|(time, row)| (f64::from_bits(time), row)).unzip();
-    Ok(History { times, rows })
-}
-
 /// Mean of (inflow - outflow) over inflow; NaN never: 0 where nothing flows or nothing was recorded.
 fn mass_imbalance(folder: &Path, start: f64, end: f64) -> f64 {
     let flow = |patch: &str| {
         let folder = folder.join("postProcessing").join(format!("mass_flow_{patch}"));
-        let history = read_history(&folder, "surfaceFieldValue.dat").ok()?;
-        let inside = history.times.iter().zip(&history.rows).filter(|(t, _)| **t > start && **t <= end);
-        let values: Vec<f64> = inside.filter_map(|(_, row)| row.first().copied()).collect();
+        let mut values = Vec::new();
+        for run in std::fs::read_dir(&folder).ok()?.flatten() {
+            let text = std::fs::read_to_string(run.path().join("surfaceFieldValue.dat")).ok()?;
+            let rows = text.lines().filter_map(|line| {
+                let mut numbers = line.split_ascii_whitespace().map(str::parse::<f64>);
+                Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
+            });
+            values.extend(rows.filter(|(time, _)| *time > start && *time <= end).map(|(_, flow)| flow));
+        }
         Some(values.iter().sum::<f64>() / values.len().max(1) as f64)
     };
     let flows: Option<Vec<f64>> =
@@ -462,33 +415,7 @@ fn mass_imbalance(folder: &Path, start: f64, end: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
-
     use super::*;
-
-    #[test]
-    fn averages_weigh_each_row_by_its_step() {
-        let history = History {
-            times: vec![0.1, 0.2, 0.4],
-            rows: vec![vec![9.0, 0.0, 0.0], vec![1.0, 0.0, 0.0], vec![4.0, 0.0, 0.0]],
-        };
-        let mean = history.average(0.1, 0.4, 0).unwrap();
-        assert!((mean.x - 3.0).abs() < 1e-12, "{mean}");
-        assert!(history.average(0.4, 0.8, 0).is_none());
-    }
-
-    #[test]
-    fn a_restart_replaces_what_it_computed_anew() {
-        let folder = tempfile::tempdir().unwrap();
-        for (start, text) in
-            [("0", "# t\n0.1 (1 0 0)\n0.2 (2 0 0)\n0.3 (3 0 0)\n"), ("0.2", "0.25 (7 0 0)\n")]
-        {
-            std::fs::create_dir(folder.path().join(start)).unwrap();
-            std::fs::write(folder.path().join(start).join("force.dat"), text).unwrap();
-        }
-        let history = read_history(folder.path(), "force.dat").unwrap();
-        assert_eq!(history.times, [0.1, 0.2, 0.25]);
-    }
 
     #[test]
     fn processor_time_adds_up_over_restarts() {

@@ -1,6 +1,6 @@
 //! `wade campaign`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -9,9 +9,12 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use wade::bundle;
 use wade::cfd::case::Settings;
+use wade::cfd::collect::{self, Collected};
 use wade::cfd::openfoam::OpenFoam;
 use wade::cfd::plan::{self, Campaign, Plan, Set};
+use wade::cfd::report;
 use wade::cfd::run::{Event, Machine, Work};
+use wade::cfd::slurm;
 use wade::geometry::hydrostatics::float_depth;
 use wade::train;
 
@@ -34,6 +37,10 @@ enum Command {
     Plan(PlanCommand),
     /// Compute the cases that are not done yet
     Run(Run),
+    /// Add the cases that are done to the campaign's data set
+    Collect(Collect),
+    /// Show what the campaign covers and how far it can be trusted
+    Report(Report),
 }
 
 impl CampaignCommand {
@@ -42,6 +49,8 @@ impl CampaignCommand {
         match self.command {
             Command::Plan(command) => command.run(),
             Command::Run(command) => command.run(),
+            Command::Collect(command) => command.run(),
+            Command::Report(command) => command.run(),
         }
     }
 }
@@ -94,9 +103,17 @@ struct PlanCommand {
     /// Settings of every case, TOML; only when the plan is begun
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// Also write what another engine needs to run the plan: `slurm`, a job array
+    #[arg(long, value_enum)]
+    target: Option<Target>,
     /// Folder of the campaign
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Target {
+    Slurm,
 }
 
 impl PlanCommand {
@@ -118,13 +135,16 @@ impl PlanCommand {
             plan.cases.len(),
             plan.cases.len() - before
         );
+        if let Some(Target::Slurm) = self.target {
+            println!("{}: one task a case", slurm::write(&self.out, &plan)?.display());
+        }
         Ok(ExitCode::SUCCESS)
     }
 
     fn begin(&self, vehicle: &wade::vehicle::Vehicle) -> Result<Plan> {
         let table = match &self.table {
             Some(path) => read_toml(path)?,
-            None => *train::Config::default().tables.get(&self.vehicle).with_context(|| {
+            None => *train::Config::default().analytic.tables.get(&self.vehicle).with_context(|| {
                 format!("no ranges are known for `{}`: give them with --table", self.vehicle)
             })?,
         };
@@ -182,11 +202,12 @@ impl Run {
         if let Some(unknown) = self.case.iter().find(|id| !plan.cases.iter().any(|c| c.id == **id)) {
             bail!("{} has no case `{unknown}`", self.campaign.display());
         }
-        let folder = self.work.clone().unwrap_or_else(|| self.campaign.join("work"));
-        let work = Work { folder, keep: self.keep };
+        let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: self.keep };
+        let collected = Collected::read(&self.campaign, &plan)?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
         let is_chosen = |case: &plan::Case| {
-            (sets.is_empty() || sets.contains(&case.set))
+            !collected.cases.contains_key(&case.id)
+                && (sets.is_empty() || sets.contains(&case.set))
                 && (self.case.is_empty() || self.case.contains(&case.id))
                 && (self.again || !work.failure_path(&case.id).exists())
         };
@@ -213,6 +234,72 @@ impl Run {
             println!("{earlier} set aside earlier were left alone: --again tries them once more");
         }
         Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+}
+
+fn work_folder(campaign: &Path, stated: Option<&PathBuf>) -> PathBuf {
+    stated.cloned().unwrap_or_else(|| campaign.join("work"))
+}
+
+/// Add the cases that are done to the campaign's data set
+///
+/// Writes `sections.parquet`, averages of 0.1 s for every surface in the form of `wade dataset`, and `cases.csv`, a row
+/// a case. What is collected is done: `run` leaves it alone even when the work folder is gone.
+#[derive(Debug, Args)]
+struct Collect {
+    /// Folder of the campaign
+    campaign: PathBuf,
+    #[command(flatten)]
+    vehicles: Vehicles,
+    /// Where the cases were computed [default: `work` in the folder of the campaign]
+    #[arg(long, value_name = "DIR")]
+    work: Option<PathBuf>,
+}
+
+impl Collect {
+    fn run(self) -> Result<ExitCode> {
+        let plan = Plan::read(&self.campaign)?;
+        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
+        let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: true };
+        let new = collect::collect(&self.campaign, &plan, &bundle.vehicle, &work)?;
+        let all = Collected::read(&self.campaign, &plan)?.cases.len();
+        println!("{}: {all} of {} cases, {new} of them new", self.campaign.display(), plan.cases.len());
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Show what the campaign covers and how far it can be trusted
+#[derive(Debug, Args)]
+struct Report {
+    /// Folder of the campaign
+    campaign: PathBuf,
+    #[command(flatten)]
+    vehicles: Vehicles,
+    /// Also write a page with plots
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Print the figures as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Report {
+    fn run(self) -> Result<ExitCode> {
+        let plan = Plan::read(&self.campaign)?;
+        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
+        let report = report::Report::of(&self.campaign, &plan, &bundle.vehicle)?;
+        if self.json {
+            super::emit(&(serde_json::to_string_pretty(&report)? + "\n"))?;
+        } else {
+            super::emit(&report.text())?;
+        }
+        if let Some(path) = &self.html {
+            let page = report.page(&self.campaign, &bundle.vehicle)?;
+            std::fs::write(path, page).with_context(|| path.display().to_string())?;
+        }
+        Ok(ExitCode::SUCCESS)
     }
 }
 

@@ -1,7 +1,10 @@
 //! Arguments in, one function a subcommand, exit codes out: 0 success, 1 what was asked for does not hold, 2 usage.
 
 mod campaign;
+mod dataset;
+mod eval;
 mod gap;
+mod gap_bench;
 mod predict;
 mod progress;
 mod query;
@@ -46,10 +49,17 @@ enum Command {
     Soak(soak::Soak),
     /// Plan, run and collect a CFD campaign
     Campaign(campaign::CampaignCommand),
+    /// Import CFD results, augment, split and describe data sets
+    Dataset(dataset::Dataset),
     /// Train a network for the vehicles of a folder
     Train(train::Train),
+    /// Judge the weights of the bundles by the states that their training held out
+    Eval(eval::Eval),
     /// Hold a model against two laws of physics along the motion of trials
     Validate(validate::Validate),
+    /// Hide effects in generated trials and score what is said of them
+    #[command(hide = true)]
+    GapBench(gap_bench::GapBench),
     /// Find where a model and measured trials disagree, and name the missing effect
     Gap(gap::Gap),
     /// Build, check and show vehicle bundles
@@ -65,8 +75,11 @@ impl Cli {
             Command::Predict(command) => command.run(),
             Command::Soak(command) => command.run(),
             Command::Campaign(command) => command.run(),
+            Command::Dataset(command) => command.run(),
             Command::Train(command) => command.run(),
+            Command::Eval(command) => command.run(),
             Command::Validate(command) => command.run(),
+            Command::GapBench(command) => command.run(),
             Command::Gap(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }

@@ -1,106 +1,325 @@
 //! `wade train`.
 
-use std::path::PathBuf;
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade::analytic;
 use wade::bundle::{self, Bundle};
-use wade::condition::GroundContact;
+use wade::dataset::split::{self, By};
+use wade::dataset::{self, Dataset};
+use wade::domain::Domain;
 use wade::model::Weights;
-use wade::train::{self, Config, TrainedVehicle};
+use wade::train::checkpoint::Checkpoint;
+use wade::train::fit::Epoch;
+use wade::train::report::{DataFile, Record, sha256_of};
+use wade::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant};
 
-use super::{Vehicles, bundle_names};
+use super::{Vehicles, bundle_names, usage_error};
 
-/// Train one network for the vehicles of a folder and write it into their bundles
+/// Train one network for the vehicles of a data set and write it into their bundles
 ///
-/// The analytic loads are hydrostatics, form drag and skin friction by formula: weights learnt from them are labelled
-/// "analytic" wherever they answer.
+/// The data set is split, mirrored and standardised by its training side; the bundles get the weights under their next
+/// version, labelled with where the loads come from. "analytic" stands for hydrostatics, form drag and skin friction by
+/// formula over the paper's parameter table, generated on the spot.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:
-  wade train --data analytic --vehicles vehicles")]
+#[command(after_help = "Examples:
+  wade train --data analytic --vehicles vehicles
+  wade train --data cfd.parquet --vehicles vehicles --out training --checkpoint training.ckpt
+  wade train --data cfd.parquet --vehicles vehicles --checkpoint training.ckpt --resume
+  wade train --data cfd.parquet --vehicles copy --split depth --part 5 --out deepest
+
+Settings that a file (--config) leaves out are the paper's:
+  seed = 1
+  epochs = 1000
+  batch = 16
+  held_out_batch = 64
+  learning_rate = 1e-3
+  patience = 20                # epochs without improvement after which the rate is halved
+  least_learning_rate = 0.0    # ends training before the last epoch
+  keep = \"last\"                # or \"best\" by the held-out loss; the paper does not say
+  front_rear = false           # mirror front to rear also a hull that is not symmetric, as the paper did
+  held_out_share = 0.2         # by case and by sample
+  parts = 5                    # by depth and by heading
+  [loss]
+  alpha = 0.5
+  epsilon = 0.01
+  net_weight = 0.1
+  dry_weight = 0.5
+Without --config, --data analytic takes epochs = 2000, patience = 60, least_learning_rate = 1e-6.")]
 pub struct Train {
-    /// What to learn from
-    #[arg(long, value_enum)]
-    data: Data,
     #[command(flatten)]
-    vehicles: Vehicles,
-    /// Settings of the training, TOML
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    data: Data,
+    /// What is learnt
+    #[arg(long, value_enum, default_value = "paper")]
+    variant: Served,
     /// Epochs at most
     #[arg(long)]
     epochs: Option<u32>,
     /// Seed
     #[arg(long)]
     seed: Option<u64>,
+    /// What is held out
+    #[arg(long, value_enum, default_value = "case")]
+    split: Rule,
+    /// Which part is held out, from 1, where a split has several: by depth, heading and vehicle
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    part: usize,
+    /// Folder for report.json and index.html
+    #[arg(long, value_name = "DIR", default_value = "training")]
+    out: PathBuf,
+    /// Writes the state of the training there every ten epochs, and removes it at the end
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Goes on from the checkpoint, with the bits of a run that was never stopped
+    #[arg(long, requires = "checkpoint")]
+    resume: bool,
+}
+
+/// What to learn from, for commands that train.
+#[derive(Debug, Args)]
+pub struct Data {
+    /// Data set, or "analytic" for loads by formula
+    #[arg(long, value_name = "FILE")]
+    pub data: PathBuf,
+    /// Settings of the training, TOML
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    #[command(flatten)]
+    pub vehicles: Vehicles,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Data {
-    /// Loads by formula over the paper's parameter table
-    Analytic,
+enum Served {
+    /// The paper's network as published
+    Paper,
 }
 
-impl Train {
-    /// Writes the next version of each bundle.
-    pub fn run(self) -> Result<ExitCode> {
-        let Data::Analytic = self.data;
-        let mut config: Config = match &self.config {
-            Some(path) => {
-                let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-                toml::from_str(&text).with_context(|| path.display().to_string())?
-            }
-            None => Config::default(),
-        };
-        for (vehicle, table) in Config::default().tables {
-            config.tables.entry(vehicle).or_insert(table);
+/// What is held out.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+pub enum Rule {
+    /// A share of the cases of each vehicle
+    Case,
+    /// A share of the samples, as the paper seems to: sections and images of one case are then on both sides
+    Sample,
+    /// Parts of the range of depths
+    Depth,
+    /// Parts of the range of flow angles
+    Heading,
+    /// One vehicle
+    Vehicle,
+}
+
+impl Rule {
+    /// With the shares and parts of the settings.
+    pub fn by(self, config: &Config) -> By {
+        match self {
+            Self::Case => By::Case { share: config.held_out_share },
+            Self::Sample => By::Sample { share: config.held_out_share },
+            Self::Depth => By::Depth { bins: config.parts },
+            Self::Heading => By::Heading { bins: config.parts },
+            Self::Vehicle => By::Vehicle,
         }
-        config.epochs = self.epochs.unwrap_or(config.epochs);
-        config.seed = self.seed.unwrap_or(config.seed);
+    }
+}
+
+/// A data set with all that a training needs besides.
+pub struct Loaded {
+    /// What it is.
+    pub file: DataFile,
+    /// The bundles of its vehicles, by name.
+    pub bundles: BTreeMap<String, Bundle>,
+    /// Its samples.
+    pub data: Dataset,
+    /// Ranges that the states were drawn from, where that is known.
+    pub domains: BTreeMap<String, Domain>,
+}
+
+impl Data {
+    fn is_analytic(&self) -> bool {
+        self.data == Path::new("analytic")
+    }
+
+    /// The settings of the file, or those that suit the data.
+    pub fn settings(&self) -> Result<Config> {
+        let Some(path) = &self.config else {
+            return Ok(if self.is_analytic() { Config::analytic() } else { Config::default() });
+        };
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let mut config: Config = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        for (vehicle, table) in Config::default().analytic.tables {
+            config.analytic.tables.entry(vehicle).or_insert(table);
+        }
+        Ok(config)
+    }
+
+    /// Reads or generates the data set, and reads the bundles of its vehicles.
+    pub fn load(&self, config: &Config) -> Result<Loaded> {
+        config.validate()?;
+        if self.is_analytic() { self.generate(config) } else { self.read() }
+    }
+
+    fn generate(&self, config: &Config) -> Result<Loaded> {
         let directory = self.vehicles.directory();
+        let tables = &config.analytic.tables;
         let (known, unknown): (Vec<_>, Vec<_>) =
-            bundle_names(&directory)?.into_iter().partition(|name| config.tables.contains_key(name));
+            bundle_names(&directory)?.into_iter().partition(|name| tables.contains_key(name));
         unknown
             .iter()
             .for_each(|name| eprintln!("{name}: left as it is, there is no parameter table for it"));
-        let paths: Vec<_> = known.iter().map(|name| directory.join(name)).collect();
-        let mut bundles: Vec<Bundle> =
-            paths.iter().map(|path| bundle::read(path)).collect::<Result<_, _>>()?;
-        let vehicles: Vec<_> = bundles.iter().map(|bundle| bundle.vehicle.clone()).collect();
+        let bundles = self.bundles(known.iter())?;
+        let vehicles = bundles.iter().map(|(name, bundle)| (name.clone(), bundle.vehicle.clone())).collect();
+        let data = train::analytic::dataset(&vehicles, &config.analytic, config.seed)?;
+        let provenance = data.meta.provenance.clone();
+        let domains = known.iter().map(|name| (name.clone(), tables[name].domain())).collect();
+        let file = DataFile { name: "analytic".to_owned(), sha256: None, provenance };
+        Ok(Loaded { file, bundles, data, domains })
+    }
 
-        let bar = ProgressBar::new(config.epochs.into());
-        bar.set_style(ProgressStyle::with_template("{wide_bar} {pos}/{len} epochs, {eta} left, {msg}")?);
-        let trained = train::train(&vehicles, &config, &|epoch| {
-            bar.set_position(epoch.number.into());
-            let (loss, rate) = (epoch.held_out_loss, epoch.learning_rate);
-            bar.set_message(format!("held-out loss {loss:.3e}, learning rate {rate:.1e}"));
+    fn read(&self) -> Result<Loaded> {
+        let data = dataset::read(&self.data)?;
+        let sha256 = Some(sha256_of(&self.data).with_context(|| self.data.display().to_string())?);
+        let (name, provenance) = (self.data.display().to_string(), data.meta.provenance.clone());
+        let bundles = self.bundles(data.meta.vehicles.keys())?;
+        let file = DataFile { name, sha256, provenance };
+        Ok(Loaded { file, bundles, data, domains: BTreeMap::new() })
+    }
+
+    fn bundles<'a>(&self, names: impl Iterator<Item = &'a String>) -> Result<BTreeMap<String, Bundle>> {
+        names.map(|name| Ok((name.clone(), bundle::read(&self.vehicles.bundle(name))?))).collect()
+    }
+}
+
+impl Loaded {
+    /// The samples with their mirror images.
+    pub fn source(&self, config: &Config) -> Result<Source> {
+        let vehicles =
+            self.bundles.iter().map(|(name, bundle)| (name.clone(), bundle.vehicle.clone())).collect();
+        let source = Source::new(self.data.clone(), &vehicles, config.front_rear);
+        source.with_context(|| self.file.name.clone())
+    }
+
+    /// What weights that were learnt from it say of themselves to a vehicle.
+    pub fn weights(&self, trained: &Trained, of_vehicle: &TrainedVehicle) -> (Weights, Domain) {
+        let weights = Weights {
+            network: trained.layers.network(),
+            scaling: trained.scaling.clone(),
+            provenance: self.file.label(),
+            ground_contact: self.data.meta.ground_contact,
+            held_out_rms: of_vehicle.held_out_rms,
+        };
+        (weights, self.domains.get(&of_vehicle.name).copied().unwrap_or(of_vehicle.domain))
+    }
+}
+
+impl Train {
+    /// Writes the next version of each bundle and the report.
+    pub fn run(self) -> Result<ExitCode> {
+        let Served::Paper = self.variant;
+        let mut config = self.data.settings()?;
+        config.epochs = self.epochs.unwrap_or(config.epochs);
+        config.seed = self.seed.unwrap_or(config.seed);
+        let mut loaded = self.data.load(&config)?;
+        let source = loaded.source(&config)?;
+        let by = self.split.by(&config);
+        let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;
+        let Some(split) = self.part.checked_sub(1).and_then(|index| splits.get(index)) else {
+            usage_error(&format!("--part must be 1 to {}: the split has no other part", splits.len()));
+        };
+        // a long training is not to end in a folder that cannot be written
+        std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
+        let sides = Sides { split, by };
+        eprintln!("held out: {}; {} samples to learn from", split.name, split.training.len());
+        let checkpoint =
+            self.checkpoint.as_ref().map(|path| Checkpoint { path: path.clone(), resume: self.resume });
+        let progress = Progress::new(config.epochs)?;
+        let trained = train::train(&source, sides, Variant::Paper, &config, checkpoint.as_ref(), &|epoch| {
+            progress.epoch(epoch);
         })?;
-        bar.finish_and_clear();
+        progress.bar.finish_and_clear();
 
-        for ((bundle, path), of_vehicle) in bundles.iter_mut().zip(&paths).zip(&trained.vehicles) {
-            let weights = Weights {
-                network: trained.network.clone(),
-                scaling: trained.scaling.clone(),
-                provenance: analytic::PROVENANCE.into(),
-                ground_contact: GroundContact::Wetted,
-                held_out_rms: of_vehicle.held_out_rms,
+        let program = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
+        let record =
+            Record::new(&trained, &source, sides, self.part, loaded.file.clone(), (&config, program));
+        record.write(&self.out)?;
+        for of_vehicle in &trained.vehicles {
+            let weights = loaded.weights(&trained, of_vehicle);
+            let Some(bundle) = loaded.bundles.get_mut(&of_vehicle.name) else {
+                bail!("{}: there is no bundle of it", of_vehicle.name);
             };
-            bundle.trained = Some((weights, of_vehicle.domain));
+            bundle.trained = Some(weights);
             bundle.version += 1;
-            bundle::write(path, bundle)?;
+            bundle::write(&self.data.vehicles.bundle(&of_vehicle.name), bundle)?;
             report(of_vehicle, bundle.version);
         }
-        println!("{} epochs", trained.history.len());
+        if let Some(path) = &self.checkpoint
+            && path.exists()
+        {
+            std::fs::remove_file(path).with_context(|| path.display().to_string())?;
+        }
+        let time = trained.epoch_s.map_or_else(String::new, |s| format!(", {s:.3} s each"));
+        println!("{} epochs{time}; weights of epoch {}", trained.history.len(), trained.kept_epoch);
+        println!("{}", self.out.join("index.html").display());
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// A bar on a terminal, a line now and then elsewhere.
+pub struct Progress {
+    bar: ProgressBar,
+    begun: Instant,
+    spoken: Cell<Duration>,
+    first: Cell<Option<u32>>,
+    epochs: u32,
+}
+
+/// Seconds between two lines where there is no terminal.
+const LINE_S: u64 = 30;
+
+impl Progress {
+    /// Begins to count.
+    pub fn new(epochs: u32) -> Result<Self> {
+        let bar = ProgressBar::new(epochs.into());
+        bar.set_style(ProgressStyle::with_template("{wide_bar} {pos}/{len} epochs, {eta} left, {msg}")?);
+        let (begun, spoken) = (Instant::now(), Cell::new(Duration::ZERO));
+        Ok(Self { bar, begun, spoken, first: Cell::new(None), epochs })
+    }
+
+    /// Takes note of an epoch.
+    pub fn epoch(&self, epoch: &Epoch) {
+        let (loss, rate) = (epoch.held_out_loss, epoch.learning_rate);
+        let text = format!("loss {:.3e}, held out {loss:.3e}, learning rate {rate:.1e}", epoch.training_loss);
+        // a run that goes on from a checkpoint has not spent the time of the epochs before
+        let first = self.first.get().unwrap_or_else(|| {
+            self.bar.set_position(u64::from(epoch.number - 1));
+            self.bar.reset_eta();
+            epoch.number
+        });
+        self.first.set(Some(first));
+        self.bar.set_position(epoch.number.into());
+        let elapsed = self.begun.elapsed();
+        if !std::io::stderr().is_terminal() && elapsed - self.spoken.get() >= Duration::from_secs(LINE_S) {
+            self.spoken.set(elapsed);
+            let each = elapsed.as_secs_f64() / f64::from(epoch.number - first + 1);
+            let left = each * f64::from(self.epochs - epoch.number);
+            eprintln!("epoch {} of {}, {left:.0} s left at most, {text}", epoch.number, self.epochs);
+        }
+        self.bar.set_message(text);
     }
 }
 
 fn report(trained: &TrainedVehicle, version: u32) {
     let score = &trained.score;
     println!("{}, version {version}: {} held-out states", trained.name, score.samples);
+    if score.samples == 0 {
+        println!("  none is held out: its uncertainty is the error on training states");
+        return;
+    }
     for (c, axis) in ["Fx", "Fy", "Fz"].into_iter().enumerate() {
         let (mae, rms, spread) = (score.mae[c], score.rms[c], score.spread[c]);
         println!("  {axis}: MAE {mae:.2} N, RMSE {rms:.2} N, spread of the target {spread:.1} N");

@@ -118,6 +118,7 @@ pub(super) fn columns(
     columns
 }
 
+#[allow(clippy::needless_range_loop, reason = "a sample is an index into the series as well")]
 fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Column]) {
     let mut memory = Memory::default();
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);

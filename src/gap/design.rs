@@ -171,6 +171,7 @@ pub(super) struct Fitted {
 
 impl Design {
     /// Fills the columns of every candidate; columns without any excitation are left out.
+    #[allow(clippy::too_many_arguments, reason = "called in two places, each with its own of all of them")]
     pub fn new(
         all: &[Series],
         trials: Vec<usize>,

@@ -12,7 +12,7 @@ use super::series::Series;
 use super::statistics::{median, quantile, white_variance};
 use super::{Config, noise::Floor};
 use crate::effects::Effect;
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::trials::{Manifest, WRENCH};
 
 /// Deviates that an effect must have to be named nine times of ten: the bar, and 1.28 for the power.

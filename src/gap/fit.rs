@@ -15,7 +15,7 @@ use super::select::Member;
 use super::series::Series;
 use super::statistics::quantile;
 use crate::effects::{Effect, Shape};
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Fewest trials, in effect, that let an interval rest on the scatter between trials.
 const ENOUGH_TRIALS: f64 = 8.0;

@@ -11,8 +11,10 @@ use super::noise::Floor;
 use super::series::Series;
 use super::statistics::quantile;
 use super::{Config, Named};
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::trials::WRENCH;
+
+/// True for the features of a sample inside a region.
 
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::Config;
 use super::features::{FEATURES, of_bins};
 use super::series::Series;
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Least share of the bins that a region may hold.
 const LEAST_SHARE: f64 = 0.03;
@@ -147,7 +147,7 @@ fn split(
         leaves.push(limits);
         return;
     };
-    let below = |p: &&Point| p.features[feature] <= at;
+    let below = |p: &&&Point| p.features[feature] <= at;
     let (low_grow, high_grow): (Vec<&Point>, Vec<&Point>) = grow.iter().partition(|p| below(p));
     let (low_check, high_check): (Vec<&Point>, Vec<&Point>) = check.iter().partition(|p| below(p));
     // the other half of the trials must see the same side ahead, clearly

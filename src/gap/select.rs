@@ -12,7 +12,7 @@ use super::noise::Floor;
 use super::robust::{Error, errors, group, noise_of};
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Least deviate of a column that stays in a group.
 const COLUMN_DEVIATE: f64 = 4.0;

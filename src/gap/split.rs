@@ -4,7 +4,7 @@ use super::Config;
 use super::design::Rows;
 use super::features::of_bins;
 use super::series::Series;
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Means that tell what is excited.
 fn signature(bins: &[[f64; 9]]) -> [f64; 6] {

@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn white_noise_is_told_from_a_parabola() {
-        let mut random = crate::train::random::Random::new(1);
+        let mut random = crate::random::Random::new(1);
         let values: Vec<f64> = (0..4000)
             .map(|i| (random.unit() - 0.5) * 12_f64.sqrt() * 2.0 + 1e-3 * f64::from(i * i) / 100.0)
             .collect();

@@ -3,7 +3,7 @@
 //! Everything here is in SI units; after `vehicle::build` it is in the body frame as well.
 //! Reading order: `mesh` and `stl` (triangles in and out), `parts`, `watertight` and `seal` (refuse or repair), `surfaces`
 //! (named patches), `immersion` and `hydrostatics` (clipping at the water plane, pressure), `submergence` (samples),
-//! `distance` (signed distance grid), `parametric` (closed parts by formula).
+//! `wetting` (pressure and wet area in the time of a query), `distance` (signed distance grid), `parametric` (closed parts by formula).
 
 pub mod distance;
 pub mod hydrostatics;
@@ -18,3 +18,4 @@ pub mod stl;
 pub mod submergence;
 pub mod surfaces;
 pub mod watertight;
+pub mod wetting;

@@ -10,9 +10,12 @@ const EPSILON: f32 = 1e-8;
 /// The state of the optimizer, one entry a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adam {
-    steps: i32,
-    mean: Vec<f32>,
-    square: Vec<f32>,
+    /// Steps taken.
+    pub steps: i32,
+    /// Running mean of the gradient.
+    pub mean: Vec<f32>,
+    /// Running mean of its square.
+    pub square: Vec<f32>,
 }
 
 impl Adam {
@@ -41,9 +44,12 @@ impl Adam {
 pub struct Plateau {
     /// The rate now.
     pub rate: f64,
-    patience: u32,
-    best: f64,
-    waited: u32,
+    /// Epochs that it waits.
+    pub patience: u32,
+    /// The least loss so far.
+    pub best: f64,
+    /// Epochs since then, or since the last halving.
+    pub waited: u32,
 }
 
 impl Plateau {

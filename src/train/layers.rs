@@ -9,9 +9,45 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, RealField};
 
-use super::random::Random;
 use crate::features::INPUTS;
 use crate::model::network::{Network, OUTPUTS, WIDTH};
+use crate::random::Random;
+
+/// Inputs, width of both hidden layers, and outputs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Numbers in a row.
+    pub inputs: usize,
+    /// Width of both hidden layers.
+    pub width: usize,
+    /// Numbers out.
+    pub outputs: usize,
+}
+
+impl Sizes {
+    /// The network that is served.
+    pub const SERVED: Self = Self { inputs: INPUTS, width: WIDTH, outputs: OUTPUTS };
+
+    /// Rows and columns of the six tensors in storage (a bias has one column).
+    fn shapes(self) -> [(usize, usize); 6] {
+        let Self { inputs, width, outputs } = self;
+        [(inputs, width), (width, 1), (width, width), (width, 1), (width, outputs), (outputs, 1)]
+    }
+
+    /// Where each tensor lies in the vector of parameters.
+    pub fn ranges(self) -> [Range<usize>; 6] {
+        let mut end = 0;
+        self.shapes().map(|(rows, columns)| {
+            end += rows * columns;
+            end - rows * columns..end
+        })
+    }
+
+    /// Number of parameters.
+    pub fn parameters(self) -> usize {
+        self.ranges()[5].end
+    }
+}
 
 /// f32 to train, f64 to check the gradient.
 pub trait Real: RealField + Copy {}
@@ -20,7 +56,8 @@ impl<T: RealField + Copy> Real for T {}
 /// Weights and biases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layers<T> {
-    width: usize,
+    /// Their sizes.
+    pub sizes: Sizes,
     /// w1, b1, w2, b2, w3, b3, one after another.
     pub parameters: Vec<T>,
 }
@@ -30,57 +67,44 @@ pub struct Layers<T> {
 pub struct Activations<T> {
     hidden1: DMatrix<T>,
     hidden2: DMatrix<T>,
-    /// Standardised force over density, `[OUTPUTS, columns]`.
+    /// Standardised force over density, `[outputs, columns]`.
     pub output: DMatrix<T>,
-}
-
-/// Rows and columns of the six tensors in storage (a bias has one column).
-fn shapes(width: usize) -> [(usize, usize); 6] {
-    [(INPUTS, width), (width, 1), (width, width), (width, 1), (width, OUTPUTS), (OUTPUTS, 1)]
-}
-
-/// Where each tensor lies in the vector.
-pub fn ranges(width: usize) -> [Range<usize>; 6] {
-    let mut end = 0;
-    shapes(width).map(|(rows, columns)| {
-        end += rows * columns;
-        end - rows * columns..end
-    })
 }
 
 impl<T: Real> Layers<T> {
     /// Uniform in `+-1 / sqrt(inputs)`, weights and biases, as PyTorch starts its linear layers.
-    pub fn random(width: usize, random: &mut Random) -> Self {
-        let fan_in = [INPUTS, INPUTS, width, width, width, width];
-        let mut parameters = Vec::new();
-        for (range, inputs) in ranges(width).into_iter().zip(fan_in) {
+    pub fn random(sizes: Sizes, random: &mut Random) -> Self {
+        let Sizes { inputs, width, .. } = sizes;
+        let fan_in = [inputs, inputs, width, width, width, width];
+        let mut parameters = Vec::with_capacity(sizes.parameters());
+        for (range, inputs) in sizes.ranges().into_iter().zip(fan_in) {
             let bound = (inputs as f64).sqrt().recip();
             parameters
                 .extend(range.map(|_| nalgebra::convert::<f64, T>(bound * (2.0 * random.unit() - 1.0))));
         }
-        Self { width, parameters }
+        Self { sizes, parameters }
     }
 
     /// Takes away all say of an input. For one that never varies in training: its weights would keep their random
     /// start, and speak up when the input varies in service.
     pub fn silence(&mut self, input: usize) {
-        for weights in self.parameters[ranges(self.width)[0].clone()].chunks_exact_mut(INPUTS) {
+        for weights in self.parameters[self.sizes.ranges()[0].clone()].chunks_exact_mut(self.sizes.inputs) {
             weights[input] = T::zero();
         }
     }
 
     fn matrix(&self, tensor: usize) -> DMatrixView<'_, T> {
-        let (rows, columns) = shapes(self.width)[tensor];
-        DMatrixView::from_slice(&self.parameters[ranges(self.width)[tensor].clone()], rows, columns)
+        let (rows, columns) = self.sizes.shapes()[tensor];
+        DMatrixView::from_slice(&self.parameters[self.sizes.ranges()[tensor].clone()], rows, columns)
     }
 
     /// The bias of a layer in each of `columns` columns, to which the product is then added.
     fn bias(&self, tensor: usize, columns: usize) -> DMatrix<T> {
-        let values = &self.parameters[ranges(self.width)[tensor].clone()];
+        let values = &self.parameters[self.sizes.ranges()[tensor].clone()];
         DMatrix::from_iterator(values.len(), columns, (0..columns).flat_map(|_| values.iter().copied()))
     }
 
-    /// Outputs for `[INPUTS, columns]`.
+    /// Outputs for `[inputs, columns]`.
     pub fn forward(&self, inputs: &DMatrix<T>) -> Activations<T> {
         let one = T::one();
         let mut hidden1 = self.bias(1, inputs.ncols());
@@ -115,8 +139,8 @@ impl<T: Real> Layers<T> {
 
     /// Weights `tensor` and the bias after them, from what went into the layer and the gradient by what came out.
     fn layer_gradient(&self, tensor: usize, inputs: &DMatrix<T>, by_output: &DMatrix<T>, gradient: &mut [T]) {
-        let (rows, columns) = shapes(self.width)[tensor];
-        let ranges = ranges(self.width);
+        let (rows, columns) = self.sizes.shapes()[tensor];
+        let ranges = self.sizes.ranges();
         let mut weights = DMatrixViewMut::from_slice(&mut gradient[ranges[tensor].clone()], rows, columns);
         weights.gemm(T::one(), inputs, &by_output.transpose(), T::zero());
         gradient[ranges[tensor + 1].clone()].copy_from_slice(by_output.column_sum().as_slice());
@@ -127,10 +151,10 @@ impl Layers<f32> {
     /// The network as it is served.
     ///
     /// # Panics
-    /// When the layers are not as wide as a `Network`.
+    /// When the layers are not of the sizes of a `Network`.
     pub fn network(&self) -> Network {
-        assert_eq!(self.width, WIDTH, "only layers of the served width make a network");
-        let [w1, b1, w2, b2, w3, b3] = ranges(WIDTH).map(|range| self.parameters[range].to_vec());
+        assert_eq!(self.sizes, Sizes::SERVED, "only layers of the served sizes make a network");
+        let [w1, b1, w2, b2, w3, b3] = self.sizes.ranges().map(|range| self.parameters[range].to_vec());
         Network { w1, b1, w2, b2, w3, b3 }
     }
 }
@@ -152,7 +176,7 @@ mod tests {
     #[test]
     fn forward_agrees_with_the_served_network() {
         let mut random = Random::new(5);
-        let layers = Layers::<f32>::random(WIDTH, &mut random);
+        let layers = Layers::<f32>::random(Sizes::SERVED, &mut random);
         let inputs = DMatrix::from_fn(INPUTS, 9, |_, _| random.unit() as f32 - 0.5);
         let output = layers.forward(&inputs).output;
         for (column, input) in output.column_iter().zip(inputs.column_iter()) {
@@ -163,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_silenced_input_has_no_say() {
-        let mut layers = Layers::<f32>::random(8, &mut Random::new(5));
+        let mut layers = Layers::<f32>::random(Sizes { width: 8, ..Sizes::SERVED }, &mut Random::new(5));
         layers.silence(20);
         let quiet = DMatrix::from_element(INPUTS, 1, 0.3);
         let mut loud = quiet.clone();

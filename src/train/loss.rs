@@ -33,12 +33,31 @@ impl Default for LossConfig {
 pub struct Batch<T> {
     /// Surfaces of the vehicle, K.
     pub surfaces: usize,
-    /// Input rows of the network, `[INPUTS, samples * K]`.
+    /// Input rows of the network, `[inputs, samples * K]`.
     pub inputs: DMatrix<T>,
     /// Standardised force over density, `[OUTPUTS, samples * K]`.
     pub targets: DMatrix<T>,
     /// True for the columns that count as dry.
     pub dry: Vec<bool>,
+}
+
+/// What the means of the loss are taken over: a batch that is worked on in parts has the counts of the whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counts {
+    /// Samples.
+    pub samples: usize,
+    /// Surfaces of all samples.
+    pub columns: usize,
+    /// Those of them that count as dry.
+    pub dry: usize,
+}
+
+impl<T> Batch<T> {
+    /// Its counts, where it is the whole.
+    pub fn counts(&self) -> Counts {
+        let (columns, dry) = (self.dry.len(), self.dry.iter().filter(|dry| **dry).count());
+        Counts { samples: columns / self.surfaces, columns, dry }
+    }
 }
 
 /// Standard deviation and mean of force over density [m4/s2].
@@ -78,7 +97,8 @@ impl Terms {
     }
 }
 
-/// The terms for a network's `output`, and the gradient of their total by it.
+/// The terms for a network's `output`, and the gradient of their total by it; of a part of a batch, its share in those of
+/// the whole, which has `counts`.
 ///
 /// A surface without a wet sample is served as exact zero whatever the network says, so in service the dry penalty
 /// shapes only surfaces that are wet by less than `dry_fraction`. It is kept because it is part of the published loss.
@@ -86,23 +106,25 @@ pub fn loss<T: Real>(
     config: &LossConfig,
     scale: &TargetScale<T>,
     batch: &Batch<T>,
+    counts: &Counts,
     output: &DMatrix<T>,
 ) -> (Terms, DMatrix<T>) {
     let mut gradient = DMatrix::zeros(OUTPUTS, output.ncols());
     let error = output - &batch.targets;
-    let (squared, relative) = hybrid(config, batch, &error, &mut gradient);
-    let net = net(config, scale, batch, &error, &mut gradient);
-    let dry = dry(config, scale, batch, output, &mut gradient);
+    let (squared, relative) = hybrid(config, batch, counts, &error, &mut gradient);
+    let net = net(config, scale, (batch.surfaces, counts), &error, &mut gradient);
+    let dry = dry(config, scale, (&batch.dry, counts), output, &mut gradient);
     (Terms { squared, relative, net, dry }, gradient)
 }
 
 fn hybrid<T: Real>(
     config: &LossConfig,
     batch: &Batch<T>,
+    counts: &Counts,
     error: &DMatrix<T>,
     gradient: &mut DMatrix<T>,
 ) -> (f64, f64) {
-    let count = error.len() as f64;
+    let count = (OUTPUTS * counts.columns) as f64;
     let epsilon: T = convert(config.epsilon);
     let [plain, by_target] =
         [1.0 - config.alpha, config.alpha].map(|share| convert::<f64, T>(2.0 * share / count));
@@ -119,12 +141,11 @@ fn hybrid<T: Real>(
 fn net<T: Real>(
     config: &LossConfig,
     scale: &TargetScale<T>,
-    batch: &Batch<T>,
+    (k, counts): (usize, &Counts),
     error: &DMatrix<T>,
     gradient: &mut DMatrix<T>,
 ) -> f64 {
-    let k = batch.surfaces;
-    let count = (OUTPUTS * error.ncols() / k) as f64;
+    let count = (OUTPUTS * counts.samples) as f64;
     let factor: T = convert(2.0 * config.net_weight / count);
     let mut sum = T::zero();
     for first in (0..error.ncols()).step_by(k) {
@@ -140,14 +161,14 @@ fn net<T: Real>(
 fn dry<T: Real>(
     config: &LossConfig,
     scale: &TargetScale<T>,
-    batch: &Batch<T>,
+    (is_dry, counts): (&[bool], &Counts),
     output: &DMatrix<T>,
     gradient: &mut DMatrix<T>,
 ) -> f64 {
-    let count = (OUTPUTS * batch.dry.iter().filter(|dry| **dry).count()).max(1) as f64;
+    let count = (OUTPUTS * counts.dry).max(1) as f64;
     let factor: T = convert(2.0 * config.dry_weight / count);
     let mut sum = T::zero();
-    for (column, _) in batch.dry.iter().enumerate().filter(|(_, dry)| **dry) {
+    for (column, _) in is_dry.iter().enumerate().filter(|(_, dry)| **dry) {
         for c in 0..OUTPUTS {
             let force = output[(c, column)] * scale.std[c] + scale.mean[c];
             sum += force * force;
@@ -180,7 +201,7 @@ mod tests {
     #[test]
     fn terms_are_those_worked_by_hand() {
         let (batch, scale, output) = worked();
-        let (terms, _) = loss(&LossConfig::default(), &scale, &batch, &output);
+        let (terms, _) = loss(&LossConfig::default(), &scale, &batch, &batch.counts(), &output);
         assert!((terms.squared - (1.0 + 4.0 + 0.25) / 6.0).abs() < 1e-12);
         assert!((terms.relative - (4.0 + 1.0 + 1.0) / 6.0).abs() < 1e-12);
         assert!((terms.net - (2.0_f64.powi(2) + 2.0_f64.powi(2) + 2.0_f64.powi(2)) / 3.0).abs() < 1e-12);
@@ -194,14 +215,41 @@ mod tests {
     fn the_relative_error_is_floored() {
         let (mut batch, scale, output) = worked();
         batch.targets.fill(0.0);
-        let (terms, _) = loss(&LossConfig::default(), &scale, &batch, &output);
+        let (terms, _) = loss(&LossConfig::default(), &scale, &batch, &batch.counts(), &output);
         assert!((terms.relative - 1e4 * terms.squared).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_shares_of_the_parts_add_up_to_the_whole() {
+        let (one, scale, output) = worked();
+        let twice =
+            |m: &DMatrix<f64>| DMatrix::from_fn(3, 4, |r, c| m[(r, c % 2)] * if c < 2 { 1.0 } else { 0.3 });
+        let dry = vec![false, true, true, true];
+        let whole =
+            Batch { targets: twice(&one.targets), dry: dry.clone(), inputs: DMatrix::zeros(0, 4), ..one };
+        let output = twice(&output);
+        let config = LossConfig::default();
+        let (terms, gradient) = loss(&config, &scale, &whole, &whole.counts(), &output);
+        let mut total = 0.0;
+        for first in [0, 2] {
+            let part = Batch {
+                targets: whole.targets.columns(first, 2).into_owned(),
+                dry: dry[first..first + 2].to_vec(),
+                inputs: DMatrix::zeros(0, 2),
+                ..whole
+            };
+            let output = output.columns(first, 2).into_owned();
+            let (share, by_output) = loss(&config, &scale, &part, &whole.counts(), &output);
+            total += share.total(&config);
+            assert_eq!(by_output, gradient.columns(first, 2));
+        }
+        assert!((total - terms.total(&config)).abs() < 1e-12);
     }
 
     #[test]
     fn no_dry_surface_is_no_penalty() {
         let (mut batch, scale, output) = worked();
         batch.dry = vec![false, false];
-        assert_eq!(loss(&LossConfig::default(), &scale, &batch, &output).0.dry, 0.0);
+        assert_eq!(loss(&LossConfig::default(), &scale, &batch, &batch.counts(), &output).0.dry, 0.0);
     }
 }

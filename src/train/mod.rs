@@ -1,90 +1,59 @@
-//! Learning a network: plan the cases, compute their loads, fit, and judge by cases held out.
+//! Learning a network: a data set and its split in, weights and what they are worth out.
 //!
-//! Reading order: `plan` (which states), `samples` (features and targets), `loss`, `layers` (forward and backward),
-//! `adam`, `fit` (epochs), `score` (errors on held-out cases). All in memory on one thread; the same seed gives the
-//! same bits on the same kind of processor (the matrix product is chosen by what the processor can do).
+//! Reading order: `config`, `label` (what is to be learnt), `samples` (features and targets), `variant` (rows and loss of
+//! each kind of network), `task`, `loss`, `layers` (forward and backward), `adam`, `fit` (epochs), `checkpoint`, `score`
+//! (errors on held-out samples), `report`, `page`; `plan` and `analytic` make the loads by formula. The same seed gives
+//! the same bits on the same kind of processor, with one thread or two (the matrix product is chosen by what the
+//! processor can do).
 
 pub mod adam;
+pub mod analytic;
+pub mod checkpoint;
+mod config;
+pub mod domain;
 pub mod fit;
+pub mod label;
 pub mod layers;
 pub mod loss;
+mod page;
 pub mod plan;
-pub mod random;
+pub mod plot;
+pub mod report;
 pub mod samples;
 pub mod score;
+pub mod task;
+pub mod variant;
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
+pub use config::{Analytic, Config, Keep};
+pub(crate) use page::style as page_style;
+pub use variant::Variant;
 
+use crate::dataset::Dataset;
+use crate::dataset::mirror::{self, MirrorError};
+use crate::dataset::split::Split;
+use crate::dataset::{Image, split};
 use crate::domain::Domain;
-use crate::model::network::{Network, OUTPUTS, Scaling};
+use crate::model::network::{OUTPUTS, Scaling};
 use crate::vehicle::Vehicle;
+use checkpoint::{Checkpoint, CheckpointError};
 use fit::{Epoch, Fit};
-use loss::LossConfig;
-use plan::Table;
-use random::Random;
-use samples::Dataset;
+use layers::Layers;
+use samples::Sample;
 use score::Score;
+use task::Task;
 
-/// How to train; the defaults are the source paper's where it states them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// Seed of the plan, the split, the first weights and the order of the batches.
-    pub seed: u64,
-    /// Cases a vehicle, each with its three mirror images.
-    pub cases: usize,
-    /// Share of the cases that is held out.
-    pub held_out_share: f64,
-    /// Epochs at most; the learning rate usually ends training after about 800.
-    pub epochs: u32,
-    /// Samples a step; a batch holds one vehicle.
-    pub batch: usize,
-    /// Learning rate at the start.
-    pub learning_rate: f64,
-    /// Epochs without improvement of the held-out loss after which the learning rate is halved.
-    ///
-    /// The paper has 20, of 700 steps each. 175 cases without its 20 windows a run make 70 steps an epoch, and after 20
-    /// of those the held-out loss is still noise: measured, 60 halves the error of the worst of three seeds.
-    pub patience: u32,
-    /// Learning rate below which training ends: ten halvings, after which nothing moves any more.
-    ///
-    /// The held-out cases set the pace, as in the paper, but choose no weights: those of the last epoch are kept.
-    pub least_learning_rate: f64,
-    /// Weights of the loss.
-    pub loss: LossConfig,
-    /// Parameter table of each vehicle, by its name.
-    pub tables: BTreeMap<String, Table>,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        let tables = [("husky", Table::HUSKY), ("warthog", Table::WARTHOG)];
-        Self {
-            seed: 1,
-            cases: 175,
-            held_out_share: 0.2,
-            epochs: 2000,
-            batch: 16,
-            learning_rate: 1e-3,
-            patience: 60,
-            least_learning_rate: 1e-6,
-            loss: LossConfig::default(),
-            tables: tables.map(|(name, table)| (name.to_owned(), table)).into(),
-        }
-    }
-}
+/// A checkpoint is written after this many epochs.
+const CHECKPOINT_EPOCHS: u32 = 10;
 
 /// Why training did not start or did not end well.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// A vehicle without a parameter table.
-    #[error("no parameter table for vehicle `{vehicle}`")]
-    NoTable {
-        /// Its name.
-        vehicle: String,
-    },
+    /// No vehicle with a parameter table.
+    #[error("no vehicle was given for which there is a parameter table: state one under [analytic.tables]")]
+    NoTable,
     /// A table with a range upside down or without a positive speed or density.
     #[error("the parameter table of `{vehicle}` has a range that is not one")]
     Table {
@@ -101,65 +70,129 @@ pub enum TrainError {
         /// What it must be.
         expected: &'static str,
     },
-    /// No vehicle, hence no case.
-    #[error("there is nothing to learn from: no vehicle was given")]
-    NoCases,
+    /// A vehicle of which the hull is not known.
+    #[error("vehicle `{vehicle}` is in the data set, but there is no bundle of it")]
+    UnknownVehicle {
+        /// Its name.
+        vehicle: String,
+    },
+    /// Surfaces of another version of the vehicle.
+    #[error(
+        "vehicle `{vehicle}`: the bundle and the data set do not name the same surfaces; `{surface}` is in one of them"
+    )]
+    Surfaces {
+        /// The vehicle.
+        vehicle: String,
+        /// A surface that only one of them has.
+        surface: String,
+    },
+    /// No mirror image.
+    #[error("{0}")]
+    Mirror(#[from] MirrorError),
+    /// A side of the split without a sample.
+    #[error("the {side} side of the split is empty")]
+    EmptySide {
+        /// Training or held-out.
+        side: &'static str,
+    },
+    /// A case on both sides of a split that promises to keep cases together.
+    #[error("the split leaks: {count} cases are on both sides, the first is `{first}`")]
+    Leak {
+        /// How many.
+        count: usize,
+        /// One of them.
+        first: String,
+    },
+    /// Nothing in a batch.
+    #[error("a batch is empty")]
+    EmptyBatch,
+    /// Samples of two vehicles, which differ in the number of surfaces, in a batch.
+    #[error("a batch mixes the vehicles {} and {}", .vehicles[0], .vehicles[1])]
+    MixedBatch {
+        /// Their indices.
+        vehicles: [usize; 2],
+    },
     /// The loss is no longer a number.
     #[error("the loss is not finite after epoch {epoch}")]
     Diverged {
         /// Number of the epoch.
         epoch: u32,
     },
+    /// A checkpoint.
+    #[error("{0}")]
+    Checkpoint(#[from] CheckpointError),
 }
 
-impl Config {
-    /// Refuses numbers that make no sense.
-    pub fn validate(&self) -> Result<(), TrainError> {
-        let positive = [
-            ("cases", self.cases as f64, 2.0),
-            ("batch", self.batch as f64, 1.0),
-            ("epochs", f64::from(self.epochs), 1.0),
-            ("patience", f64::from(self.patience), 1.0),
-            ("learning_rate", self.learning_rate, f64::MIN_POSITIVE),
-            ("loss.epsilon", self.loss.epsilon, f64::MIN_POSITIVE),
-        ];
-        for (key, value, least) in positive {
-            if !(value >= least && value.is_finite()) {
-                let expected = if least > 1.0 { "at least 2" } else { "positive" };
-                return Err(TrainError::Config { key, value, expected });
-            }
-        }
-        let value = self.least_learning_rate;
-        // with nothing to learn, random weights would be written as trained ones; NaN is neither below nor above
-        if value.is_nan() || value >= self.learning_rate {
-            let expected = "below learning_rate";
-            return Err(TrainError::Config { key: "least_learning_rate", value, expected });
-        }
-        let shares = [("held_out_share", self.held_out_share), ("loss.alpha", self.loss.alpha)];
-        match shares.into_iter().find(|(_, share)| !(0.0..=1.0).contains(share)) {
-            Some((key, value)) => Err(TrainError::Config { key, value, expected: "between 0 and 1" }),
-            None => Ok(()),
-        }
-    }
+/// A data set that is ready to be learnt from, and the vehicles that it is about.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The samples with their mirror images.
+    pub data: Dataset,
+    /// Every vehicle of it, by its name.
+    pub vehicles: BTreeMap<String, Vehicle>,
+}
 
-    fn table(&self, vehicle: &Vehicle) -> Result<&Table, TrainError> {
-        let name = || vehicle.name.clone();
-        let table = self.tables.get(&vehicle.name).ok_or_else(|| TrainError::NoTable { vehicle: name() })?;
-        if table.is_valid() { Ok(table) } else { Err(TrainError::Table { vehicle: name() }) }
+impl Source {
+    /// Adds the mirror images where the data set has none yet.
+    pub fn new(
+        data: Dataset,
+        vehicles: &BTreeMap<String, Vehicle>,
+        front_rear: bool,
+    ) -> Result<Self, TrainError> {
+        let of = |name: &String| {
+            let unknown = || TrainError::UnknownVehicle { vehicle: name.clone() };
+            Ok((name.clone(), vehicles.get(name).cloned().ok_or_else(unknown)?))
+        };
+        let vehicles = data.meta.vehicles.keys().map(of).collect::<Result<BTreeMap<_, _>, TrainError>>()?;
+        // before any image is made: names of surfaces that do not fit are the likeliest mistake
+        for (name, vehicle) in &vehicles {
+            label::order(vehicle, &data.meta.vehicles[name])?;
+        }
+        let has_images = data.samples.iter().any(|sample| sample.image != Image::Original);
+        let data = if has_images { data } else { mirror::augment(&data, &vehicles, front_rear)? };
+        Ok(Self { data, vehicles })
+    }
+}
+
+/// Which samples are held out, and whether cases may be on both sides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sides<'a> {
+    /// The split.
+    pub split: &'a Split,
+    /// How it was made.
+    pub by: split::By,
+}
+
+impl Sides<'_> {
+    /// Refuses a case on both sides, but of a split by sample, which the source paper seems to have used.
+    pub fn check(&self, data: &Dataset) -> Result<(), TrainError> {
+        let leaks = self.split.leaks(data);
+        match leaks.first() {
+            Some(first) if !matches!(self.by, split::By::Sample { .. }) => {
+                Err(TrainError::Leak { count: leaks.len(), first: first.clone() })
+            }
+            _ => Ok(()),
+        }
     }
 }
 
 /// What came out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trained {
+    /// What was learnt.
+    pub variant: Variant,
     /// One network for all vehicles.
-    pub network: Network,
+    pub layers: Layers<f32>,
     /// Its standardisation.
     pub scaling: Scaling,
-    /// What holds for each vehicle, in the order given.
+    /// What holds for each vehicle of the data set, in the order of their names.
     pub vehicles: Vec<TrainedVehicle>,
     /// Every epoch.
     pub history: Vec<Epoch>,
+    /// The epoch after which the weights were as they are kept.
+    pub kept_epoch: u32,
+    /// Seconds an epoch took in this run [s]; `None` where there was none left to do.
+    pub epoch_s: Option<f64>,
 }
 
 /// The part of a training that belongs to one vehicle.
@@ -167,45 +200,111 @@ pub struct Trained {
 pub struct TrainedVehicle {
     /// Its name.
     pub name: String,
-    /// The states learnt from.
+    /// The states learnt from; those of all vehicles where none was of this one.
     pub domain: Domain,
-    /// Root mean square of the error of the net force over density on held-out cases [m4/s2].
+    /// Root mean square of the error of the net force over density [m4/s2]: on held-out samples, or on training samples
+    /// where none of this vehicle is held out.
     pub held_out_rms: [f64; OUTPUTS],
-    /// Errors on held-out cases in newtons.
+    /// Errors on held-out samples in newtons.
     pub score: Score,
 }
 
-/// Trains one network for all vehicles on their analytic loads; `progress` hears of every epoch.
+/// Trains one network for all vehicles of a data set; `progress` hears of every epoch.
 pub fn train(
-    vehicles: &[Vehicle],
+    source: &Source,
+    sides: Sides<'_>,
+    variant: Variant,
     config: &Config,
+    checkpoint: Option<&Checkpoint>,
     progress: &dyn Fn(&Epoch),
 ) -> Result<Trained, TrainError> {
     config.validate()?;
-    let mut random = Random::new(config.seed);
-    let data = gather(vehicles, config, &mut random)?;
-    let mut fit = Fit::new(&data, config, &mut random)?;
-    let mut history = Vec::new();
-    while !fit.is_over() {
-        let epoch = fit.epoch()?;
-        progress(&epoch);
-        history.push(epoch);
-    }
-    let of_vehicle = |(index, vehicle): (usize, &Vehicle)| {
-        let samples = || data.held_out.iter().filter(|s| s.vehicle == index);
-        let score = Score::of(samples(), |sample| fit.net_force_over_density(sample));
-        let domain = config.table(vehicle)?.domain();
-        Ok(TrainedVehicle { name: vehicle.name.clone(), domain, held_out_rms: score.rms_over_density, score })
+    sides.check(&source.data)?;
+    let side = |numbers: &[usize]| samples::samples(&source.data, numbers, &source.vehicles);
+    let (training, held_out) = (side(&sides.split.training)?, side(&sides.split.held_out)?);
+    let (task, scaling) = Task::new(variant, &training, &held_out, config)?;
+    let begun = Instant::now();
+    let (fit, epochs) = run(&task, config, checkpoint, progress)?;
+    let (layers, kept_epoch) = fit.kept();
+    let mut trained = Trained {
+        variant,
+        layers,
+        scaling,
+        vehicles: Vec::new(),
+        history: fit.state.history,
+        kept_epoch,
+        epoch_s: (epochs > 0).then(|| begun.elapsed().as_secs_f64() / f64::from(epochs)),
     };
-    let vehicles = vehicles.iter().enumerate().map(of_vehicle).collect::<Result<_, TrainError>>()?;
-    Ok(Trained { network: fit.network(), scaling: fit.scaling().clone(), vehicles, history })
+    trained.vehicles = source
+        .vehicles
+        .keys()
+        .enumerate()
+        .map(|(index, name)| trained.vehicle(index, name, source, sides, [&training, &held_out]))
+        .collect::<Result<_, _>>()?;
+    Ok(trained)
 }
 
-fn gather(vehicles: &[Vehicle], config: &Config, random: &mut Random) -> Result<Dataset, TrainError> {
-    let mut data = Dataset::default();
-    for (index, vehicle) in vehicles.iter().enumerate() {
-        let table = config.table(vehicle)?;
-        data.add(index, vehicle, table, config.cases, config.held_out_share, &mut random.fork());
+/// All epochs, or those that a checkpoint leaves to do, and how many these were.
+fn run<'a>(
+    task: &'a Task,
+    config: &'a Config,
+    checkpoint: Option<&Checkpoint>,
+    progress: &dyn Fn(&Epoch),
+) -> Result<(Fit<'a>, u32), TrainError> {
+    let digest = task.digest(config);
+    let state = checkpoint.map(|checkpoint| checkpoint.start(task.sizes, &digest)).transpose()?.flatten();
+    let mut fit = match state {
+        Some(state) => Fit::resume(task, config, state),
+        None => Fit::new(task, config),
+    };
+    let mut epochs = 0;
+    while !fit.is_over() {
+        let epoch = fit.epoch()?;
+        epochs += 1;
+        if let Some(checkpoint) = checkpoint.filter(|_| epoch.number % CHECKPOINT_EPOCHS == 0) {
+            checkpoint.write(&fit.state, &digest)?;
+        }
+        progress(&epoch);
     }
-    Ok(data)
+    Ok((fit, epochs))
+}
+
+impl Trained {
+    /// Force over density on each surface as this variant sees them [m4/s2]: nothing from one without a wet sample.
+    pub fn force_over_density(&self, sample: &Sample) -> Vec<[f64; OUTPUTS]> {
+        let view = self.variant.view(sample);
+        let rows = self.variant.rows(&view, &self.scaling, 0.0);
+        let inputs = nalgebra::DMatrix::from_vec(self.layers.sizes.inputs, view.surfaces.len(), rows.inputs);
+        let output = self.layers.forward(&inputs).output;
+        let surface = |(column, fraction): (usize, &f32)| match *fraction > 0.0 {
+            true => self.scaling.target(std::array::from_fn(|c| output[(c, column)])),
+            false => [0.0; OUTPUTS],
+        };
+        view.fractions.iter().enumerate().map(surface).collect()
+    }
+
+    fn vehicle(
+        &self,
+        index: usize,
+        name: &str,
+        source: &Source,
+        sides: Sides<'_>,
+        [training, held_out]: [&Vec<Sample>; 2],
+    ) -> Result<TrainedVehicle, TrainError> {
+        let score = |samples: &[Sample]| {
+            let of_vehicle = samples.iter().filter(|sample| sample.vehicle == index);
+            Score::of(of_vehicle, |sample| samples::sum(&self.force_over_density(sample)))
+        };
+        let learnt = || sides.split.training.iter().map(|&number| &source.data.samples[number]);
+        let of_vehicle = domain::of(learnt().filter(|sample| sample.vehicle == name));
+        let domain = of_vehicle.or_else(|| domain::of(learnt()));
+        let held_out = score(held_out);
+        let judged = if held_out.samples > 0 { held_out } else { score(training) };
+        Ok(TrainedVehicle {
+            name: name.to_owned(),
+            domain: domain.ok_or(TrainError::EmptySide { side: "training" })?,
+            held_out_rms: judged.rms_over_density,
+            score: held_out,
+        })
+    }
 }

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::random::Random;
+use super::domain::{HEAVE, TILT, TURN};
 use crate::condition::Condition;
 use crate::domain::{Domain, Range};
 use crate::frame::Vec3;
+use crate::random::Random;
 
 /// The parameter table of one vehicle; level, planar motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -48,9 +49,9 @@ impl Table {
             angle_rad: Range { min: radians(self.angle_deg.min), max: radians(self.angle_deg.max) },
             density_kgpm3: self.density_kgpm3,
             depth_m: self.depth_m,
-            tilt_rad: Range { min: 0.0, max: 0.01 },
-            vertical_speed_mps: Range { min: -0.05, max: 0.05 },
-            angular_speed_radps: Range { min: 0.0, max: 0.05 },
+            tilt_rad: Range { min: 0.0, max: TILT },
+            vertical_speed_mps: Range { min: -HEAVE, max: HEAVE },
+            angular_speed_radps: Range { min: 0.0, max: TURN },
         }
     }
 
@@ -71,26 +72,6 @@ fn strata(range: Range, count: usize, random: &mut Random) -> Vec<f64> {
 
 fn case(speed: f64, angle: f64, density: f64, depth: f64) -> Condition {
     Condition { density, ..Condition::level(Vec3::new(angle.sin(), angle.cos(), 0.0) * speed, depth) }
-}
-
-/// The state and its images: left to right, front to rear, both.
-///
-/// The paper mirrors CFD forces and so takes both vehicles for symmetric; here the loads are computed anew for each
-/// image, which is exact on a hull that is not.
-pub fn mirrored(case: &Condition) -> [Condition; 4] {
-    [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(x, y)| {
-        let velocity = case.velocity.component_mul(&Vec3::new(x, y, 1.0));
-        Condition { velocity, ground_velocity: velocity, ..*case }
-    })
-}
-
-/// Splits case numbers into training and held-out ones, `share` of them held out (rounded, at least one of each when
-/// there are two).
-pub fn split(count: usize, share: f64, random: &mut Random) -> (Vec<usize>, Vec<usize>) {
-    let mut training = random.permutation(count);
-    let held_out = ((share * count as f64).round() as usize).clamp(1, count.saturating_sub(1).max(1));
-    let held_out = training.split_off(count.saturating_sub(held_out));
-    (training, held_out)
 }
 
 #[cfg(test)]
@@ -123,17 +104,8 @@ mod tests {
     }
 
     #[test]
-    fn every_case_and_image_is_inside_the_domain() {
+    fn every_case_is_inside_the_domain() {
         let domain = Table::HUSKY.domain();
-        assert!(plan(1).iter().flat_map(mirrored).all(|c| domain.outside(&c).is_inside()));
-    }
-
-    #[test]
-    fn no_case_is_on_both_sides_of_the_split() {
-        let (mut all, held_out) = split(175, 0.2, &mut Random::new(1));
-        assert_eq!((all.len(), held_out.len()), (140, 35));
-        all.extend(held_out);
-        all.sort_unstable();
-        assert_eq!(all, (0..175).collect::<Vec<_>>());
+        assert!(plan(1).iter().all(|case| domain.outside(case).is_inside()));
     }
 }

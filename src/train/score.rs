@@ -1,10 +1,12 @@
-//! Errors of the net force on held-out cases.
+//! Errors of the net force on held-out samples.
+
+use serde::{Deserialize, Serialize};
 
 use super::samples::Sample;
 use crate::model::network::OUTPUTS;
 
 /// Errors of the net force, component by component, body frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Score {
     /// Number of states, mirror images included.
     pub samples: usize,

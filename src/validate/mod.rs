@@ -14,7 +14,7 @@ mod folder;
 pub mod generated;
 mod mocap;
 mod page;
-mod paper;
+pub mod paper;
 mod planar;
 mod plot;
 mod recording;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use wade::frame::Vec3;
-use wade::train::random::Random;
+use wade::random::Random;
 use wade::trials::{Body, Manifest, Measured, Method, Trial, Trials};
 
 pub const LENGTH: f64 = 1.5;

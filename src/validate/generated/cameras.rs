@@ -6,7 +6,7 @@ use super::super::recording::Recording;
 use super::run::Run;
 use super::{gaussian, gaussian_vector};
 use crate::frame::Vec3;
-use crate::train::random::Random;
+use crate::random::Random;
 
 /// Frames a second: the paper's.
 pub const CAMERA_RATE: f64 = 120.0;

@@ -22,7 +22,7 @@ pub use schedule::{Direction, PAPER_TABLE, Planned, TableRow, schedule};
 use super::recording::{RECORDINGS_FILE, Recording, RecordingEntry, RecordingsFile};
 use crate::condition::FRESH_WATER;
 use crate::frame::Vec3;
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::vehicle::Vehicle;
 
 /// From the marker origin to the center of mass, vehicle frame [m]: the paper's.

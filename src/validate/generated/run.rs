@@ -6,7 +6,7 @@ use super::super::mocap::Rig;
 use super::CENTER_OF_MASS_FROM_MARKER;
 use super::schedule::{Direction, Planned};
 use crate::frame::Vec3;
-use crate::train::random::Random;
+use crate::random::Random;
 use crate::vehicle::Vehicle;
 
 /// Slope of the ramps, rise over run: chosen, the paper does not state it.

@@ -1,0 +1,341 @@
+//! What is known about a state before anything is learnt, for the `anchored` model: exact hydrostatics (E1), a simple
+//! drag (E2 on the box around the wet part), and what the network is told, all without a dimension.
+//!
+//! The model is `F_s = H_s + D_s + q A_s R_s`: the pressure load `H_s` of still water, the drag `D_s`, and a remainder
+//! `R_s` that the network answers, in units of the dynamic pressure `q = rho U^2 / 2` on the wet area `A_s`. A dry surface
+//! gets nothing, continuously; a vehicle at rest gets Archimedes.
+//!
+//! Left and right: what is told of a surface on one side is told in terms of that side (toward it is positive), and of a
+//! surface on the plane of symmetry only what does not change under reflection, with lateral answers multiplied by
+//! something that does. So the mirror image of a state gets the mirror image of the answer, by construction.
+
+use crate::condition::{Condition, GroundContact};
+use crate::features::direction;
+use crate::frame::{GRAVITY, VISCOSITY, Vec3};
+use crate::geometry::mesh::Bounds;
+use crate::geometry::wetting::{Wetting, WettingTable};
+use crate::vehicle::Vehicle;
+use crate::wrench::Wrench;
+
+/// Names of what is told of a state, in order.
+pub const GLOBAL_NAMES: [&str; 11] = [
+    "froude_depth",
+    "froude_length",
+    "depth",
+    "ahead",
+    "aside_squared",
+    "reynolds",
+    "bed",
+    "up_x",
+    "up_y_squared",
+    "width",
+    "height",
+];
+
+/// Names of what is told of a surface in a state, in order.
+pub const DYNAMIC_NAMES: [&str; 12] = [
+    "wet_fraction",
+    "mean_depth",
+    "aside",
+    "up_aside",
+    "facing",
+    "wet_facing",
+    "upstream",
+    "off_track",
+    "below_surface",
+    "above_top",
+    "wet_area",
+    "clearance",
+];
+
+/// Names of what is told of a surface whatever the state, in order.
+pub const STATIC_NAMES: [&str; 12] =
+    ["bottom", "front", "rear", "side", "wheel", "x", "y_outward", "z", "nx", "n_outward", "nz", "area"];
+
+/// Names of what the network answers for a surface, in order.
+pub const OUTPUT_NAMES: [&str; 7] =
+    ["force_x", "force_aside", "force_z", "force_up_aside", "center_x", "center_aside", "center_z"];
+
+/// Number of global features.
+pub const GLOBAL: usize = GLOBAL_NAMES.len();
+/// Number of features of a surface that change with the state.
+pub const DYNAMIC: usize = DYNAMIC_NAMES.len();
+/// Number of features of a surface that do not.
+pub const STATIC: usize = STATIC_NAMES.len();
+/// Number of answers for a surface.
+pub const OUTPUTS: usize = OUTPUT_NAMES.len();
+/// Coordinates of a state among the cases that were learnt from.
+pub const COORDINATES: usize = 8;
+
+/// Drag coefficient of a box in open-channel flow (Qi, Eames, Johnson, JFM 2014) [-].
+const CD0: f64 = 1.9;
+/// Share of the drag that depends on how far upstream a surface is; see `effects::form_drag`.
+const SHELTERING: f64 = 0.5;
+/// Depth below which Froude numbers no longer grow [m].
+const LEAST_DEPTH: f64 = 1e-3;
+/// Reynolds number below which its logarithm is held.
+const LEAST_REYNOLDS: f64 = 1e3;
+
+/// A vehicle prepared to be read in any state; body frame.
+#[derive(Debug, Clone)]
+pub struct Anchor {
+    table: WettingTable,
+    surfaces: Vec<AnchorSurface>,
+    /// Ends of the hull along x and y, from the origin [m].
+    bounds: Bounds,
+    /// Depth up to which the coordinates of a state are told apart, the height of the hull [m].
+    height: f64,
+}
+
+#[derive(Debug, Clone)]
+struct AnchorSurface {
+    bounds: Bounds,
+    /// 1 to the left, -1 to the right, 0 on the plane of symmetry.
+    side: f64,
+    normal: Vec3,
+    area: f64,
+}
+
+/// What is known of a state.
+#[derive(Debug, Clone, Default)]
+pub struct Reading {
+    /// Dynamic pressure [Pa].
+    pub pressure: f64,
+    /// Features of the state.
+    pub global: [f64; GLOBAL],
+    /// Where the state lies among the cases that were learnt from.
+    pub coordinates: [f64; COORDINATES],
+    /// One entry a surface, in the vehicle's order.
+    pub surfaces: Vec<SurfaceReading>,
+    wetting: Vec<Wetting>,
+}
+
+/// What is known of a surface in a state; body frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SurfaceReading {
+    /// Share under water.
+    pub wet_fraction: f64,
+    /// Centroid of the wet part [m]; of the whole surface where it is dry.
+    pub center: Vec3,
+    /// Load of still water about the body origin [N, N m].
+    pub hydrostatic: Wrench,
+    /// Simple drag [N].
+    pub drag: Vec3,
+    /// `q A`: what a coefficient of one is worth [N].
+    pub unit: f64,
+    /// Factors of the two lateral coefficients.
+    pub lateral: [f64; 2],
+    /// The box around the wet part [m].
+    pub wet_box: [Vec3; 2],
+    /// Features.
+    pub dynamic: [f32; DYNAMIC],
+}
+
+impl SurfaceReading {
+    /// The dynamic force that the network's answer means [N].
+    pub fn force(&self, output: &[f32; OUTPUTS]) -> Vec3 {
+        let o = output.map(f64::from);
+        let aside = o[1] * self.lateral[0] + o[3] * self.lateral[1];
+        self.drag + Vec3::new(o[0], aside, o[2]) * self.unit
+    }
+
+    /// Where the dynamic force acts, inside the box around the wet part [m].
+    pub fn center_of_pressure(&self, output: &[f32; OUTPUTS]) -> Vec3 {
+        let o = output.map(f64::from);
+        let share = Vec3::new(o[4].tanh(), o[5].tanh() * self.lateral[0], o[6].tanh());
+        let [low, high] = self.wet_box;
+        let toward = |axis: usize| {
+            if share[axis] > 0.0 { high[axis] - self.center[axis] } else { self.center[axis] - low[axis] }
+        };
+        self.center + Vec3::new(share.x * toward(0), share.y * toward(1), share.z * toward(2))
+    }
+}
+
+impl Anchor {
+    /// Prepares a vehicle.
+    pub fn new(vehicle: &Vehicle) -> Self {
+        let count = vehicle.surfaces.len();
+        let whole = vehicle.hull.mesh.bounds().unwrap_or(Bounds { min: Vec3::zeros(), max: Vec3::zeros() });
+        let surface = |(index, surface): (usize, &crate::vehicle::Surface)| {
+            let corners = vehicle.hull.faces_of(index).flat_map(|face| vehicle.hull.mesh.triangle(face));
+            let corners: Vec<Vec3> = corners.collect();
+            let alone = surface.mirror_left_right == index;
+            AnchorSurface {
+                bounds: Bounds::around(&corners).unwrap_or(whole),
+                side: if alone { 0.0 } else { surface.centroid.y.signum() },
+                normal: surface.normal,
+                area: surface.area,
+            }
+        };
+        Self {
+            table: WettingTable::new(&vehicle.hull, count),
+            surfaces: vehicle.surfaces.iter().enumerate().map(surface).collect(),
+            bounds: whole,
+            height: vehicle.dimensions.height,
+        }
+    }
+
+    /// Features of each surface that do not change with the state.
+    pub fn static_rows(&self, vehicle: &Vehicle) -> Vec<[f32; STATIC]> {
+        let dimensions = &vehicle.dimensions;
+        let row = |(surface, anchor): (&crate::vehicle::Surface, &AnchorSurface)| {
+            let mut row = crate::features::surface_static(surface, dimensions);
+            (row[6], row[9]) = (row[6].abs(), row[9] * anchor.side);
+            row.map(|x| x as f32)
+        };
+        vehicle.surfaces.iter().zip(&self.surfaces).map(row).collect()
+    }
+
+    /// Reads a state. Allocates nothing once `out` has held this vehicle.
+    pub fn read(&self, vehicle: &Vehicle, condition: &Condition, out: &mut Reading) {
+        let plane = condition.water_plane(vehicle.z0);
+        out.wetting.resize(self.surfaces.len(), Wetting::default());
+        self.table.wetting_into(&vehicle.hull, &plane, &mut out.wetting);
+        let flow = Flow::of(vehicle, condition);
+        out.pressure = 0.5 * condition.density * flow.speed * flow.speed;
+        out.global = flow.global(vehicle, condition);
+        out.coordinates = self.coordinates(&flow, condition);
+        out.surfaces.clear();
+        for (index, (surface, wetting)) in self.surfaces.iter().zip(&out.wetting).enumerate() {
+            let mut reading = self.surface(vehicle, surface, wetting, condition, &flow);
+            if reading.wet_fraction == 0.0 {
+                reading.center = vehicle.surfaces[index].centroid;
+            }
+            out.surfaces.push(reading);
+        }
+        if condition.ground_contact == GroundContact::Dry {
+            for patch in &vehicle.contacts {
+                let reading = &mut out.surfaces[patch.surface];
+                if reading.wet_fraction > 0.0 {
+                    reading.hydrostatic += patch.lost_pressure(&plane, condition.density, &Vec3::zeros());
+                }
+            }
+        }
+    }
+
+    fn surface(
+        &self,
+        vehicle: &Vehicle,
+        surface: &AnchorSurface,
+        wetting: &Wetting,
+        condition: &Condition,
+        flow: &Flow,
+    ) -> SurfaceReading {
+        let Some(center) = wetting.centroid() else { return SurfaceReading::default() };
+        let (length, width, height) =
+            (vehicle.dimensions.length, vehicle.dimensions.width, vehicle.dimensions.height);
+        let plane = condition.water_plane(vehicle.z0);
+        let Bounds { min, max } = surface.bounds;
+        // the water level in the body frame where the surface is; a vehicle on its side has none
+        let level = center.z + plane.depth_below(&center) / plane.normal.z.max(0.1);
+        let top = max.z.min(level.max(min.z));
+        let wet = Vec3::new(max.x - min.x, max.y - min.y, top - min.z);
+        let fraction = (wetting.area / surface.area).min(1.0);
+        let weight = density_times_gravity(condition);
+        let hydrostatic =
+            Wrench { force: wetting.pressure.force * weight, moment: wetting.pressure.moment * weight };
+        let ahead = &flow.direction;
+        let front = (wet.y * ahead.x.abs() + wet.x * ahead.y.abs()) * wet.z;
+        let place = center.dot(ahead) / flow.half_length(&self.bounds);
+        let shelter = 0.5 * (1.0 + SHELTERING * place.clamp(-1.0, 1.0));
+        let pressure = 0.5 * condition.density * flow.speed * flow.speed;
+        let facing = surface.normal.dot(ahead);
+        let off_track = (center.x * ahead.y - center.y * ahead.x).abs();
+        let dynamic = [
+            fraction,
+            plane.depth_below(&center) / height,
+            surface.side * ahead.y,
+            surface.side * condition.up.y,
+            facing,
+            facing.abs() * fraction,
+            center.dot(ahead) / length,
+            off_track / width,
+            ((level - min.z) / height).clamp(0.0, 2.0),
+            ((level - max.z) / height).clamp(-1.0, 1.0),
+            wetting.area / (length * width),
+            ((min.z - vehicle.z0) / condition.depth.max(LEAST_DEPTH)).clamp(0.0, 4.0),
+        ];
+        SurfaceReading {
+            wet_fraction: fraction,
+            center,
+            hydrostatic,
+            drag: ahead * -(CD0 * shelter * front * pressure),
+            unit: pressure * wetting.area,
+            lateral: if surface.side == 0.0 { [ahead.y, condition.up.y] } else { [surface.side, 0.0] },
+            wet_box: [min.inf(&center), Vec3::new(max.x, max.y, top).sup(&center)],
+            dynamic: dynamic.map(|x| x as f32),
+        }
+    }
+
+    fn coordinates(&self, flow: &Flow, condition: &Condition) -> [f64; COORDINATES] {
+        [
+            bounded(flow.froude_depth),
+            flow.froude_length,
+            condition.depth / self.height,
+            flow.direction.x,
+            flow.direction.y.abs(),
+            condition.up.x,
+            condition.up.y.abs(),
+            flow.bed,
+        ]
+    }
+}
+
+/// `x / (1 + x)`: a Froude number of any size, in 0 to 1.
+fn bounded(x: f64) -> f64 {
+    x / (1.0 + x)
+}
+
+fn density_times_gravity(condition: &Condition) -> f64 {
+    condition.density * GRAVITY
+}
+
+/// The motion through the water.
+struct Flow {
+    speed: f64,
+    direction: Vec3,
+    froude_depth: f64,
+    froude_length: f64,
+    /// How much of the velocity through the water the bed sees: 1 driving in still water, 0 parked in a current.
+    bed: f64,
+}
+
+impl Flow {
+    fn of(vehicle: &Vehicle, condition: &Condition) -> Self {
+        let speed = condition.velocity.norm();
+        let ahead = direction(&condition.velocity);
+        let bed = if speed > 0.0 { condition.ground_velocity.dot(&ahead) / speed } else { 0.0 };
+        Self {
+            speed,
+            direction: ahead,
+            froude_depth: speed / (GRAVITY * condition.depth.max(LEAST_DEPTH)).sqrt(),
+            froude_length: speed / (GRAVITY * vehicle.dimensions.length).sqrt(),
+            bed: bed.clamp(-2.0, 2.0),
+        }
+    }
+
+    fn global(&self, vehicle: &Vehicle, condition: &Condition) -> [f64; GLOBAL] {
+        let dimensions = &vehicle.dimensions;
+        let reynolds = condition.density * self.speed * dimensions.length / VISCOSITY;
+        [
+            bounded(self.froude_depth),
+            self.froude_length,
+            condition.depth / dimensions.height,
+            self.direction.x,
+            self.direction.y * self.direction.y,
+            reynolds.max(LEAST_REYNOLDS).log10() - 6.0,
+            self.bed,
+            condition.up.x,
+            condition.up.y * condition.up.y,
+            dimensions.width / dimensions.length,
+            dimensions.height / dimensions.length,
+        ]
+    }
+
+    /// Half the length of the hull along the motion [m].
+    fn half_length(&self, bounds: &Bounds) -> f64 {
+        let half = bounds.extent() * 0.5;
+        (half.x * self.direction.x.abs() + half.y * self.direction.y.abs() + half.z * self.direction.z.abs())
+            .max(1e-6)
+    }
+}

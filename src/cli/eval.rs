@@ -1,0 +1,195 @@
+//! `wade eval`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde_json::json;
+use wade::dataset::split;
+use wade::evaluate::contest::{Contest, Contestants, enter};
+use wade::evaluate::report::{Report, VehicleReport};
+use wade::evaluate::{held_out, paper};
+use wade::geometry::distance::SignedDistanceGrid;
+use wade::model::Model;
+use wade::model::kernel::Isa;
+use wade::train::report::Record;
+use wade::train::{self, Config, Sides, Source, Trained, Variant};
+
+use super::train::{Data, Loaded, Progress, Rule};
+use super::{emit, usage_error};
+
+/// Judge the weights of the bundles by the states that their training held out
+///
+/// The model is asked as it is served, with the ground contact of the data set. Beside it stand three simple models that
+/// are fitted to the same training states, and the paper's figures, which are of other data. States that the weights have
+/// learnt from are refused: the report of the training says which these are.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  wade eval --data cfd.parquet --trained training --html eval.html
+  wade eval --data cfd.parquet --trained training --ablations --html eval.html
+  wade eval --data cfd.parquet --split depth --json         trains anew for each depth held out, leaves bundles alone")]
+pub struct Eval {
+    #[command(flatten)]
+    data: Data,
+    /// Folder of the report that wade train wrote
+    #[arg(long, value_name = "DIR", default_value = "training")]
+    trained: PathBuf,
+    /// Trains anew for each part that is held out in turn, with the settings of --config, instead of judging the bundles
+    #[arg(long, value_enum, conflicts_with = "trained")]
+    split: Option<Rule>,
+    /// Trains the paper's three ablations with the same settings and split
+    #[arg(long)]
+    ablations: bool,
+    /// Write a page with tables and plots
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+const PROGRAM: &str = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
+
+impl Eval {
+    /// Prints the tables and writes the page.
+    pub fn run(self) -> Result<ExitCode> {
+        let report = match self.split {
+            Some(rule) => self.anew(rule)?,
+            None => self.of_bundles()?,
+        };
+        if let Some(path) = &self.html {
+            std::fs::write(path, report.page()?).with_context(|| path.display().to_string())?;
+        }
+        emit(&if self.json { format!("{:#}\n", json!(report)) } else { text(&report) })?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn of_bundles(&self) -> Result<Report> {
+        if self.data.config.is_some() {
+            usage_error(
+                "--config goes with --split: without it the settings are those of the training report",
+            );
+        }
+        let record = Record::read(&self.trained).context("which states were held out is not known")?;
+        let loaded = self.data.load(&record.config)?;
+        let source = loaded.source(&record.config)?;
+        let split = held_out::of(&record, &loaded.file, &source)?;
+        let mut models = BTreeMap::new();
+        for (name, bundle) in &loaded.bundles {
+            let Some((weights, domain)) = bundle.trained.clone() else {
+                bail!("{name}: the bundle has no weights")
+            };
+            held_out::check_weights(&record, name, &weights)?;
+            let model =
+                Model::new(bundle.vehicle.clone(), bundle.version, domain, weights, Isa::available()[0]);
+            models.insert(name.clone(), model);
+        }
+        let by = if record.split.by_sample { Rule::Sample } else { Rule::Case }.by(&record.config);
+        let sides = Sides { split: &split, by };
+        let mut contest = Contest::new();
+        self.enter(&mut contest, &source, sides, &record.config, (&loaded, &models))?;
+        let about = (loaded.file, vec![split.name.clone()], record.split.by_sample);
+        Ok(Report::new(&contest, &source.vehicles, about, PROGRAM)?)
+    }
+
+    /// One training a part; the held-out states of all parts are pooled.
+    fn anew(&self, rule: Rule) -> Result<Report> {
+        let config = self.data.settings()?;
+        let loaded = self.data.load(&config)?;
+        let source = loaded.source(&config)?;
+        let by = rule.by(&config);
+        let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;
+        let mut contest = Contest::new();
+        for split in &splits {
+            let sides = Sides { split, by };
+            let trained = learn(&source, sides, Variant::Paper, &config)?;
+            let mut models = BTreeMap::new();
+            for of_vehicle in &trained.vehicles {
+                let (weights, domain) = loaded.weights(&trained, of_vehicle);
+                let vehicle = source.vehicles[&of_vehicle.name].clone();
+                models.insert(
+                    of_vehicle.name.clone(),
+                    Model::new(vehicle, 0, domain, weights, Isa::available()[0]),
+                );
+            }
+            self.enter(&mut contest, &source, sides, &config, (&loaded, &models))?;
+        }
+        let names = splits.iter().map(|split| split.name.clone()).collect();
+        Ok(Report::new(&contest, &source.vehicles, (loaded.file, names, rule == Rule::Sample), PROGRAM)?)
+    }
+
+    fn enter(
+        &self,
+        contest: &mut Contest,
+        source: &Source,
+        sides: Sides<'_>,
+        config: &Config,
+        (loaded, models): (&Loaded, &BTreeMap<String, Model>),
+    ) -> Result<()> {
+        let mut ablations = Vec::new();
+        if self.ablations {
+            for variant in Variant::ABLATIONS {
+                ablations.push(learn(source, sides, variant, config)?);
+            }
+        }
+        let distances: BTreeMap<String, &SignedDistanceGrid> =
+            loaded.bundles.iter().map(|(name, bundle)| (name.clone(), &bundle.distance)).collect();
+        let contestants = Contestants { models, distances: &distances, ablations: &ablations };
+        Ok(enter(contest, source, sides.split, &contestants)?)
+    }
+}
+
+fn learn(source: &Source, sides: Sides<'_>, variant: Variant, config: &Config) -> Result<Trained> {
+    eprintln!("training {}, held out: {}", variant.name(), sides.split.name);
+    let progress = Progress::new(config.epochs)?;
+    Ok(train::train(source, sides, variant, config, None, &|epoch| progress.epoch(epoch))?)
+}
+
+fn text(report: &Report) -> String {
+    let mut text = format!("loads: {}\nheld out: {}\n", report.data.label(), report.splits.join("; "));
+    if report.by_sample {
+        text.push_str(
+            "sections and images of one case are on both sides: this tests interpolation within known runs\n",
+        );
+    }
+    report.vehicles.iter().for_each(|vehicle| text.push_str(&vehicle_text(vehicle)));
+    text
+}
+
+fn vehicle_text(vehicle: &VehicleReport) -> String {
+    let three = |values: [f64; 3]| values.map(|x| format!("{x:9.2}")).concat();
+    let mut text =
+        format!("\n{}: {} held-out cases, {} states\n", vehicle.name, vehicle.cases, vehicle.samples);
+    text.push_str(&format!(
+        "{:32}{:>27}{:>27}{:>27}\n",
+        "net force, x y z", "MAE [N]", "RMSE [N]", "sMAPE [%]"
+    ));
+    let mut line = |name: &str, mae, rmse, smape| {
+        text.push_str(&format!("  {name:30}{}{}{}\n", three(mae), three(rmse), three(smape)));
+    };
+    for model in &vehicle.models {
+        line(&model.name, model.force.mae, model.force.rmse, model.force.smape);
+    }
+    if let Some(theirs) = vehicle.paper {
+        line(&format!("({})", paper::LABEL), theirs.mae, theirs.rmse, theirs.smape);
+    }
+    for kind in &vehicle.kinds {
+        let (mae, share) = (three(kind.mae_n), 100.0 * kind.share);
+        text.push_str(&format!(
+            "  {:30}{mae}   MAE on a surface [N]; {share:.1} % of the force\n",
+            kind.name
+        ));
+    }
+    for slice in &vehicle.slices {
+        let (name, mae) = (format!("{} ({:.3})", slice.name, slice.bound), three(slice.mae_n));
+        text.push_str(&format!("  {name:30}{mae}   MAE [N] of {} states\n", slice.samples));
+    }
+    if let Some(calibration) = &vehicle.calibration {
+        let [one, two] =
+            [calibration.within_one, calibration.within_two].map(|s| three(s.map(|x| 100.0 * x)));
+        text.push_str(&format!("  {:30}{one}{two}\n", "within 1 and 2 deviations [%]"));
+    }
+    text
+}

@@ -1,0 +1,262 @@
+//! `wade gap-bench`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use wade::gap_bench::answer::Answer;
+use wade::gap_bench::baselines::Method;
+use wade::gap_bench::case::{Case, Family, cases};
+use wade::gap_bench::generate::generate;
+use wade::gap_bench::real::{falling_balls, kvlcc2, rm2_rotor};
+use wade::gap_bench::score::{Row, rows, table};
+use wade::gap_bench::{
+    Hull, Outcome, Prediction, Progress, Schedule, Simulator, Tool, ToolError, command_tool, folder, run,
+};
+use wade::trials::Trials;
+use wade::vehicle::shipped;
+
+use super::emit;
+
+/// Hide effects in generated trials and score what a tool and plain regressions say of them
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+#[command(after_help = "Examples:
+  wade gap-bench --cases 69 --seed 1 --out bench/
+  wade gap-bench --cases 6 --families null,single --size slice --out bench/ --json
+  wade gap-bench --cases 69 --tool 'wade gap --vehicle generated-box --trials {trials} --out {out}' --out bench/
+  wade gap-bench import kvlcc2 --from kvlcc2_roll_decay/ --out trials/
+
+All trials are generated and labelled so. OUT/results.json holds the table and every case.")]
+pub struct GapBench {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    bench: Bench,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make a folder of trials from published measurements
+    Import(Import),
+}
+
+#[derive(Debug, Args)]
+struct Import {
+    #[arg(value_enum)]
+    source: Source,
+    /// Folder of the published files
+    #[arg(long, value_name = "DIR")]
+    from: PathBuf,
+    /// Folder for the trials
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Source {
+    /// Roll decay of a ship model beside inviscid simulations
+    Kvlcc2,
+    /// A towed rotor against the same without blades
+    Rm2Rotor,
+    /// Falling balls, a folder of trials each
+    FallingBalls,
+}
+
+impl Import {
+    fn run(self) -> Result<ExitCode> {
+        let import = match self.source {
+            Source::Kvlcc2 => kvlcc2::import,
+            Source::Rm2Rotor => rm2_rotor::import,
+            Source::FallingBalls => falling_balls::import,
+        };
+        import(&self.from, &self.out)?;
+        emit(&format!("{}\n", self.out.display()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+#[derive(Debug, Args)]
+struct Bench {
+    /// Cases of each family; 69 are all effects at all strengths once
+    #[arg(long, value_name = "N", default_value_t = 69)]
+    cases: usize,
+    /// Seed of all that is random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Families of cases [default: all but timing]
+    #[arg(long, value_delimiter = ',')]
+    families: Vec<FamilyName>,
+    /// Length and number of the trials of a case
+    #[arg(long, value_enum, default_value_t = Size::Full)]
+    size: Size,
+    /// Command that answers: {trials} stands for the folder of trials, {out} for where it leaves report.json
+    #[arg(long, value_name = "COMMAND")]
+    tool: Option<String>,
+    /// Leave the plain regressions out
+    #[arg(long)]
+    no_baselines: bool,
+    /// Ask again with the trials shuffled and mirrored in every N-th case; 0 for never
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    invariance: usize,
+    /// Write the trials of each case to OUT/cases
+    #[arg(long)]
+    keep: bool,
+    /// Folder for results.json
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the JSON instead of the table
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FamilyName {
+    Null,
+    Single,
+    Set,
+    Confounded,
+    Gated,
+    Outside,
+    NotExcited,
+    Timing,
+}
+
+impl FamilyName {
+    fn family(self) -> Family {
+        match self {
+            Self::Null => Family::Null,
+            Self::Single => Family::Single,
+            Self::Set => Family::Set,
+            Self::Confounded => Family::Confounded,
+            Self::Gated => Family::Gated,
+            Self::Outside => Family::Outside,
+            Self::NotExcited => Family::NotExcited,
+            Self::Timing => Family::Timing,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Size {
+    /// The paper's 71 trials and 18 others at 111 Hz
+    Full,
+    /// A sixth of the paper's and the others, at 37 Hz
+    Slice,
+}
+
+impl GapBench {
+    /// Prints the table, or the JSON.
+    pub fn run(self) -> Result<ExitCode> {
+        match self.command {
+            Some(Command::Import(import)) => import.run(),
+            None => self.bench.run(),
+        }
+    }
+}
+
+impl Bench {
+    fn run(self) -> Result<ExitCode> {
+        let Some(out) = &self.out else { super::usage_error("--out DIR is needed") };
+        let hull = Hull::generated_box();
+        let simulator = Simulator { hull: &hull, prediction: Prediction::Analytic, vehicle: "generated-box" };
+        let warthog = shipped::warthog()?.vehicle()?;
+        let schedule = match self.size {
+            Size::Full => Schedule::full(&warthog, self.seed),
+            Size::Slice => Schedule::slice(&warthog, self.seed),
+        };
+        let cases = cases(&self.families(), self.cases, self.seed);
+        if self.keep {
+            for case in &cases {
+                let place = out.join("cases").join(&case.name);
+                folder::write(&place, &generate(case, &schedule, simulator).trials)
+                    .with_context(|| place.display().to_string())?;
+            }
+        }
+        let outcomes = self.outcomes(&cases, &schedule, simulator);
+        std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+        let json = self.json(&outcomes)?;
+        std::fs::write(out.join("results.json"), &json).with_context(|| out.display().to_string())?;
+        emit(&if self.json { json } else { text(&outcomes) })?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn families(&self) -> Vec<Family> {
+        if self.families.is_empty() {
+            return Family::ALL.into_iter().filter(|family| *family != Family::Timing).collect();
+        }
+        self.families.iter().map(|name| name.family()).collect()
+    }
+
+    fn outcomes(
+        &self,
+        cases: &[Case],
+        schedule: &Schedule,
+        simulator: Simulator,
+    ) -> BTreeMap<String, Outcome> {
+        type Boxed<'a> = Box<dyn Fn(&Trials) -> Result<Answer, ToolError> + 'a>;
+        let mut tools: Vec<(String, Boxed)> = Vec::new();
+        if let Some(command) = &self.tool {
+            tools.push(("tool".to_owned(), Box::new(command_tool(command))));
+        }
+        for method in Method::ALL.into_iter().filter(|_| !self.no_baselines) {
+            let answer = move |trials: &Trials| method.answer(trials, &simulator);
+            tools.push((method.name().to_owned(), Box::new(answer)));
+        }
+        let borrowed: Vec<(&str, &Tool)> =
+            tools.iter().map(|(name, tool)| (name.as_str(), tool.as_ref())).collect();
+        let bar = bar();
+        let mut show = |progress: Progress| {
+            bar.set_length(progress.done[1] as u64);
+            bar.set_position(progress.done[0] as u64);
+            bar.set_message(progress.case.to_owned());
+        };
+        let outcomes = run(cases, schedule, simulator, &borrowed, self.invariance, &mut show);
+        bar.finish_and_clear();
+        tools.into_iter().map(|(name, _)| name).zip(outcomes).collect()
+    }
+
+    fn json(&self, outcomes: &BTreeMap<String, Outcome>) -> Result<String> {
+        let tools: BTreeMap<&String, serde_json::Value> = outcomes
+            .iter()
+            .map(|(name, outcome)| {
+                (name, serde_json::json!({"measures": rows(&outcome.judged), "cases": outcome}))
+            })
+            .collect();
+        let results = serde_json::json!({
+            "generated": "all trials are generated; nothing of them was measured",
+            "commit": env!("WADE_COMMIT"),
+            "cases_of_each_family": self.cases,
+            "seed": self.seed,
+            "size": format!("{:?}", self.size).to_lowercase(),
+            "tool": self.tool,
+            "tools": tools,
+        });
+        Ok(serde_json::to_string_pretty(&results)? + "\n")
+    }
+}
+
+fn text(outcomes: &BTreeMap<String, Outcome>) -> String {
+    let tools: BTreeMap<String, Vec<Row>> =
+        outcomes.iter().map(|(name, outcome)| (name.clone(), rows(&outcome.judged))).collect();
+    let mut text = table(&tools);
+    for (name, outcome) in outcomes {
+        let [shuffled, mirrored] = [outcome.same_when_shuffled, outcome.same_when_mirrored];
+        text += &format!(
+            "{name}: the same in {} of {} with trials shuffled, in {} of {} mirrored\n",
+            shuffled[0], shuffled[1], mirrored[0], mirrored[1]
+        );
+    }
+    text
+}
+
+fn bar() -> ProgressBar {
+    let bar = ProgressBar::new(0);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos} of {len}, {eta} left, {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,207 @@
+//! The data set on disk: one Parquet file in long form, a row for each surface of each sample, plain enough for pandas
+//! and DuckDB. The key-value meta data carry what no column can: `wade.format`, `wade.meta` (JSON), `wade.units`
+//! (JSON, by column) and `wade.frame`.
+
+use std::fs::{File, Permissions};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use parquet::errors::ParquetError;
+use parquet::file::reader::SerializedFileReader;
+
+use super::decode::decode;
+use super::encode::encode;
+use super::{Dataset, Flaw, Image};
+
+/// Format of the files that this program writes, and the newest that it reads.
+pub const FORMAT: u32 = 1;
+
+pub(super) const FORMAT_KEY: &str = "wade.format";
+pub(super) const META_KEY: &str = "wade.meta";
+
+/// Why a data set could not be read or written. The message names the file and what is wrong with it.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {fault}", .path.display())]
+pub struct DatasetError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+/// What is wrong with a file. Rows are counted from 0, as pandas and DuckDB do.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// Missing, unreadable, or no room to write.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    /// Cut off, damaged, or not Parquet at all.
+    #[error("cannot be read as Parquet: {0}")]
+    Parquet(#[from] ParquetError),
+    /// Parquet, but without our meta data.
+    #[error(
+        "the meta data have no key `{key}`: `wade dataset` writes it, a copy by another program may lose it"
+    )]
+    NoMeta {
+        /// The key.
+        key: &'static str,
+    },
+    /// Meta data of another form.
+    #[error("the meta data under {META_KEY} cannot be read: {0}")]
+    Meta(#[from] serde_json::Error),
+    /// Written by a newer program.
+    #[error("format {found} is newer than {FORMAT}, the newest that this program reads: update wade")]
+    NewerFormat {
+        /// The format of the file.
+        found: String,
+    },
+    /// A column is missing.
+    #[error("column {column} is missing")]
+    MissingColumn {
+        /// Its name.
+        column: &'static str,
+    },
+    /// A column of another length.
+    #[error("column {column} has {found} values for {rows} rows")]
+    ColumnLength {
+        /// Its name.
+        column: &'static str,
+        /// Its length.
+        found: usize,
+        /// Rows of the file.
+        rows: usize,
+    },
+    /// A column of another type.
+    #[error("column {column} is {found}, which is not {expected}")]
+    ColumnType {
+        /// Its name.
+        column: &'static str,
+        /// Its type.
+        found: String,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// Nothing where there must be something.
+    #[error("column {column}, row {row}: there is no value")]
+    Null {
+        /// The column.
+        column: &'static str,
+        /// The row.
+        row: usize,
+    },
+    /// Bytes that are no text.
+    #[error("column {column}, row {row}: not UTF-8")]
+    NotText {
+        /// The column.
+        column: &'static str,
+        /// The row.
+        row: usize,
+    },
+    /// A number that is none.
+    #[error("column {column}, row {row}: {value} is not finite")]
+    NotFinite {
+        /// The column.
+        column: &'static str,
+        /// The row.
+        row: usize,
+        /// What stands there.
+        value: f64,
+    },
+    /// A value that the column cannot have.
+    #[error("column {column}, row {row}: `{value}` is not {expected}")]
+    Value {
+        /// The column.
+        column: &'static str,
+        /// The row.
+        row: usize,
+        /// What stands there.
+        value: String,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// A vehicle of which the meta data do not list the surfaces.
+    #[error("column vehicle, row {row}: the meta data do not list `{vehicle}`")]
+    UnknownVehicle {
+        /// The row.
+        row: usize,
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// A surface that the vehicle has not.
+    #[error("column surface, row {row}: vehicle `{vehicle}` has no surface `{surface}`")]
+    UnknownSurface {
+        /// The row.
+        row: usize,
+        /// The vehicle.
+        vehicle: String,
+        /// The surface.
+        surface: String,
+    },
+    /// The same surface of the same sample again.
+    #[error("column surface, row {row}: `{surface}` of case `{case}`, section {section} is there already")]
+    RepeatedSurface {
+        /// The row.
+        row: usize,
+        /// The surface.
+        surface: String,
+        /// The case.
+        case: String,
+        /// The section.
+        section: u32,
+    },
+    /// Two rows of one sample that state different things.
+    #[error("column {column}, row {row}: differs from the other rows of case `{case}`, section {section}")]
+    Differs {
+        /// The column.
+        column: &'static str,
+        /// The row.
+        row: usize,
+        /// The case.
+        case: String,
+        /// The section.
+        section: u32,
+    },
+    /// A sample without one of its surfaces.
+    #[error("case `{case}`, section {section}, image {image}: there is no row for surface `{surface}`")]
+    MissingSurface {
+        /// The case.
+        case: String,
+        /// The section.
+        section: u32,
+        /// The image.
+        image: Image,
+        /// The surface.
+        surface: String,
+    },
+    /// Values that make no data set.
+    #[error("{0}")]
+    Flaw(#[from] Flaw),
+}
+
+/// Reads a data set and checks it. Rows may stand in any order; further columns are left alone.
+pub fn read(path: &Path) -> Result<Dataset, DatasetError> {
+    load(path).map_err(|fault| DatasetError { path: path.to_owned(), fault })
+}
+
+/// Writes a data set as a whole or not at all: to a temporary file in the same folder, which then takes the name.
+pub fn write(path: &Path, dataset: &Dataset) -> Result<(), DatasetError> {
+    store(path, dataset).map_err(|fault| DatasetError { path: path.to_owned(), fault })
+}
+
+fn load(path: &Path) -> Result<Dataset, Fault> {
+    let dataset = decode(&SerializedFileReader::new(File::open(path)?)?)?;
+    dataset.check()?;
+    Ok(dataset)
+}
+
+fn store(path: &Path, dataset: &Dataset) -> Result<(), Fault> {
+    dataset.check()?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // readable as any file that a program writes, less the umask; the default of temporary files is for secrets
+    let mut staged =
+        tempfile::Builder::new().permissions(Permissions::from_mode(0o666)).tempfile_in(folder)?;
+    encode(staged.as_file_mut(), dataset)?;
+    staged.as_file().sync_all()?;
+    staged.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}

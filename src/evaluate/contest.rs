@@ -1,0 +1,88 @@
+//! Several models on the same held-out states: the one that is served, the simple ones, and the ablations. Parts of a
+//! split that are held out in turn are pooled.
+
+use std::collections::BTreeMap;
+
+use super::EvaluateError;
+use super::baseline::Baseline;
+use super::predict::{Prediction, by_trainer, served};
+use super::states::{State, states};
+use crate::dataset::split::Split;
+use crate::geometry::distance::SignedDistanceGrid;
+use crate::model::Model;
+use crate::train::{Source, Trained};
+
+/// What one model says of every held-out state of a vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// The model.
+    pub name: String,
+    /// One prediction a state.
+    pub predictions: Vec<Prediction>,
+}
+
+/// The held-out states of one vehicle and what is said of them; the first entry is the model under evaluation.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Heat {
+    /// The states.
+    pub states: Vec<State>,
+    /// The models.
+    pub entries: Vec<Entry>,
+}
+
+/// Heats by vehicle.
+pub type Contest = BTreeMap<String, Heat>;
+
+/// Models to judge beside the simple ones, which are fitted here.
+#[derive(Debug)]
+pub struct Contestants<'a> {
+    /// The model of each vehicle, as it is served.
+    pub models: &'a BTreeMap<String, Model>,
+    /// Signed distance to each hull, for the pontoons.
+    pub distances: &'a BTreeMap<String, &'a SignedDistanceGrid>,
+    /// Networks that cannot be served.
+    pub ablations: &'a [Trained],
+}
+
+/// Adds the held-out side of a split to a contest.
+pub fn enter(
+    contest: &mut Contest,
+    source: &Source,
+    split: &Split,
+    contestants: &Contestants<'_>,
+) -> Result<(), EvaluateError> {
+    let (training, held_out) = (states(source, &split.training)?, states(source, &split.held_out)?);
+    for (name, vehicle) in &source.vehicles {
+        let held_out: Vec<&State> = held_out.iter().filter(|state| state.vehicle == *name).collect();
+        if held_out.is_empty() {
+            continue;
+        }
+        let no_model = || EvaluateError::NoModel { vehicle: name.clone() };
+        let model = contestants.models.get(name).ok_or_else(no_model)?;
+        let distance = contestants.distances.get(name).ok_or_else(no_model)?;
+        let mut entries = vec![(model_name(), served(model, &held_out))];
+        let learnt: Vec<&State> = training.iter().filter(|state| state.vehicle == *name).collect();
+        // a vehicle that is held out as a whole leaves nothing to fit its simple models to
+        if !learnt.is_empty() {
+            for baseline in Baseline::fit(vehicle, distance, &learnt)? {
+                entries.push((baseline.name().to_owned(), baseline.predict(vehicle, &held_out)));
+            }
+        }
+        for ablation in contestants.ablations {
+            entries.push((ablation.variant.name().to_owned(), by_trainer(ablation, &held_out)));
+        }
+        let heat = contest.entry(name.clone()).or_default();
+        heat.states.extend(held_out.into_iter().cloned());
+        for (name, predictions) in entries {
+            match heat.entries.iter_mut().find(|entry| entry.name == name) {
+                Some(entry) => entry.predictions.extend(predictions),
+                None => heat.entries.push(Entry { name, predictions }),
+            }
+        }
+    }
+    if contest.is_empty() { Err(EvaluateError::NothingHeldOut) } else { Ok(()) }
+}
+
+fn model_name() -> String {
+    crate::train::Variant::Paper.name().to_owned()
+}

@@ -1,0 +1,209 @@
+//! The figures of an evaluation as one HTML page that needs no other file.
+
+use std::fmt::Write;
+
+use super::paper::{LABEL, Paper, entry};
+use super::report::{ModelReport, Report, VehicleReport};
+use crate::train::page_style;
+use crate::train::plot::{PlotError, Series, escape, parity};
+
+const AXES: [&str; 3] = ["F<sub>x</sub>", "F<sub>y</sub>", "F<sub>z</sub>"];
+
+/// The page.
+pub(super) fn page(report: &Report) -> Result<String, PlotError> {
+    let title = escape(&format!("wade eval: {}", report.data.name));
+    let mut text = format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\
+         <meta name=\"viewport\" content=\"width=device-width\"><style>{}</style></head><body>\n<h1>{title}</h1>\n\
+         <p>Loads: {}. Held out: {}.</p>\n<p class=\"small\">Shaded: {LABEL}. The source paper's CFD is not public, so its \
+         figures are of other cases and another mesh; they say where it stands, not which network is better.</p>\n",
+        page_style(),
+        escape(&report.data.label()),
+        escape(&report.splits.join("; ")),
+    );
+    if report.by_sample {
+        text.push_str(
+            "<div class=\"notice\">Sections and mirror images of one case are on both sides of this split: the figures \
+             test interpolation within known runs only.</div>\n",
+        );
+    }
+    for vehicle in &report.vehicles {
+        text.push_str(&section(vehicle)?);
+    }
+    let _ = writeln!(text, "<p class=\"small\">{}</p></body></html>", escape(&report.program));
+    Ok(text)
+}
+
+fn section(vehicle: &VehicleReport) -> Result<String, PlotError> {
+    let paper = vehicle.paper;
+    Ok(format!(
+        "<h2>{}</h2>\n<p>{} held-out cases, {} states with their mirror images. Mean magnitude of the net force: {} N.</p>\n\
+         <h3>Net force</h3>\n{}{}\n<h3>Parity</h3>\n{}\n<h3>Force on a surface</h3>\n{}{}\n\
+         <h3>Ends of the ranges</h3>\n{}\n<h3>Stated uncertainty</h3>\n{}",
+        escape(&vehicle.name),
+        vehicle.cases,
+        vehicle.samples,
+        vehicle.mean_force_n.map(|x| format!("{x:.1}")).join(", "),
+        net_table(vehicle, paper),
+        moment_table(vehicle),
+        parity_figures(vehicle)?,
+        kind_table(vehicle, paper),
+        surface_table(vehicle),
+        slice_table(vehicle, paper),
+        calibration(vehicle),
+    ))
+}
+
+/// A table whose columns from `paper` on are the paper's.
+fn table(heads: &[String], paper: usize, rows: &[Vec<String>]) -> String {
+    let class = |column: usize| if column >= paper { " class=\"paper\"" } else { "" };
+    let line = |tag: &str, cells: &[String]| {
+        let cell = |(column, cell): (usize, &String)| format!("<{tag}{}>{cell}</{tag}>", class(column));
+        format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>())
+    };
+    let body: String = rows.iter().map(|row| line("td", row)).collect();
+    format!("<div class=\"wide\"><table>{}{body}</table></div>\n", line("th", heads))
+}
+
+fn number(value: f64) -> String {
+    if value.abs() < 100.0 { format!("{value:.2}") } else { format!("{value:.1}") }
+}
+
+fn stated(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), number)
+}
+
+fn heads(first: &str, groups: &[&str]) -> Vec<String> {
+    let of = |group: &&str| AXES.map(|axis| format!("{axis} {group}"));
+    std::iter::once(first.to_owned()).chain(groups.iter().flat_map(of)).collect()
+}
+
+fn net_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
+    let papers = "MAE [N]";
+    let mut heads = heads("model", &["MAE [N]", "RMSE [N]", "sMAPE [%]", "MAE on a surface [N]", papers]);
+    heads.extend(
+        ["RMSE [N]", "sMAPE [%]"].iter().flat_map(|group| AXES.map(|axis| format!("{axis} {group}"))),
+    );
+    let row = |model: &ModelReport| {
+        let is_paper = model.name == vehicle.models[0].name;
+        let papers: Vec<Option<f64>> = match paper {
+            Some(paper) if is_paper => {
+                [paper.mae, paper.rmse, paper.smape].concat().into_iter().map(Some).collect()
+            }
+            Some(paper) => [entry(paper.ablations, &model.name), [None; 3], [None; 3]].concat(),
+            None => vec![None; 9],
+        };
+        let force = &model.force;
+        let ours = [force.mae, force.rmse, force.smape].concat().into_iter().map(number);
+        let surfaces = model.surface_mae_n.map_or([None; 3], |mae| mae.map(Some)).map(stated);
+        std::iter::once(escape(&model.name))
+            .chain(ours)
+            .chain(surfaces)
+            .chain(papers.into_iter().map(stated))
+            .collect()
+    };
+    let rows: Vec<Vec<String>> = vehicle.models.iter().map(row).collect();
+    let note = paper.map_or_else(String::new, |paper| {
+        let of = |values: [Option<f64>; 3]| values.map(stated).join(", ");
+        let merged = of(entry(paper.ablation_surfaces, "merged_plates"));
+        format!(
+            "<p class=\"small\">{LABEL}: {} held-out samples; MAE on a surface {} N, with merged plates {merged} N \
+             (x, y, z). sMAPE: 2 |p − t| / max(|p| + |t|, 1 N), of which the paper states the floor alone.</p>\n",
+            paper.samples,
+            of(paper.surface_mae.map(Some)),
+        )
+    });
+    table(&heads, 13, &rows) + &note
+}
+
+fn moment_table(vehicle: &VehicleReport) -> String {
+    let Some(scale) = vehicle.mean_moment_nm else {
+        return "<p class=\"small\">The data set has no moments.</p>\n".to_owned();
+    };
+    let heads =
+        ["net moment, MAE [N m]", "M<sub>x</sub>", "M<sub>y</sub>", "M<sub>z</sub>"].map(str::to_owned);
+    let row = |(name, values): (&str, [f64; 3])| {
+        std::iter::once(escape(name)).chain(values.map(number)).collect::<Vec<_>>()
+    };
+    let models = vehicle.models.iter().filter_map(|model| Some((model.name.as_str(), model.moment_mae_nm?)));
+    let rows: Vec<_> = models.chain([("mean magnitude", scale)]).map(row).collect();
+    table(&heads, usize::MAX, &rows)
+        + "<p class=\"small\">About the center of mass. The paper has no moments.</p>\n"
+}
+
+fn parity_figures(vehicle: &VehicleReport) -> Result<String, PlotError> {
+    let mut text = String::new();
+    for (c, axis) in ["Fx", "Fy", "Fz"].into_iter().enumerate() {
+        let points = vehicle.parity.iter().map(|(truth, prediction)| (truth[c], prediction[c])).collect();
+        let series = Series { name: format!("{axis}, {}", vehicle.name), points };
+        text.push_str(&parity(
+            &format!("{axis} of the data set [N]"),
+            &format!("{axis} of the model [N]"),
+            &[series],
+        )?);
+    }
+    Ok(text)
+}
+
+fn kind_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
+    let mut heads = heads("kind", &["MAE [N]"]);
+    heads.push("share of the force".to_owned());
+    heads.extend(AXES.map(|axis| format!("{axis} MAE [N]")));
+    heads.push("share of the force".to_owned());
+    let row = |kind: &super::report::GroupReport| {
+        let papers = paper.map_or([None; 3], |paper| entry(paper.kinds, &kind.name));
+        let share = paper.filter(|_| kind.name == "wheel").map(|paper| paper.wheel_share);
+        std::iter::once(escape(&kind.name))
+            .chain(kind.mae_n.map(number))
+            .chain([percent(kind.share)])
+            .chain(papers.map(stated))
+            .chain([share.map_or_else(|| "–".to_owned(), percent)])
+            .collect()
+    };
+    table(&heads, 5, &vehicle.kinds.iter().map(row).collect::<Vec<_>>())
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+fn surface_table(vehicle: &VehicleReport) -> String {
+    let mut heads = heads("surface", &["MAE [N]"]);
+    heads.push("share of the force".to_owned());
+    let row = |surface: &super::report::GroupReport| {
+        let cells = std::iter::once(escape(&surface.name)).chain(surface.mae_n.map(number));
+        cells.chain([percent(surface.share)]).collect()
+    };
+    table(&heads, usize::MAX, &vehicle.surfaces.iter().map(row).collect::<Vec<_>>())
+}
+
+fn slice_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
+    let mut heads = vec!["slice".to_owned(), "5th or 95th percentile".to_owned(), "states".to_owned()];
+    heads.extend(["ours", "paper"].iter().flat_map(|_| AXES.map(|axis| format!("{axis} MAE [N]"))));
+    let row = |slice: &super::report::SliceReport| {
+        let papers = paper.map_or([None; 3], |paper| entry(paper.slices, &slice.name));
+        [escape(&slice.name), format!("{:.3}", slice.bound), slice.samples.to_string()]
+            .into_iter()
+            .chain(slice.mae_n.map(number))
+            .chain(papers.map(stated))
+            .collect()
+    };
+    let rows: Vec<_> = vehicle.slices.iter().map(row).collect();
+    table(&heads, 6, &rows)
+        + "<p class=\"small\">Depth [m], speed [m/s], obliqueness |v<sub>y</sub>| / |v|; net force.</p>\n"
+}
+
+fn calibration(vehicle: &VehicleReport) -> String {
+    let Some(calibration) = &vehicle.calibration else {
+        return "<p class=\"small\">No uncertainty is stated.</p>\n".to_owned();
+    };
+    let heads = heads("net force", &[""]);
+    let row =
+        |name: &str, values: [String; 3]| std::iter::once(name.to_owned()).chain(values).collect::<Vec<_>>();
+    let rows = [
+        row("errors within one stated deviation (68.3 % where normal)", calibration.within_one.map(percent)),
+        row("within two (95.4 %)", calibration.within_two.map(percent)),
+        row("RMS of error over stated deviation (1)", calibration.error_over_stated.map(number)),
+    ];
+    table(&heads, usize::MAX, &rows)
+}

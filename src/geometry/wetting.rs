@@ -1,0 +1,322 @@
+//! What the water reaches on each surface, exactly and in the time of a query: pressure load, wet area and where it is.
+//!
+//! The load of a wholly wet face is linear in the water plane, so the faces that lie below the waterline for sure enter
+//! as one prefix sum; only faces that the surface may cross are clipped. On level water even that is known beforehand:
+//! between two heights at which the hull has a vertex every quantity is a polynomial of the water level of degree four
+//! at most, so each such interval stores one.
+
+use nalgebra::{Matrix3, SMatrix};
+
+use super::hydrostatics::unit_load;
+use super::immersion::wet_triangles;
+use super::surfaces::Hull;
+use crate::frame::{Vec3, WaterPlane};
+use crate::wrench::Wrench;
+
+/// Room for rounding of a height [m].
+const ROOM: f64 = 1e-9;
+/// Intervals of level water that are stored for all surfaces together; a finer hull is clipped at every query.
+const MOST_INTERVALS: usize = 20_000;
+/// Heights closer than this are one [m]: a polynomial over less would be rounding.
+const LEAST_INTERVAL: f64 = 1e-6;
+/// Coefficients of a polynomial: degree four.
+const TERMS: usize = 5;
+/// Quantities of a surface: force, moment, wet area, first moment of the wet area.
+const QUANTITIES: usize = 10;
+
+/// What the water reaches on one surface; body frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wetting {
+    /// Pressure load about the body origin in a fluid with `rho g = 1` [m3, m4].
+    pub pressure: Wrench,
+    /// Wet area [m2].
+    pub area: f64,
+    /// Integral of the position over the wet area [m3].
+    pub area_moment: Vec3,
+}
+
+impl Wetting {
+    /// Centroid of the wet area [m]; `None` where nothing is wet.
+    pub fn centroid(&self) -> Option<Vec3> {
+        (self.area > 0.0).then(|| self.area_moment / self.area)
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.pressure += other.pressure;
+        self.area += other.area;
+        self.area_moment += other.area_moment;
+    }
+
+    fn values(&self) -> [f64; QUANTITIES] {
+        let (f, m, a) = (self.pressure.force, self.pressure.moment, self.area_moment);
+        [f.x, f.y, f.z, m.x, m.y, m.z, self.area, a.x, a.y, a.z]
+    }
+
+    fn from_values(v: &[f64; QUANTITIES]) -> Self {
+        let pressure = Wrench { force: Vec3::new(v[0], v[1], v[2]), moment: Vec3::new(v[3], v[4], v[5]) };
+        Self { pressure, area: v[6], area_moment: Vec3::new(v[7], v[8], v[9]) }
+    }
+}
+
+/// A hull prepared for [`WettingTable::wetting_into`]; body frame.
+#[derive(Debug, Clone)]
+pub struct WettingTable {
+    surfaces: Vec<SurfaceTable>,
+}
+
+/// Faces by rising top, so that the wet ones come first.
+#[derive(Debug, Clone)]
+struct SurfaceTable {
+    faces: Vec<usize>,
+    tops: Vec<f64>,
+    bottoms: Vec<f64>,
+    x_range: [f64; 2],
+    y_range: [f64; 2],
+    /// Over the first k faces.
+    prefix: Vec<Terms>,
+    level: Option<LevelTable>,
+}
+
+/// Polynomials over the intervals between the heights of a surface's vertices.
+#[derive(Debug, Clone, Default)]
+struct LevelTable {
+    heights: Vec<f64>,
+    /// One an interval, in powers of the share of the interval that is under water.
+    intervals: Vec<[[f64; QUANTITIES]; TERMS]>,
+}
+
+/// What a wet face contributes besides the plane `n . x = c`:
+/// force `-(c S - T n)`, moment about the origin `-(c P - U n)`.
+#[derive(Debug, Clone, Copy, Default)]
+struct Terms {
+    /// `S = sum A` of area vectors.
+    area_vector: Vec3,
+    /// `T = sum A x^T` with the centroid x.
+    first: Matrix3<f64>,
+    /// `P = sum x cross A`.
+    moment: Vec3,
+    /// `U = -sum [A]x Q` with the mean Q of `x x^T` over the face.
+    second: Matrix3<f64>,
+    /// `sum |A|`.
+    area: f64,
+    /// `sum |A| x`.
+    area_moment: Vec3,
+}
+
+impl WettingTable {
+    /// Prepares the hull of a vehicle with `count` surfaces.
+    pub fn new(hull: &Hull, count: usize) -> Self {
+        let mut surfaces: Vec<SurfaceTable> = (0..count).map(|s| SurfaceTable::new(hull, s)).collect();
+        let heights: Vec<Vec<f64>> = surfaces.iter().map(|s| s.heights(hull)).collect();
+        if heights.iter().map(Vec::len).sum::<usize>() <= MOST_INTERVALS {
+            for (surface, heights) in surfaces.iter_mut().zip(heights) {
+                surface.level = Some(LevelTable::new(surface, hull, heights));
+            }
+        }
+        Self { surfaces }
+    }
+
+    /// What the water reaches on each surface. `hull` is the one the table was made from; `out` has one entry a
+    /// surface. No allocation.
+    pub fn wetting_into(&self, hull: &Hull, plane: &WaterPlane, out: &mut [Wetting]) {
+        for (table, out) in self.surfaces.iter().zip(out) {
+            *out = match &table.level {
+                Some(level) if plane.is_level() => {
+                    level.at(plane.offset).unwrap_or_else(|| table.submerged().wetting(plane))
+                }
+                _ => table.clip(hull, plane),
+            };
+        }
+    }
+}
+
+impl SurfaceTable {
+    fn new(hull: &Hull, surface: usize) -> Self {
+        let mesh = &hull.mesh;
+        let corner_z = |f: usize| mesh.triangle(f).map(|p| p.z);
+        let top = |f: usize| corner_z(f).into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let mut faces: Vec<usize> = hull.faces_of(surface).collect();
+        faces.sort_by(|a, b| top(*a).total_cmp(&top(*b)));
+        let mut prefix = vec![Terms::default()];
+        let mut sum = Terms::default();
+        for &face in &faces {
+            sum.add(mesh.triangle(face));
+            prefix.push(sum);
+        }
+        let range = |axis: usize| {
+            let values = || faces.iter().flat_map(|f| mesh.triangle(*f)).map(|p| p[axis]);
+            [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
+        };
+        Self {
+            tops: faces.iter().map(|f| top(*f)).collect(),
+            bottoms: faces.iter().map(|f| corner_z(*f).into_iter().fold(f64::INFINITY, f64::min)).collect(),
+            x_range: range(0),
+            y_range: range(1),
+            prefix,
+            faces,
+            level: None,
+        }
+    }
+
+    /// Sums over all faces.
+    fn submerged(&self) -> Terms {
+        self.prefix[self.faces.len()]
+    }
+
+    /// Heights of the vertices, rising, those that are one left out.
+    fn heights(&self, hull: &Hull) -> Vec<f64> {
+        let mut heights: Vec<f64> =
+            self.faces.iter().flat_map(|f| hull.mesh.triangle(*f)).map(|corner| corner.z).collect();
+        heights.sort_by(f64::total_cmp);
+        heights.dedup_by(|next, kept| *next - *kept < LEAST_INTERVAL);
+        heights
+    }
+
+    fn clip(&self, hull: &Hull, plane: &WaterPlane) -> Wetting {
+        let (low, high) = self.waterline_heights(plane);
+        let wet = self.tops.partition_point(|top| *top <= low);
+        let mut sum = self.prefix[wet].wetting(plane);
+        for (face, bottom) in self.faces[wet..].iter().zip(&self.bottoms[wet..]) {
+            if *bottom < high {
+                for triangle in wet_triangles(&hull.mesh, *face, plane).iter() {
+                    let area = triangle.area_vector().norm();
+                    let centroid = triangle.vertices.iter().sum::<Vec3>() / 3.0;
+                    let pressure = unit_load(triangle, &Vec3::zeros());
+                    sum.add(&Wetting { pressure, area, area_moment: centroid * area });
+                }
+            }
+        }
+        sum
+    }
+
+    /// Heights between which the plane crosses this surface's footprint; all heights for a vehicle near its side.
+    fn waterline_heights(&self, plane: &WaterPlane) -> (f64, f64) {
+        let up = plane.normal;
+        if up.z < 0.1 {
+            return (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        let across = |n: f64, range: [f64; 2]| range.map(|v| n * v);
+        let ([x0, x1], [y0, y1]) = (across(up.x, self.x_range), across(up.y, self.y_range));
+        let low = (plane.offset - x0.max(x1) - y0.max(y1)) / up.z;
+        let high = (plane.offset - x0.min(x1) - y0.min(y1)) / up.z;
+        (low - ROOM, high + ROOM)
+    }
+}
+
+impl LevelTable {
+    fn new(surface: &SurfaceTable, hull: &Hull, heights: Vec<f64>) -> Self {
+        // inside the interval: at its ends a horizontal face is about to get wet
+        let nodes: [f64; TERMS] = std::array::from_fn(|i| (i as f64 + 0.5) / TERMS as f64);
+        let powers = SMatrix::<f64, TERMS, TERMS>::from_fn(|row, column| nodes[row].powi(column as i32));
+        // five different nodes: never singular
+        let coefficients = powers.try_inverse().unwrap_or_else(SMatrix::identity);
+        let interval = |pair: &[f64]| {
+            let values = nodes.map(|share| {
+                let level = pair[0] + share * (pair[1] - pair[0]);
+                surface.clip(hull, &WaterPlane::level(level, 0.0)).values()
+            });
+            std::array::from_fn(|term| {
+                std::array::from_fn(|quantity| {
+                    (0..TERMS).map(|node| coefficients[(term, node)] * values[node][quantity]).sum()
+                })
+            })
+        };
+        Self { intervals: heights.windows(2).map(interval).collect(), heights }
+    }
+
+    /// `None` where the surface is wholly under water.
+    fn at(&self, level: f64) -> Option<Wetting> {
+        let above = self.heights.partition_point(|height| *height < level);
+        if above == 0 {
+            return Some(Wetting::default());
+        }
+        let polynomial = self.intervals.get(above - 1)?;
+        let share = (level - self.heights[above - 1]) / (self.heights[above] - self.heights[above - 1]);
+        let mut values = polynomial[TERMS - 1];
+        for term in polynomial[..TERMS - 1].iter().rev() {
+            for (value, term) in values.iter_mut().zip(term) {
+                *value = *value * share + term;
+            }
+        }
+        Some(Wetting::from_values(&values))
+    }
+}
+
+impl Terms {
+    fn add(&mut self, [a, b, c]: [Vec3; 3]) {
+        let vector = (b - a).cross(&(c - a)) * 0.5;
+        let centroid = (a + b + c) / 3.0;
+        let midpoints = [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+        let spread = midpoints.iter().map(|m| m * m.transpose()).sum::<Matrix3<f64>>() / 3.0;
+        self.area_vector += vector;
+        self.first += vector * centroid.transpose();
+        self.moment += centroid.cross(&vector);
+        self.second -= vector.cross_matrix() * spread;
+        self.area += vector.norm();
+        self.area_moment += centroid * vector.norm();
+    }
+
+    fn wetting(&self, plane: &WaterPlane) -> Wetting {
+        let (n, c) = (plane.normal.into_inner(), plane.offset);
+        let force = self.first * n - self.area_vector * c;
+        let moment = self.second * n - self.moment * c;
+        Wetting { pressure: Wrench { force, moment }, area: self.area, area_moment: self.area_moment }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::frame::up_from_roll_pitch;
+    use crate::geometry::hydrostatics::surface_hydrostatics;
+    use crate::vehicle::shipped;
+
+    /// Largest difference to the pressure integral face by face, over the weight of the water displaced.
+    fn worst(planes: impl Iterator<Item = WaterPlane>) -> f64 {
+        let mut worst = 0.0_f64;
+        let planes: Vec<WaterPlane> = planes.collect();
+        for shipped in [shipped::husky().unwrap(), shipped::warthog().unwrap()] {
+            let vehicle = shipped.vehicle().unwrap();
+            let count = vehicle.surfaces.len();
+            let table = WettingTable::new(&vehicle.hull, count);
+            let mut wetting = vec![Wetting::default(); count];
+            for plane in &planes {
+                table.wetting_into(&vehicle.hull, plane, &mut wetting);
+                let rho_g = 1.0 / crate::frame::GRAVITY;
+                let truth = surface_hydrostatics(&vehicle.hull, count, plane, rho_g, &Vec3::zeros());
+                for (surface, (got, want)) in wetting.iter().zip(&truth).enumerate() {
+                    worst = worst.max((got.pressure.force - want.force).norm());
+                    worst = worst.max((got.pressure.moment - want.moment).norm());
+                    let faces = vehicle.hull.faces_of(surface);
+                    let wet = faces.flat_map(|f| wet_triangles(&vehicle.hull.mesh, f, plane).to_vec());
+                    let (mut area, mut moment) = (0.0, Vec3::zeros());
+                    for triangle in wet {
+                        let part = triangle.area_vector().norm();
+                        area += part;
+                        moment += triangle.vertices.iter().sum::<Vec3>() / 3.0 * part;
+                    }
+                    worst = worst.max((got.area - area).abs()).max((got.area_moment - moment).norm());
+                }
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn level_water_is_exact_at_every_depth_also_over_the_deck() {
+        let worst = worst((0..600).map(|i| WaterPlane::level(-0.5, f64::from(i) * 0.001_7)));
+        assert!(worst < 1e-9, "{worst:e}");
+    }
+
+    #[test]
+    fn tilted_water_is_exact() {
+        let angles = [(0.1, -0.2), (-0.4, 0.3), (1.2, 0.9), (2.5, 0.0)];
+        let planes = angles.into_iter().flat_map(|(roll, pitch)| {
+            [-0.1, 0.0, 0.1, 0.3].map(|d| WaterPlane::new(-0.2, d, up_from_roll_pitch(roll, pitch)))
+        });
+        let worst = worst(planes);
+        assert!(worst < 1e-9, "{worst:e}");
+    }
+}

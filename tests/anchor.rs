@@ -1,0 +1,137 @@
+//! Promise: what the anchored model knows by itself is right: Archimedes at rest, nothing on a dry surface and nothing
+//! that jumps when it gets wet, and mirror images of a state that give mirror images of any network's answer.
+
+use nalgebra::UnitVector3;
+use wade::anchor::{Anchor, DYNAMIC, GLOBAL, OUTPUTS, Reading, STATIC, SurfaceReading};
+use wade::condition::{Condition, GroundContact};
+use wade::frame::{Vec3, up_from_roll_pitch};
+use wade::vehicle::Vehicle;
+
+mod common;
+
+fn vehicle(name: &str) -> Vehicle {
+    common::model(name).vehicle().clone()
+}
+
+fn read(vehicle: &Vehicle, condition: &Condition) -> Reading {
+    let mut reading = Reading::default();
+    Anchor::new(vehicle).read(vehicle, condition, &mut reading);
+    reading
+}
+
+fn states() -> Vec<Condition> {
+    let attitudes = [(0.0, 0.0), (0.12, 0.0), (-0.08, 0.15)];
+    let velocities = [(0.8, 0.0), (0.5, 0.4), (-0.7, -0.2), (0.0, 0.9)];
+    let depths = [0.07, 0.14, 0.19];
+    let mut states = Vec::new();
+    for (roll, pitch) in attitudes {
+        for (x, y) in velocities {
+            for depth in depths {
+                let up = up_from_roll_pitch(roll, pitch);
+                states.push(Condition { up, ..Condition::level(Vec3::new(x, y, 0.0), depth) });
+            }
+        }
+    }
+    states
+}
+
+/// Any smooth function of all that a network is told.
+fn answer(global: &[f64; GLOBAL], fixed: &[f32; STATIC], dynamic: &[f32; DYNAMIC]) -> [f32; OUTPUTS] {
+    let told = global.iter().map(|x| *x as f32).chain(fixed.iter().copied()).chain(dynamic.iter().copied());
+    let told: Vec<f32> = told.collect();
+    std::array::from_fn(|output| {
+        let sum: f32 =
+            told.iter().enumerate().map(|(i, x)| x * ((i * 7 + output * 13) as f32 * 0.37).sin()).sum();
+        sum.sin()
+    })
+}
+
+fn loads(vehicle: &Vehicle, condition: &Condition) -> Vec<(Vec3, Vec3)> {
+    let fixed = Anchor::new(vehicle).static_rows(vehicle);
+    let reading = read(vehicle, condition);
+    let load = |(surface, fixed): (&SurfaceReading, &[f32; STATIC])| {
+        let output = answer(&reading.global, fixed, &surface.dynamic);
+        (surface.force(&output), surface.center_of_pressure(&output))
+    };
+    reading.surfaces.iter().zip(&fixed).map(load).collect()
+}
+
+#[test]
+fn a_mirror_image_of_the_state_gets_the_mirror_image_of_any_answer() {
+    let reflect = |v: Vec3| Vec3::new(v.x, -v.y, v.z);
+    for name in common::VEHICLES {
+        let vehicle = vehicle(name);
+        for state in states() {
+            let velocity = reflect(state.velocity);
+            let up = UnitVector3::new_unchecked(reflect(state.up.into_inner()));
+            let mirrored = Condition { velocity, ground_velocity: velocity, up, ..state };
+            let (here, there) = (loads(&vehicle, &state), loads(&vehicle, &mirrored));
+            let scale: f64 = here.iter().map(|(force, _)| force.norm()).sum();
+            for (index, surface) in vehicle.surfaces.iter().enumerate() {
+                let partner = there[surface.mirror_left_right];
+                assert!(
+                    (here[index].0 - reflect(partner.0)).norm() < 1e-4 * scale,
+                    "{name} {}",
+                    surface.name
+                );
+                assert!((here[index].1 - reflect(partner.1)).norm() < 1e-4, "{name} {}", surface.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn at_rest_the_surfaces_feel_archimedes_and_nothing_else() {
+    for name in common::VEHICLES {
+        let vehicle = vehicle(name);
+        for contact in [GroundContact::Wetted, GroundContact::Dry] {
+            let level = Condition::level(Vec3::zeros(), 0.15);
+            let state = Condition { ground_contact: contact, ..level };
+            let reading = read(&vehicle, &state);
+            let net: Vec3 = reading.surfaces.iter().map(|s| s.hydrostatic.force).sum();
+            let truth: Vec3 = wade::analytic::loads(&vehicle, &state).iter().sum();
+            assert!((net - truth).norm() < 1e-6 * truth.norm(), "{name}: {net} {truth}");
+            assert!(reading.surfaces.iter().all(|s| s.unit == 0.0 && s.drag == Vec3::zeros()));
+        }
+    }
+}
+
+#[test]
+fn a_dry_surface_has_nothing_and_gets_wet_without_a_jump() {
+    for name in common::VEHICLES {
+        let vehicle = vehicle(name);
+        let mut before: Option<Vec<f64>> = None;
+        for step in 0..4000 {
+            let depth = 1e-4 * f64::from(step);
+            let reading = read(&vehicle, &Condition::level(Vec3::new(0.9, 0.3, 0.0), depth));
+            for surface in reading.surfaces.iter().filter(|s| s.wet_fraction == 0.0) {
+                assert_eq!((surface.unit, surface.drag, surface.hydrostatic.force), Default::default());
+            }
+            let sizes: Vec<f64> =
+                reading.surfaces.iter().map(|s| s.drag.norm() + s.hydrostatic.force.norm()).collect();
+            if let Some(before) = &before {
+                for (now, before) in sizes.iter().zip(before) {
+                    assert!(
+                        (now - before).abs() < 5.0,
+                        "{name} at {depth}: from {before} to {now} N in 0.1 mm"
+                    );
+                }
+            }
+            before = Some(sizes);
+        }
+    }
+}
+
+#[test]
+fn forces_act_inside_the_box_around_the_wet_part() {
+    for name in common::VEHICLES {
+        let vehicle = vehicle(name);
+        for state in states() {
+            for (surface, (_, point)) in read(&vehicle, &state).surfaces.iter().zip(loads(&vehicle, &state)) {
+                let [low, high] = surface.wet_box;
+                let inside = (0..3).all(|i| point[i] >= low[i] - 1e-9 && point[i] <= high[i] + 1e-9);
+                assert!(surface.wet_fraction == 0.0 || inside, "{name}: {point} in {low} {high}");
+            }
+        }
+    }
+}

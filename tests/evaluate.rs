@@ -1,0 +1,337 @@
+//! Evaluation: simple models find the coefficients that were planted, the figures are those of planted errors, and what
+//! was learnt from is no judge.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+use wade::bundle::{self, Bundle};
+use wade::condition::Condition;
+use wade::dataset::split::{By, split};
+use wade::dataset::{self, Dataset};
+use wade::evaluate::baseline::Baseline;
+use wade::evaluate::contest::{Contest, Entry, Heat};
+use wade::evaluate::predict::Prediction;
+use wade::evaluate::report::Report;
+use wade::evaluate::states::{State, states};
+use wade::evaluate::{EvaluateError, held_out};
+use wade::frame::{GRAVITY, Vec3};
+use wade::geometry::hydrostatics::hydrostatics;
+use wade::train::report::{DataFile, Record};
+use wade::train::{self, Analytic, Config, Sides, Source, Variant};
+use wade::vehicle::Vehicle;
+
+fn bundles() -> BTreeMap<String, Bundle> {
+    let read = |name: &str| (name.to_owned(), bundle::read(&common::vehicles().join(name)).unwrap());
+    common::VEHICLES.map(read).into()
+}
+
+fn vehicles() -> BTreeMap<String, Vehicle> {
+    bundles().into_iter().map(|(name, bundle)| (name, bundle.vehicle)).collect()
+}
+
+fn analytic(cases: usize) -> Dataset {
+    train::analytic::dataset(&vehicles(), &Analytic { cases, ..Analytic::default() }, 1).unwrap()
+}
+
+/// All states of a vehicle, with loads that `change` makes of the net ones: the first surface takes the difference.
+fn planted(vehicle: &str, moments: bool, wrench: impl Fn(&Condition) -> (Vec3, Vec3)) -> Vec<State> {
+    let mut data = analytic(12);
+    data.samples.retain(|sample| sample.vehicle == vehicle);
+    data.meta.vehicles.retain(|name, _| name == vehicle);
+    for sample in &mut data.samples {
+        let (force, moment) = wrench(&sample.condition);
+        for (index, load) in sample.surfaces.iter_mut().enumerate() {
+            (load.force, load.rest) = (if index == 0 { force } else { Vec3::zeros() }, None);
+            load.moment = moments.then_some(if index == 0 { moment } else { Vec3::zeros() });
+        }
+    }
+    let source = Source::new(data, &vehicles(), false).unwrap();
+    states(&source, &(0..source.data.samples.len()).collect::<Vec<_>>()).unwrap()
+}
+
+fn fit(vehicle: &str, states: &[State]) -> [Baseline; 3] {
+    let bundle = bundles().remove(vehicle).unwrap();
+    Baseline::fit(&bundle.vehicle, &bundle.distance, &states.iter().collect::<Vec<_>>()).unwrap()
+}
+
+#[test]
+fn a_planted_drag_constant_is_found_and_leaves_no_error() {
+    let vehicle = vehicles().remove("warthog").unwrap();
+    let planted = planted("warthog", false, |c| {
+        let buoyancy =
+            hydrostatics(&vehicle.hull.mesh, &c.water_plane(vehicle.z0), c.density, &Vec3::zeros());
+        let v = Vec3::new(c.velocity.x, c.velocity.y, 0.0);
+        let drag = v * (-0.5 * 0.77 * c.density * vehicle.dimensions.width * c.depth * v.norm());
+        (buoyancy.wrench.force + drag, Vec3::zeros())
+    });
+    let [archimedes, ..] = fit("warthog", &planted);
+    let Baseline::Archimedes { drag } = archimedes else { panic!("{archimedes:?}") };
+    assert!((drag - 0.77).abs() < 1e-9, "{drag}");
+    for state in &planted {
+        let error = archimedes.wrench(&vehicle, &state.condition).force - state.force();
+        assert!(error.norm() < 1e-8 * state.force().norm(), "{error}");
+    }
+}
+
+#[test]
+fn pontoons_lift_the_caps_of_spheres_and_together_the_hull() {
+    let vehicle = vehicles().remove("husky").unwrap();
+    let half = Baseline::Pontoons { centers: vec![Vec3::zeros()], radius: 0.1, lift: 1.0, drag: 0.5 };
+    // the surface at the center: half the sphere lifts, half its cross section drags
+    let state = Condition::level(Vec3::new(2.0, 0.0, 0.0), -vehicle.z0);
+    let wrench = half.wrench(&vehicle, &state);
+    let pi = std::f64::consts::PI;
+    assert!((wrench.force.z - 1000.0 * GRAVITY * 2.0 / 3.0 * pi * 1e-3).abs() < 1e-9);
+    assert!((wrench.force.x + 0.5 * 0.5 * 1000.0 * pi * 0.01 * 0.5 * 4.0).abs() < 1e-9);
+
+    let planted = planted("husky", false, |_| (Vec3::new(-1.0, 0.0, 1.0), Vec3::zeros()));
+    let [_, pontoons, _] = fit("husky", &planted);
+    let Baseline::Pontoons { centers, radius, .. } = pontoons else { panic!("{pontoons:?}") };
+    let deep = Condition::level(Vec3::zeros(), 5.0);
+    let plane = deep.water_plane(vehicle.z0);
+    let hull = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &Vec3::zeros()).wrench.force.z;
+    let all = Baseline::Pontoons { centers: centers.clone(), radius, lift: 1.0, drag: 0.0 };
+    assert!((all.wrench(&vehicle, &deep).force.z - hull).abs() < 1e-6 * hull);
+    assert!(centers.len() > 10, "{}", centers.len());
+    let half = vehicle.dimensions;
+    assert!(centers.iter().all(|c| c.x.abs() < 0.5 * half.length && c.y.abs() < 0.5 * half.width));
+}
+
+#[test]
+fn planted_coefficients_of_fossen_s_form_are_found_with_their_moments() {
+    let vehicle = vehicles().remove("husky").unwrap();
+    let about = vehicle.center_of_mass;
+    // by density; rows as the model's terms
+    let terms = |c: &Condition| {
+        let (u, v) = (c.velocity.x, c.velocity.y);
+        [1.0, c.depth, u, v, u * u.abs(), v * v.abs()]
+    };
+    let force = [
+        [0.0, 0.0, -0.1],
+        [0.0, 0.0, 1.9],
+        [-0.01, 0.0, 0.0],
+        [0.0, -0.02, 0.0],
+        [-0.05, 0.0, 0.003],
+        [0.0, -0.07, 0.0],
+    ];
+    let moment = [
+        [0.0, 0.01, 0.0],
+        [0.0, 0.1, 0.0],
+        [0.0, 0.02, 0.0],
+        [0.004, 0.0, 0.0],
+        [0.0, 0.005, 0.0],
+        [0.006, 0.0, 0.001],
+    ];
+    let of = |c: &Condition, rows: &[[f64; 3]; 6]| -> Vec3 {
+        terms(c).iter().zip(rows).map(|(term, row)| Vec3::from(*row) * (*term * c.density)).sum()
+    };
+    // loads on a data set are about the body origin; no mirror images, which would make odd terms of what is planted
+    let planted = planted("husky", true, |c| {
+        let (force, moment) = (of(c, &force), of(c, &moment));
+        (force, moment + about.cross(&force))
+    });
+    let original: Vec<State> = planted.into_iter().take(12).collect();
+    let [.., fossen] = fit("husky", &original);
+    for state in &original {
+        let wrench = fossen.wrench(&vehicle, &state.condition);
+        assert!((wrench.force - of(&state.condition, &force)).norm() < 1e-6, "{wrench:?}");
+        assert!((wrench.moment - of(&state.condition, &moment)).norm() < 1e-6, "{wrench:?}");
+        assert!((state.moment(&about).unwrap() - of(&state.condition, &moment)).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn the_figures_are_those_of_planted_errors() {
+    let data = analytic(20);
+    let source = Source::new(data, &vehicles(), false).unwrap();
+    let numbers: Vec<usize> =
+        (0..source.data.samples.len()).filter(|&n| source.data.samples[n].vehicle == "husky").collect();
+    let states = states(&source, &numbers).unwrap();
+    let surface = Vec3::new(0.5, -1.0, 2.0);
+    let shallow = states.iter().map(|state| state.condition.depth).fold(f64::INFINITY, f64::min);
+    let predict = |state: &State| {
+        // at the least depth three times the error
+        let factor = if state.condition.depth == shallow { 3.0 } else { 1.0 };
+        Prediction {
+            force: state.force() + surface * factor * 13.0,
+            moment: None,
+            surface_errors: vec![surface * factor; 13],
+            uncertainty: Some(Vec3::new(13.5, 13.5, 13.5)),
+        }
+    };
+    let entry = Entry { name: "paper".into(), predictions: states.iter().map(predict).collect() };
+    let contest: Contest = [("husky".to_owned(), Heat { states, entries: vec![entry] })].into();
+    let file = DataFile { name: "analytic".into(), sha256: None, provenance: "analytic".into() };
+    let report = Report::new(&contest, &source.vehicles, (file, vec!["all".into()], false), "test").unwrap();
+    let husky = &report.vehicles[0];
+    assert_eq!((husky.cases, husky.samples), (20, 80));
+    // 4 of 80 states are the images of the shallowest case
+    let mean = (76.0 + 4.0 * 3.0) / 80.0;
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * b.abs().max(1.0), "{a} {b}");
+    near(husky.models[0].force.mae[0], 6.5 * mean);
+    near(husky.models[0].force.rmse[2], 26.0 * ((76.0 + 4.0 * 9.0) / 80.0_f64).sqrt());
+    near(husky.models[0].surface_mae_n.unwrap()[1], mean);
+    near(husky.kinds.iter().map(|kind| kind.share).sum(), 1.0);
+    near(husky.surfaces.iter().map(|surface| surface.share).sum(), 1.0);
+    assert_eq!(
+        husky.kinds.iter().map(|k| k.name.as_str()).collect::<Vec<_>>(),
+        ["front", "rear", "side", "bottom", "wheel"]
+    );
+    let slice = husky.slices.iter().find(|slice| slice.name == "depth low").unwrap();
+    assert_eq!(slice.samples, 4);
+    near(slice.mae_n[2], 78.0);
+    let calibration = husky.calibration.unwrap();
+    near(calibration.within_one[1], 0.95);
+    near(calibration.within_two[2], 0.95);
+    assert_eq!(husky.paper.unwrap().mae, [1.25, 3.42, 4.38]);
+    let page = report.page().unwrap();
+    assert!(page.contains("paper, other data") && page.contains("<svg") && page.contains("12.96"));
+}
+
+/// A record of one short training.
+fn trained(by: By) -> (Record, Source, DataFile) {
+    let config = Config { epochs: 1, ..Config::analytic() };
+    let source = Source::new(analytic(10), &vehicles(), false).unwrap();
+    let split = split(&source.data, by, config.seed).unwrap().remove(0);
+    let sides = Sides { split: &split, by };
+    let trained = train::train(&source, sides, Variant::Paper, &config, None, &|_| ()).unwrap();
+    let file = DataFile { name: "data".into(), sha256: Some("abc".into()), provenance: "test".into() };
+    (Record::new(&trained, &source, sides, 1, file.clone(), (&config, "test")), source, file)
+}
+
+#[test]
+fn what_was_learnt_from_is_no_judge() {
+    for by in [By::Case { share: 0.2 }, By::Sample { share: 0.2 }] {
+        let (record, source, file) = trained(by);
+        let sides = split(&source.data, by, 1).unwrap().remove(0);
+        assert_eq!(held_out::of(&record, &file, &source).unwrap().held_out, sides.held_out);
+    }
+    let (record, source, file) = trained(By::Case { share: 0.2 });
+    let other = DataFile { sha256: Some("abd".into()), ..file.clone() };
+    assert!(matches!(held_out::of(&record, &other, &source), Err(EvaluateError::OtherData { .. })));
+    let mut leak = record.clone();
+    let case = leak.split.training_cases.first().unwrap().clone();
+    leak.split.held_out_cases.insert(case.clone());
+    let error = held_out::of(&leak, &file, &source).unwrap_err().to_string();
+    assert!(error.contains(&case) && error.contains("was learnt from"), "{error}");
+    let mut stranger = record.clone();
+    stranger.split.training_cases.remove(&case);
+    assert!(matches!(held_out::of(&stranger, &file, &source), Err(EvaluateError::UnknownCase { .. })));
+    let (weights, _) = bundles().remove("husky").unwrap().trained.unwrap();
+    let error = held_out::check_weights(&record, "husky", &weights).unwrap_err();
+    assert!(matches!(error, EvaluateError::OtherWeights { .. }));
+}
+
+// the program
+
+fn wade(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wade")).args(arguments).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn the_program_judges_bundles_by_what_their_training_held_out() {
+    let (vehicles, folder) = (common::copy_of_vehicles(), TempDir::new().unwrap());
+    let at = |name: &str| folder.path().join(name);
+    dataset::write(&at("data.parquet"), &analytic(10)).unwrap();
+    dataset::write(&at("other.parquet"), &analytic(9)).unwrap();
+    let (data, other, training) = (at("data.parquet"), at("other.parquet"), at("training"));
+    let eval = |data: &Path, more: &[&str]| {
+        let fixed =
+            ["eval", "--vehicles", text(vehicles.path()), "--data", text(data), "--trained", text(&training)];
+        wade(&[&fixed, more].concat())
+    };
+    let none = eval(&data, &[]);
+    assert!(!none.status.success() && stderr(&none).contains("report.json"), "{}", stderr(&none));
+    let settings = at("short.toml");
+    std::fs::write(&settings, "epochs = 3").unwrap();
+    let train = [
+        "train",
+        "--vehicles",
+        text(vehicles.path()),
+        "--data",
+        text(&data),
+        "--out",
+        text(&training),
+        "--config",
+        text(&settings),
+    ];
+    let output = wade(&train);
+    assert!(output.status.success(), "{}", stderr(&output));
+
+    let page = at("eval.html");
+    let output = eval(&data, &["--ablations", "--json", "--html", text(&page)]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let record = Record::read(&training).unwrap();
+    for (index, vehicle) in record.vehicles.iter().enumerate() {
+        let served = &report["vehicles"][index];
+        let models: Vec<_> =
+            served["models"].as_array().unwrap().iter().map(|m| m["name"].as_str().unwrap()).collect();
+        assert_eq!(models.len(), 7, "{models:?}");
+        assert_eq!(
+            (models[0], &models[4..]),
+            ("paper", &["no_dimensions", "merged_plates", "global_only"][..])
+        );
+        // as it is served, and as its trainer judged it
+        for c in 0..3 {
+            let mae = served["models"][0]["force"]["mae"][c].as_f64().unwrap();
+            assert!((mae - vehicle.score.mae[c]).abs() < 1e-4 * mae.max(1.0), "{mae} {:?}", vehicle.score);
+        }
+    }
+    assert!(std::fs::read_to_string(&page).unwrap().contains("global_only"));
+
+    let refused = eval(&other, &[]);
+    assert!(
+        stderr(&refused).contains("is not the data set that the weights learnt from"),
+        "{}",
+        stderr(&refused)
+    );
+    let shipped = common::copy_of_vehicles();
+    let refused = wade(&[
+        "eval",
+        "--vehicles",
+        text(shipped.path()),
+        "--data",
+        text(&data),
+        "--trained",
+        text(&training),
+    ]);
+    assert!(stderr(&refused).contains("are not those of the training report"), "{}", stderr(&refused));
+}
+
+#[test]
+fn the_program_trains_anew_for_every_part_that_is_held_out() {
+    let folder = TempDir::new().unwrap();
+    let (data, settings) = (folder.path().join("data.parquet"), folder.path().join("short.toml"));
+    dataset::write(&data, &analytic(10)).unwrap();
+    std::fs::write(&settings, "epochs = 2\nparts = 2").unwrap();
+    let vehicles = common::vehicles();
+    let eval =
+        ["eval", "--vehicles", text(&vehicles), "--data", text(&data), "--config", text(&settings), "--json"];
+    for (rule, parts, models) in [("depth", 2, 4), ("vehicle", 2, 1)] {
+        let output = wade(&[&eval[..], &["--split", rule]].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["splits"].as_array().unwrap().len(), parts);
+        for vehicle in report["vehicles"].as_array().unwrap() {
+            // every case is held out once; of a vehicle held out as a whole nothing is left to fit simple models to
+            let cases = if vehicle["name"] == "husky" { 10 } else { 20 };
+            assert_eq!(vehicle["cases"], cases);
+            assert_eq!(vehicle["models"].as_array().unwrap().len(), models);
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Promise: the gap benchmark repeats by seed, hides what it says at the strength it says, and tells nothing of it.
+#![allow(clippy::unwrap_used)]
+
+use std::path::PathBuf;
+
+use wade::gap_bench::answer::Answer;
+use wade::gap_bench::baselines::Method;
+use wade::gap_bench::case::{Case, Family, cases};
+use wade::gap_bench::generate::{gap, generate, predicted};
+use wade::gap_bench::hidden::{Effect, Hidden};
+use wade::gap_bench::real::{kvlcc2, rm2_rotor};
+use wade::gap_bench::score::rows;
+use wade::gap_bench::{Hull, NoiseKind, Prediction, Schedule, Simulator, Tool, folder, run};
+use wade::trials::Trials;
+use wade::vehicle::shipped;
+
+fn schedule() -> Schedule {
+    Schedule::slice(&shipped::warthog().unwrap().vehicle().unwrap(), 1)
+}
+
+fn box_simulator(hull: &Hull) -> Simulator<'_> {
+    Simulator { hull, prediction: Prediction::Analytic, vehicle: "generated-box" }
+}
+
+fn single(effect: Effect, strength: f64) -> Case {
+    let singles = cases(&[Family::Single], 69, 3);
+    let is_it = |case: &Case| case.hidden[0].effect == effect && case.strength == strength;
+    singles.into_iter().find(is_it).unwrap()
+}
+
+#[test]
+fn a_folder_reads_back_as_the_trials_that_were_made() {
+    let hull = Hull::generated_box();
+    for case in cases(&[Family::Null], 4, 2).iter().chain([&single(Effect::DriveGain, 1.0)]) {
+        let generated = generate(case, &schedule(), box_simulator(&hull));
+        assert_eq!(generated, generate(case, &schedule(), box_simulator(&hull)), "the same bits");
+        let place = tempfile::tempdir().unwrap();
+        folder::write(place.path(), &generated.trials).unwrap();
+        let read = Trials::read(place.path()).unwrap();
+        assert_eq!(read.manifest, generated.trials.manifest);
+        assert!(read.manifest.generated.is_some());
+        assert_eq!(read.trials.len(), generated.trials.trials.len());
+        let mut made = generated.trials.trials.clone();
+        made.sort_by(|a, b| a.name.cmp(&b.name));
+        for (read, made) in read.trials.iter().zip(&made) {
+            assert_eq!((&read.name, &read.gaps.len()), (&made.name, &made.gaps.len()));
+            for i in 0..made.len() {
+                // seven decimals in the file: 1e-7 over the step in a derivative
+                assert!((read.velocity[i] - made.velocity[i]).norm() < 1e-6);
+                assert!((read.acceleration[i] - made.acceleration[i]).norm() < 1e-3, "{} {i}", made.name);
+                assert!(
+                    (read.measured[0].as_ref().unwrap()[i] - made.measured[0].as_ref().unwrap()[i]).abs()
+                        < 1e-6
+                );
+            }
+        }
+        let text = std::fs::read_to_string(place.path().join("trials.toml")).unwrap();
+        assert!(!text.contains("drive_gain"), "the folder does not say what is hidden");
+    }
+}
+
+#[test]
+fn every_effect_has_its_strength_and_the_gap_is_noise_and_it() {
+    let hull = Hull::generated_box();
+    let simulator = box_simulator(&hull);
+    let schedule = schedule();
+    for case in cases(&[Family::Single], 46, 3).iter().chain(&cases(&[Family::Outside], 5, 3)) {
+        let generated = generate(case, &schedule, simulator);
+        let truth = &generated.truth;
+        assert!(
+            (truth.strengths[0] / case.strength - 1.0).abs() < 1e-3,
+            "{}: {:?}",
+            case.name,
+            truth.strengths
+        );
+        let closure = truth.closure.unwrap_or(1.0);
+        assert!(closure > 0.75, "{}: {closure}", case.name);
+        let (mut rest, mut count) = (0.0, 0.0);
+        for (trial, change) in generated.trials.trials.iter().zip(&truth.change) {
+            for (i, change) in change.iter().enumerate() {
+                let left = gap(trial, i, &predicted(trial, i, &simulator)) - change;
+                rest += left[0] * left[0];
+                count += 1.0;
+            }
+        }
+        let ratio = f64::sqrt(rest / count) / truth.floor[0];
+        assert!((ratio - 1.0).abs() < 1e-6, "{}: {ratio}", case.name);
+    }
+}
+
+#[test]
+fn strength_scales_a_linear_effect_exactly() {
+    let hull = Hull::generated_box();
+    let hidden = Hidden { effect: Effect::LinearDamping, size: 200.0, shape: [0.0; 3] };
+    let of = |strength: f64| {
+        let case = Case { hidden: vec![hidden], strength, ..single(Effect::LinearDamping, 3.0) };
+        generate(&case, &schedule(), box_simulator(&hull)).truth
+    };
+    let (one, three) = (of(1.0), of(3.0));
+    // instruments of another quality take up what the size does not
+    let per_floor = |truth: &wade::gap_bench::generate::Truth| truth.effects[0].size / truth.floor[0];
+    assert!((per_floor(&three) / per_floor(&one) - 3.0).abs() < 0.05);
+}
+
+#[test]
+fn nulls_have_no_structure_beyond_their_kind() {
+    let hull = Hull::generated_box();
+    let simulator = box_simulator(&hull);
+    let null = cases(&[Family::Null], 6, 4);
+    let white = null.iter().find(|case| case.noise == NoiseKind::White).unwrap();
+    let generated = generate(white, &schedule(), simulator);
+    let (mut product, mut square) = ([0.0; 4], 0.0);
+    for trial in &generated.trials.trials {
+        // the force along y is measured by a cell alone where nothing moves along y
+        let values: Vec<f64> =
+            (0..trial.len()).map(|i| gap(trial, i, &predicted(trial, i, &simulator))[1]).collect();
+        for i in 0..values.len() - 3 {
+            square += values[i] * values[i];
+            (0..4).for_each(|lag| product[lag] += values[i] * values[i + lag]);
+        }
+    }
+    assert!(product[1..].iter().all(|sum| (sum / square).abs() < 0.08), "{product:?} {square}");
+}
+
+#[test]
+fn the_warthog_s_own_model_can_be_the_prediction() {
+    let vehicle = shipped::warthog().unwrap().vehicle().unwrap();
+    let hull = Hull::of_vehicle(&vehicle);
+    let model = |condition: &wade::condition::Condition| {
+        let forces = wade::analytic::loads(&vehicle, condition);
+        let force: wade::frame::Vec3 = forces.iter().sum();
+        wade::wrench::Wrench { force, moment: wade::frame::Vec3::zeros() }
+    };
+    let simulator = Simulator { hull: &hull, prediction: Prediction::Model(&model), vehicle: "warthog" };
+    let mut coarse = schedule();
+    coarse.rate = 10.0;
+    let generated = generate(&single(Effect::Current, 3.0), &coarse, simulator);
+    assert!((generated.truth.strengths[0] / 3.0 - 1.0).abs() < 1e-3);
+    assert!(generated.trials.manifest.body.is_none());
+    assert!(generated.trials.trials.iter().all(|trial| trial.simulated[0].is_none()));
+}
+
+#[test]
+fn a_slice_of_the_benchmark_scores_an_oracle_and_the_baselines() {
+    let hull = Hull::generated_box();
+    let simulator = box_simulator(&hull);
+    let all = cases(&[Family::Null, Family::Single, Family::Confounded], 6, 1);
+    let silent = |_: &Trials| Ok(Answer::from_report(&serde_json::json!({"verdict": "nothing_missing"}))?);
+    let sparse = |trials: &Trials| Method::ThresholdedSparse.answer(trials, &simulator);
+    let best = |trials: &Trials| Method::BestR2.answer(trials, &simulator);
+    let tools: [(&str, &Tool); 3] = [("silent", &silent), ("sparse", &sparse), ("best", &best)];
+    let outcomes = run(&all, &schedule(), simulator, &tools, 6, &mut |_| ());
+    let value = |tool: usize, measure: &str| {
+        rows(&outcomes[tool].judged).into_iter().find(|row| row.measure.contains(measure)).unwrap().value
+    };
+    assert_eq!(value(0, "nulls in which"), Some(0.0));
+    assert_eq!(value(0, "right name, one effect, 3 x"), Some(0.0));
+    assert_eq!(value(0, "indistinguishable pair"), Some(0.0));
+    assert_eq!(outcomes[0].same_when_mirrored, [3, 3]);
+    assert_eq!(outcomes[1].judged.len(), all.len());
+    assert!(outcomes.iter().all(|o| o.judged.iter().all(|case| case.error.is_none())));
+    // shuffled trials keep their names, and so their order in the session
+    assert_eq!(outcomes[1].same_when_shuffled, [3, 3]);
+}
+
+/// Folder of the published measurements, which are not part of the repository.
+fn published(source: &str) -> PathBuf {
+    let folder = std::env::var_os("WADE_PUBLISHED_DATA").expect(
+        "WADE_PUBLISHED_DATA names the folder of published measurements, which are not part of the repository",
+    );
+    PathBuf::from(folder).join(source)
+}
+
+fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+    f64::sqrt(sum / count)
+}
+
+#[test]
+#[ignore = "needs published measurements: set WADE_PUBLISHED_DATA"]
+fn a_ship_model_rolls_with_more_damping_than_an_inviscid_simulation() {
+    let place = tempfile::tempdir().unwrap();
+    kvlcc2::import(&published("kvlcc2_roll_decay"), place.path()).unwrap();
+    let trials = Trials::read(place.path()).unwrap();
+    assert_eq!(trials.trials.len(), 3);
+    for trial in &trials.trials {
+        let (measured, simulated) =
+            (trial.measured[3].as_ref().unwrap(), trial.simulated[3].as_ref().unwrap());
+        let gap: Vec<f64> = measured.iter().zip(simulated).map(|(m, s)| m - s).collect();
+        let rates = trial.angular_velocity.iter().map(|omega| omega.x);
+        let work: f64 = gap.iter().zip(rates).map(|(gap, rate)| gap * rate).sum();
+        assert!(work < 0.0, "{}: what the simulation lacks takes energy out", trial.name);
+        let share = root_mean_square(gap.into_iter()) / root_mean_square(measured.iter().copied());
+        assert!((0.005..0.3).contains(&share), "{}: {share}", trial.name);
+    }
+}
+
+#[test]
+#[ignore = "needs published measurements: set WADE_PUBLISHED_DATA"]
+fn a_rotor_with_blades_has_more_drag_the_faster_it_turns() {
+    let place = tempfile::tempdir().unwrap();
+    rm2_rotor::import(&published("unh_rm2_rotor"), place.path()).unwrap();
+    let trials = Trials::read(place.path()).unwrap();
+    assert_eq!(trials.trials.len(), 12);
+    let curve = trials.trials.iter().find(|trial| trial.name == "perf-1-0").unwrap();
+    let (measured, simulated) = (curve.measured[0].as_ref().unwrap(), curve.simulated[0].as_ref().unwrap());
+    assert!(measured.iter().zip(simulated).all(|(m, s)| m < s), "the blades drag");
+    let last = measured.len() - 1;
+    assert!(measured[last] - simulated[last] < measured[0] - simulated[0]);
+}
