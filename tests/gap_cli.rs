@@ -13,7 +13,7 @@ use wade::forces::Forces;
 use wade::frame::Vec3;
 use wade::geometry::hydrostatics::hydrostatics;
 use wade::model::Workspace;
-use wade::train::random::Random;
+use wade::random::Random;
 
 fn wade(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));

@@ -13,6 +13,7 @@ use wade::gap::{self, Config, GapError, Predicted, Report, Verdict, effects_toml
 use wade::model::{Model, Workspace};
 use wade::trials::Trials;
 
+use super::gap_bench::GapBench;
 use super::{Vehicles, emit, usage_error};
 
 /// Find where a model and measured trials disagree, name the missing effect, and show the gap shrink
@@ -26,6 +27,7 @@ use super::{Vehicles, emit, usage_error};
   wade gap --vehicle warthog --trials trials/ --out gap/
   wade gap --vehicle warthog --trials trials/ --out gap/ --apply
   wade gap locate --vehicle warthog --trials trials/ --json
+  wade gap bench --cases 69 --out bench/
 
 OUT holds report.json and index.html, with --apply effects.toml too: the physical effects with their standard errors and the
 ranges in which they were seen. Faults of sensors and drive are never in it.")]
@@ -59,6 +61,7 @@ enum Step {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+    Bench(GapBench),
 }
 
 #[derive(Debug, Args)]
@@ -88,6 +91,7 @@ impl Gap {
             (Some(Step::Name(source)), _) => source.name(),
             (Some(Step::Fit(source)), _) => source.fit(),
             (Some(Step::Report { source, out }), _) => source.report(&out, false),
+            (Some(Step::Bench(bench)), _) => bench.run(),
             (None, Some(out)) => self.source.report(&out, self.apply),
             (None, None) => usage_error("give --vehicle, --trials and --out, or a step"),
         }

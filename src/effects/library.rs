@@ -279,6 +279,7 @@ impl Effect {
     pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::HullFlooding => &[("opening_ratio", "1")],
+            Self::WaterEntrySlamming => &[("wet_at", "m")],
             Self::WaveMemory => &[("time_constant", "s"), ("frequency", "rad/s")],
             _ => &[],
         }

@@ -68,16 +68,21 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
             // a memory shorter than the waves of the hull take to leave it is added mass
             let period = (setting.body.length / GRAVITY).sqrt();
             let mut shapes = Vec::new();
-            for form in [0.0, 1.0] {
-                for tau in [1.0, 2.5, 6.0, 15.0] {
-                    for frequency in [0.0, 1.0, 2.0] {
-                        shapes.push([tau * period, frequency / period, form]);
-                    }
-                }
+            for tau in [1.0, 2.5, 6.0, 15.0] {
+                let of = |frequency: f64, form: f64| [tau * period, frequency / period, form];
+                shapes.extend([of(0.0, 0.0), of(1.0, 0.0), of(2.0, 0.0)]);
+                shapes.extend([of(0.5, 1.0), of(1.0, 1.0), of(2.0, 1.0)]);
             }
             shapes
         }
-        Effect::Rotation | Effect::Squat | Effect::BedMotion => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::Rotation => vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        Effect::Current => vec![[0.0; 3], [0.0, 0.0, 1.0]],
+        Effect::DragCoefficientError => [0.0, 1.0, 2.0].map(|law| [law, 0.0, 0.0]).into(),
+        Effect::Squat | Effect::BedMotion => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::WaterEntrySlamming => {
+            // a bottom without deadrise, and of 10, 20 and 30 degrees
+            [0.0, 0.18, 0.36, 0.58].map(|slope| [0.5 * slope * setting.body.width, 0.0, 0.0]).into()
+        }
         Effect::SensorDelay => [0.0, 0.1, 0.25, 0.5].map(|delay| [delay, 0.0, 0.0]).into(),
         Effect::SensorDrift if setting.one_clock => vec![[0.0; 3], [1.0, 0.0, 0.0]],
         Effect::SensorBiasStep => steps(all),
@@ -167,7 +172,8 @@ fn chain(
             Effect::SensorGain => own(&|c| p[c]),
             Effect::AxisMisalignment => {
                 for (axis, column) in columns.iter_mut().enumerate() {
-                    let e = Vec3::ith(axis, 1.0);
+                    // axes that are turned by an angle see the wrench turned back by it
+                    let e = Vec3::ith(axis, -1.0);
                     let force = e.cross(&Vec3::new(p[0], p[1], p[2]));
                     let moment = e.cross(&Vec3::new(p[3], p[4], p[5]));
                     column[sample] = [force.x, force.y, force.z, moment.x, moment.y, moment.z];

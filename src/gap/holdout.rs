@@ -14,8 +14,6 @@ use super::{Config, Named};
 use crate::random::Random;
 use crate::trials::WRENCH;
 
-/// True for the features of a sample inside a region.
-
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 

@@ -282,9 +282,9 @@ fn text(condition: &Condition) -> String {
     let Condition { quantity, unit, above, at_most } = condition;
     let unit = if *unit == "1" { String::new() } else { format!(" {unit}") };
     match (above, at_most) {
-        (Some(above), Some(at_most)) => format!("{quantity} between {above:.3} and {at_most:.3}{unit}"),
-        (Some(above), None) => format!("{quantity} above {above:.3}{unit}"),
-        (None, Some(at_most)) => format!("{quantity} at most {at_most:.3}{unit}"),
+        (Some(above), Some(at_most)) => format!("{above:.3} < {quantity} <= {at_most:.3}{unit}"),
+        (Some(above), None) => format!("{quantity} > {above:.3}{unit}"),
+        (None, Some(at_most)) => format!("{quantity} <= {at_most:.3}{unit}"),
         (None, None) => quantity.to_string(),
     }
 }

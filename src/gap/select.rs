@@ -5,17 +5,21 @@
 //! most of the blocks that excite it, a stated share of the remaining gap above the floor, larger than its phase-shifted
 //! placebos, and large enough to matter beside the noise of a sample and the model's own uncertainty.
 
-use nalgebra::{DMatrix, DVector};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
 
 use super::design::{Design, Fitted};
 use super::noise::Floor;
 use super::robust::{Error, errors, group, noise_of};
+use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
 use crate::random::Random;
 
 /// Least deviate of a column that stays in a group.
-const COLUMN_DEVIATE: f64 = 4.0;
+const COLUMN_DEVIATE: f64 = 2.5;
 /// Share of the folds in which an effect must help and keep its sign.
 const MOST_FOLDS: f64 = 0.75;
 /// A shifted column that still points the same way is no placebo.
@@ -67,9 +71,20 @@ pub(super) struct Judge<'a> {
     pub floors: &'a [Floor; 6],
     /// Loss that nothing explains.
     pub floor_loss: f64,
+    passed: RefCell<BTreeMap<(Vec<usize>, Effect), Option<Judged>>>,
 }
 
-impl Judge<'_> {
+impl<'a> Judge<'a> {
+    pub fn new(
+        design: &'a Design,
+        setting: &'a Setting<'a>,
+        config: &'a Config,
+        floors: &'a [Floor; 6],
+        floor_loss: f64,
+    ) -> Self {
+        Self { design, setting, config, floors, floor_loss, passed: RefCell::default() }
+    }
+
     /// Columns of a set.
     pub fn columns(&self, set: &[Member]) -> Vec<usize> {
         set.iter().flat_map(|member| member.columns.iter().map(|(column, _)| *column)).collect()
@@ -79,10 +94,22 @@ impl Judge<'_> {
         self.design.candidates[member.candidate].effect
     }
 
-    /// The best form of an effect beside a set, without regard to the gates that need most work.
+    /// The best form of an effect beside a set, by every gate but the placebos.
     pub fn judge(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let ranked = self.ranked(set, effect)?;
+        let before = self.design.solve(&self.columns(set))?.1;
+        let &(least, candidate) = ranked.first()?;
+        let Some(refused) = self.hopeless(set, before, least) else {
+            return self.judge_ranked(set, &ranked);
+        };
+        let member = self.whole(candidate);
+        let (gain, refused) = (before - least, Some(refused));
+        Some(Judged { member, effect, cv_loss: f64::INFINITY, gain, refused })
+    }
+
+    /// Loss and candidate of each form of an effect beside a set, the least first.
+    fn ranked(&self, set: &[Member], effect: Effect) -> Option<Vec<(f64, usize)>> {
         let base = self.columns(set);
-        let (_, before) = self.design.solve(&base)?;
         let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
         let mut ranked: Vec<(f64, usize)> = forms
             .filter_map(|(index, candidate)| {
@@ -92,6 +119,18 @@ impl Judge<'_> {
             })
             .collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        (!ranked.is_empty()).then_some(ranked)
+    }
+
+    /// A candidate with all of its columns.
+    fn whole(&self, candidate: usize) -> Member {
+        Member { candidate, columns: self.design.candidates[candidate].columns.clone() }
+    }
+
+    /// The first of the best two forms that passes, or else the best one.
+    fn judge_ranked(&self, set: &[Member], ranked: &[(f64, usize)]) -> Option<Judged> {
+        let base = self.columns(set);
+        let before = self.design.solve(&base)?.1;
         let mut first = None;
         for &(_, candidate) in ranked.iter().take(2) {
             let judged = self.judge_form(set, &base, before, candidate)?;
@@ -101,6 +140,28 @@ impl Judge<'_> {
             first.get_or_insert(judged);
         }
         first
+    }
+
+    /// A gate that no choice among an effect's columns can pass, from the gain of all of them: most of the library is not
+    /// there, and the errors of a fit take most of the time.
+    fn hopeless(&self, set: &[Member], before: f64, after: f64) -> Option<Refusal> {
+        // a third of the variance that rows of their own residual would give
+        const CERTAIN: f64 = 3.0;
+        let gain = before - after;
+        if gain < self.least_gain(set, before) {
+            return Some(Refusal::SmallShare);
+        }
+        let variance = after / self.design.y.len().max(1) as f64;
+        let deviate = deviate_of(self.config.significance);
+        (CERTAIN * gain < deviate * deviate * variance).then_some(Refusal::NotSignificant)
+    }
+
+    /// What an effect beside a set must gain.
+    fn least_gain(&self, set: &[Member], before: f64) -> f64 {
+        let remaining = (before - self.floor_loss).max(0.0);
+        let whole = (self.design.empty_loss() - self.floor_loss).max(0.0);
+        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * whole };
+        f64::max(self.config.share_of_remaining * remaining, of_whole)
     }
 
     fn judge_form(&self, set: &[Member], base: &[usize], before: f64, candidate: usize) -> Option<Judged> {
@@ -162,11 +223,7 @@ impl Judge<'_> {
         if !self.relevant(member, base.len(), fitted) {
             return Some(Refusal::Irrelevant);
         }
-        let gain = before - fitted.loss;
-        let remaining = (before - self.floor_loss).max(0.0);
-        let whole = (self.design.empty_loss() - self.floor_loss).max(0.0);
-        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * whole };
-        if gain < self.config.share_of_remaining * remaining || gain < of_whole {
+        if before - fitted.loss < self.least_gain(set, before) {
             return Some(Refusal::SmallShare);
         }
         (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
@@ -264,7 +321,7 @@ impl Judge<'_> {
                 shifted.dot(&original) / (shifted.norm() * original.norm()).max(1e-12) > SAME_DIRECTION
             });
             if !alike {
-                strongest = strongest.max(projected(design, &base, &columns, &residual));
+                strongest = strongest.max(design.gain(&columns, &base, &residual));
             }
         }
         Some((real, strongest))
@@ -322,7 +379,18 @@ impl Judge<'_> {
         set.iter().any(|member| self.effect(member) == effect)
     }
 
+    /// An effect beside a set where it passes every gate; the search asks again and again.
     fn passes(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let key = (self.columns(set), effect);
+        if let Some(known) = self.passed.borrow().get(&key) {
+            return known.clone();
+        }
+        let found = self.passes_anew(set, effect);
+        self.passed.borrow_mut().insert(key, found.clone());
+        found
+    }
+
+    fn passes_anew(&self, set: &[Member], effect: Effect) -> Option<Judged> {
         let judged = self.judge(set, effect).filter(|judged| judged.refused.is_none())?;
         let mut whole = set.to_vec();
         whole.push(judged.member.clone());
@@ -445,16 +513,7 @@ impl Judge<'_> {
 
     /// The best form of an effect beside a set by least squares alone.
     fn judge_quick(&self, set: &[Member], effect: Effect) -> Option<Member> {
-        let base = self.columns(set);
-        let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
-        let best = forms
-            .filter_map(|(index, candidate)| {
-                let mut columns = base.clone();
-                columns.extend(candidate.columns.iter().map(|(column, _)| *column));
-                Some((self.design.solve(&columns)?.1, index))
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Member { candidate: best.1, columns: self.design.candidates[best.1].columns.clone() })
+        Some(self.whole(self.ranked(set, effect)?.first()?.1))
     }
 
     /// Sets in which one effect is exchanged that explain as much within two standard errors, with no more numbers.
@@ -499,12 +558,14 @@ impl Judge<'_> {
 
     /// Two rivals together, where each is significant beside the other.
     fn both(&self, ours: Effect, theirs: Effect) -> Option<Vec<Member>> {
-        let significant =
-            |judged: &Judged| !matches!(judged.refused, Some(refused) if refused != Refusal::SmallShare);
-        let a = self.judge(&[], ours)?;
-        let b = self.judge(std::slice::from_ref(&a.member), theirs).filter(significant)?;
-        let a = self.judge(std::slice::from_ref(&b.member), ours).filter(significant)?;
-        let mut both = vec![a.member, b.member];
+        let significant = |set: &[Member], effect: Effect| {
+            let judged = self.judge_ranked(set, &self.ranked(set, effect)?)?;
+            matches!(judged.refused, None | Some(Refusal::SmallShare)).then_some(judged.member)
+        };
+        let a = self.judge(&[], ours)?.member;
+        let b = significant(&[a], theirs)?;
+        let a = significant(std::slice::from_ref(&b), ours)?;
+        let mut both = vec![a, b];
         both.sort_by_key(|member| self.effect(member));
         Some(both)
     }
@@ -557,26 +618,4 @@ impl Judge<'_> {
         };
         Some(DVector::from_fn(design.y.len(), |row, _| of(row)))
     }
-}
-
-/// Gain of columns that are no part of the design beside a base of which `residual` is what it leaves.
-fn projected(design: &Design, base: &[usize], columns: &[DVector<f64>], residual: &DVector<f64>) -> f64 {
-    let inverse = design.inverse(base);
-    let mut clean: Vec<DVector<f64>> = Vec::new();
-    for column in columns {
-        let mut column = column.clone();
-        if let Some(inverse) = inverse.as_ref().filter(|_| !base.is_empty()) {
-            let cross =
-                DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&column)));
-            let weights = inverse * cross;
-            base.iter().enumerate().for_each(|(i, &c)| column.axpy(-weights[i], &design.x.column(c), 1.0));
-        }
-        clean.push(column);
-    }
-    let count = clean.len();
-    let ridge = 1e-9 * clean.iter().map(DVector::norm_squared).fold(0.0, f64::max);
-    let xx =
-        DMatrix::from_fn(count, count, |i, j| clean[i].dot(&clean[j]) + if i == j { ridge } else { 0.0 });
-    let xy = DVector::from_iterator(count, clean.iter().map(|column| column.dot(residual)));
-    xx.cholesky().map_or(0.0, |factor| xy.dot(&factor.solve(&xy)))
 }
