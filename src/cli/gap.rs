@@ -73,7 +73,7 @@ struct Source {
     /// Folder of trials
     #[arg(long, value_name = "DIR", required = true)]
     trials: Option<PathBuf>,
-    /// Settings, TOML: seed, bin_s, block_s, folds, held_out, significance, ...
+    /// Settings, TOML: library, seed, bin_s, block_s, folds, held_out, ...
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Print JSON

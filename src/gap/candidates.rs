@@ -11,6 +11,9 @@ const DELAY_ARM: f64 = 0.15;
 /// Speed below which rolling resistance fades out [m/s].
 const ROLLING_SPEED: f64 = 0.05;
 
+/// Coefficient of a gain that all channels share.
+const ALL_CHANNELS: usize = 6;
+
 /// What columns depend on besides the trial.
 #[derive(Debug, Clone)]
 pub(super) struct Setting<'a> {
@@ -75,6 +78,8 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
             }
             shapes
         }
+        // each channel by itself, or one factor of all
+        Effect::SensorGain => vec![[0.0; 3], [1.0, 0.0, 0.0]],
         Effect::Rotation => vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
         Effect::Current => vec![[0.0; 3], [0.0, 0.0, 1.0]],
         Effect::DragCoefficientError => [0.0, 1.0, 2.0].map(|law| [law, 0.0, 0.0]).into(),
@@ -168,6 +173,9 @@ fn chain(
                 let time =
                     if shape[0] > 0.5 { series.t[sample] - setting.first_stamp } else { since_start(sample) };
                 own(&|_| time);
+            }
+            Effect::SensorGain if shape[0] > 0.5 => {
+                setting.components.iter().for_each(|&c| columns[ALL_CHANNELS][sample][c] = p[c]);
             }
             Effect::SensorGain => own(&|c| p[c]),
             Effect::AxisMisalignment => {

@@ -63,7 +63,7 @@ pub(super) fn compose(
         _ => locate::locate(all, &design.trials, gap_excess, config),
     };
     let excitation =
-        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &Effect::ALL, config);
+        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &config.library, config);
     let not_testable = excitation.iter().filter_map(not_testable).collect();
     let alternatives: Vec<Vec<&'static str>> = match holds {
         true => found.alternatives.iter().map(|set| names(judge, set)).collect(),
@@ -104,7 +104,7 @@ pub(super) fn compose(
         samples: all.iter().map(|s| s.t.len()).sum(),
         remarks: trials.remarks().iter().map(ToString::to_string).collect(),
         sources: Sources { trials: hash(trials), ..Sources::default() },
-        traces: traces(&named, all, setting, judge.floors),
+        traces: traces(&named, all, &held, setting, judge.floors),
     };
     report.summary = summary(&report);
     report
@@ -130,7 +130,7 @@ fn named_effects(
         let others: Vec<Member> =
             found.members.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, m)| m.clone()).collect();
         let without = design.solve(&judge.columns(&others)).map_or(found.loss, |(_, loss)| loss);
-        let placebo = judge.beats_placebos(&found.members, member).unwrap_or_default();
+        let placebo = judge.placebo_gains(&found.members, member).unwrap_or_default();
         let specs = one.effect.coefficients();
         let mut parameters = BTreeMap::new();
         for (i, &(coefficient, value)) in one.coefficients.iter().enumerate() {
@@ -307,9 +307,15 @@ fn hash(trials: &Trials) -> String {
     digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Bins of the trials with the largest gap in their worst component.
-fn traces(named: &[Named], all: &[Series], setting: &Setting, floors: &[Floor; 6]) -> Vec<Trace> {
-    const MOST: usize = 3;
+/// Bins of the trials with the largest gap in their worst component: of those that took no part, then of the others.
+fn traces(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    setting: &Setting,
+    floors: &[Floor; 6],
+) -> Vec<Trace> {
+    const MOST: usize = 2;
     let mut worst: Vec<(f64, usize, usize)> = Vec::new();
     for (trial, series) in all.iter().enumerate() {
         let size = |&c: &usize| {
@@ -319,27 +325,35 @@ fn traces(named: &[Named], all: &[Series], setting: &Setting, floors: &[Floor; 6
         worst.extend(setting.components.iter().map(size).max_by(|a, b| a.0.total_cmp(&b.0)));
     }
     worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    worst
-        .into_iter()
-        .take(MOST)
-        .map(|(_, trial, component)| {
-            let series = &all[trial];
-            let added = explained(named, series, trial, setting);
-            let samples = series.bins.iter().map(|bin| bin.len()).max().unwrap_or(1) as f64;
-            Trace {
-                trial: series.name.clone(),
-                component: WRENCH[component],
-                t: series.binned(|i| series.t[i] - series.t[0]),
-                before: series.binned(|i| series.gap[i][component]),
-                after: series.binned(|i| series.gap[i][component] - added[i][component]),
-                noise: floors[component].sample / samples.sqrt(),
-            }
-        })
-        .collect()
+    let (kept, others): (Vec<_>, Vec<_>) = worst.into_iter().partition(|(_, trial, _)| held.contains(trial));
+    let chosen = kept.into_iter().take(MOST).chain(others.into_iter().take(MOST));
+    chosen.map(|(_, trial, component)| trace(named, &all[trial], trial, component, setting, floors)).collect()
+}
+
+fn trace(
+    named: &[Named],
+    series: &Series,
+    trial: usize,
+    component: usize,
+    setting: &Setting,
+    floors: &[Floor; 6],
+) -> Trace {
+    let added = explained(named, series, trial, setting);
+    let samples = series.bins.iter().map(|bin| bin.len()).max().unwrap_or(1) as f64;
+    Trace {
+        trial: series.name.clone(),
+        component: WRENCH[component],
+        t: series.binned(|i| series.t[i] - series.t[0]),
+        before: series.binned(|i| series.gap[i][component]),
+        after: series.binned(|i| series.gap[i][component] - added[i][component]),
+        noise: floors[component].sample / samples.sqrt(),
+    }
 }
 
 fn summary(report: &Report) -> String {
-    let names = |effects: &[NamedEffect]| effects.iter().map(|e| e.name).collect::<Vec<_>>().join(" and ");
+    let names = |effects: &[NamedEffect]| {
+        effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
+    };
     let closed = report.gap.held_out.get("all").and_then(|all| all.closure);
     let closed = closed.map_or_else(String::new, |c| {
         format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c)
@@ -349,11 +363,16 @@ fn summary(report: &Report) -> String {
             "Nothing is missing that these trials can show: the gap holds no structure beyond its noise."
                 .into()
         }
-        Verdict::Named => format!("The gap is {}.{closed}", names(&report.effects)),
+        Verdict::Named => format!("What is missing is {}.{closed}", names(&report.effects)),
         Verdict::Ambiguous => format!(
-            "The gap is {}, or {}: these trials cannot tell them apart.{closed}",
+            "What is missing is {}, or {}: these trials cannot tell them apart.{closed}",
             names(&report.effects),
-            report.alternatives.iter().map(|set| set.join(" and ")).collect::<Vec<_>>().join(", or "),
+            report
+                .alternatives
+                .iter()
+                .map(|set| set.join(" and ").replace('_', " "))
+                .collect::<Vec<_>>()
+                .join(", or "),
         ),
         Verdict::NoCandidateFits => {
             "There is a gap with structure, and no effect of the library explains it; nothing is applied."

@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::Config;
 use super::candidates::Setting;
 use super::design::Design;
+use super::rates::accelerations;
 use super::robust::errors;
 use super::select::Member;
 use super::series::Series;
@@ -223,14 +224,10 @@ fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Seri
     for &trial in &design.trials {
         let series = &all[trial];
         for axis in axes.clone() {
-            let of = |c: &crate::condition::Condition| match axis {
-                0..3 => c.acceleration[axis],
-                _ => c.angular_acceleration[axis - 3],
-            };
             noise += series.rate_noise[axis] * series.t.len() as f64;
-            power += series.conditions.iter().map(|c| of(c).powi(2)).sum::<f64>();
+            power += series.conditions.iter().map(|c| accelerations(c)[axis].powi(2)).sum::<f64>();
         }
     }
     // an axis that does not move has no coefficient worth a correction
-    if power > 0.0 { (noise / power).min(0.2) } else { 0.0 }
+    if power > 0.0 { (noise / power).clamp(0.0, 0.3) } else { 0.0 }
 }

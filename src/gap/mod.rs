@@ -3,7 +3,7 @@
 //!
 //! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
 //!
-//! Reading order: `config`, `measurement` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
+//! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
 //! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
 //! hold), `select` (which effects), `nonlinear`, `features` and `locate` (where; structure without a name), `verdict`, `fit`,
 //! `holdout`, `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
@@ -25,6 +25,7 @@ mod noise;
 mod nonlinear;
 mod page;
 mod plot;
+mod rates;
 mod report;
 mod robust;
 mod run;

@@ -59,8 +59,10 @@ pub fn run(
         first_stamp: all.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min),
     };
     setting.base_drag = base_drag(&all, &setting);
-    let library: Vec<Effect> = Effect::ALL
-        .into_iter()
+    let library: Vec<Effect> = config
+        .library
+        .iter()
+        .copied()
         .filter(|&effect| unavailable(effect, &setting, &trials.manifest, &all).is_none())
         .collect();
     let forms: Vec<(Effect, Shape)> = library

@@ -1,6 +1,7 @@
 //! Which effects: forward selection with swaps and deletions over the whole library.
 //!
-//! Physics, sensors and drive compete in one regression. Each effect of a set must pass every gate given the others:
+//! Physics, sensors and drive compete in one regression, scored by the loss of blocks left out (Burman, Chow, Nolan,
+//! Biometrika 1994) and Schwarz's price of a number (Annals of Statistics 1978). Each effect of a set must pass every gate given the others:
 //! significant by cluster-robust errors, inside its physical bounds, of one sign in every fold, better in most folds and in
 //! most of the blocks that excite it, a stated share of the remaining gap above the floor, larger than its phase-shifted
 //! placebos, and large enough to matter beside the noise of a sample and the model's own uncertainty.
@@ -22,6 +23,9 @@ use crate::random::Random;
 const COLUMN_DEVIATE: f64 = 2.5;
 /// Share of the folds in which an effect must help and keep its sign.
 const MOST_FOLDS: f64 = 0.75;
+/// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
+/// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
+const MOST_SCATTER: f64 = 0.6;
 /// A shifted column that still points the same way is no placebo.
 const SAME_DIRECTION: f64 = 0.9;
 
@@ -258,6 +262,12 @@ impl<'a> Judge<'a> {
         let strongest = (0..member.columns.len())
             .max_by(|&a, &b| fitted.beta[base.len() + a].abs().total_cmp(&fitted.beta[base.len() + b].abs()));
         let Some(strongest) = strongest else { return false };
+        let columns: Vec<usize> =
+            base.iter().copied().chain(member.columns.iter().map(|(c, _)| *c)).collect();
+        let scatter = scatter(self.design, &columns, &fitted.beta, base.len() + strongest);
+        if scatter > MOST_SCATTER * fitted.beta[base.len() + strongest].abs() {
+            return false;
+        }
         let sign = fitted.beta[base.len() + strongest].signum();
         let kept = fitted.fold_betas.iter().all(|beta| beta[base.len() + strongest].signum() == sign);
         helped >= MOST_FOLDS * folds && kept && self.helps_most_blocks(member, base, fitted, &without)
@@ -298,8 +308,9 @@ impl<'a> Judge<'a> {
         2 * better > looked
     }
 
-    /// True where a member beats copies of itself that are shifted in time within each trial.
-    pub fn beats_placebos(&self, set: &[Member], member: &Member) -> Option<(f64, f64)> {
+    /// Gain of a member, and that of the best of copies of itself that are shifted in time around each trial, which have its
+    /// spectrum but not its phase (surrogate data; Theiler and others, Physica D 1992).
+    pub fn placebo_gains(&self, set: &[Member], member: &Member) -> Option<(f64, f64)> {
         let design = self.design;
         let others: Vec<Member> = set.iter().filter(|other| *other != member).cloned().collect();
         let base = self.columns(&others);
@@ -329,19 +340,15 @@ impl<'a> Judge<'a> {
 
     /// For every row the row of the same component whose time is shifted within its trial.
     fn shifted(&self, random: &mut Random) -> Vec<usize> {
-        let rows = &self.design.rows.rows;
-        let width = self.setting.components.len();
-        let mut order = Vec::with_capacity(rows.len());
-        let mut start = 0;
-        while start < rows.len() {
-            let end = start + rows[start..].iter().take_while(|row| row.trial == rows[start].trial).count();
-            let bins = (end - start) / width;
+        let rows = &self.design.rows;
+        let mut order = Vec::with_capacity(rows.rows.len());
+        for trial in &rows.of_trial {
+            let bins = trial.len() / rows.width;
             let shift = ((0.25 + 0.5 * random.unit()) * bins as f64) as usize;
             for bin in 0..bins {
-                let from = start + (bin + shift) % bins * width;
-                order.extend(from..from + width);
+                let from = trial.start + (bin + shift) % bins * rows.width;
+                order.extend(from..from + rows.width);
             }
-            start = end;
         }
         order
     }
@@ -394,7 +401,7 @@ impl<'a> Judge<'a> {
         let judged = self.judge(set, effect).filter(|judged| judged.refused.is_none())?;
         let mut whole = set.to_vec();
         whole.push(judged.member.clone());
-        let (real, placebo) = self.beats_placebos(&whole, &judged.member)?;
+        let (real, placebo) = self.placebo_gains(&whole, &judged.member)?;
         (real > 1.05 * placebo).then_some(judged)
     }
 
@@ -528,8 +535,8 @@ impl<'a> Judge<'a> {
             let explained = (without - fitted.loss).max(0.0);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
                 let Some(judged) = self.passes(&others, effect) else { continue };
-                // what needs more numbers to say the same is no rival
-                if self.numbers(&judged.member) > self.numbers(&out) {
+                // what needs many more numbers to say the same is no rival
+                if self.numbers(&judged.member) > self.numbers(&out) + 1 {
                     continue;
                 }
                 let mut rival = others.clone();
@@ -618,4 +625,27 @@ impl<'a> Judge<'a> {
         };
         Some(DVector::from_fn(design.y.len(), |row, _| of(row)))
     }
+}
+
+/// Standard deviation of a coefficient between trials beyond what noise explains, by moments (DerSimonian and Laird,
+/// Controlled Clinical Trials 1986); 0 where its excess is as likely chance.
+fn scatter(design: &Design, columns: &[usize], beta: &DVector<f64>, index: usize) -> f64 {
+    let residual = design.residual(columns, beta);
+    let x = design.x.column(columns[index]);
+    let noise = residual.norm_squared() / residual.len().max(1) as f64;
+    let trials: Vec<(f64, f64)> = design
+        .rows
+        .of_trial
+        .iter()
+        .map(|rows| rows.clone().fold((0.0, 0.0), |(xx, xr), r| (xx + x[r] * x[r], xr + x[r] * residual[r])))
+        .filter(|(xx, _)| *xx > 0.0)
+        .collect();
+    let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), (xx, _)| (s + xx, q + xx * xx));
+    let freedom = trials.len().max(2) as f64 - 1.0;
+    let excess =
+        trials.iter().map(|(xx, xr)| xr * xr / xx).sum::<f64>() / noise.max(f64::MIN_POSITIVE) - freedom;
+    if excess < 5.0 * (2.0 * freedom).sqrt() {
+        return 0.0;
+    }
+    (excess * noise / (sum - squares / sum).max(f64::MIN_POSITIVE)).sqrt()
 }

@@ -96,7 +96,8 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
         Effect::SensorGain => {
             let error = Parameter { names: &["error", "relative_error", "share"], unit: "1", value: size };
             let gain = Parameter { names: &["gain"], unit: "1", value: 1.0 + size };
-            let names: &[&str] = [&["fx"], &["fy"], &["fz"]][component(hidden)];
+            let names: &[&str] =
+                if hidden.shape[0] < 0.0 { &["all"] } else { [&["fx"], &["fy"], &["fz"]][component(hidden)] };
             vec![error, gain, Parameter { names, unit: "1", value: size }]
         }
         Effect::AxisMisalignment => one(&["pitch", "angle_y", "y", "about_y"], "rad", size),
