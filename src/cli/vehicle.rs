@@ -187,8 +187,7 @@ fn show(bundle: &Bundle, as_json: bool) -> Result<()> {
     });
     let domain = bundle.trained.as_ref().map(|&(_, domain)| domain);
     let provenance = bundle.trained.as_ref().map(|(weights, _)| weights.provenance.as_str());
-    let ranges =
-        || Quantity::ALL.into_iter().filter_map(|q| domain.map(|domain| (q.name(), domain.range(q))));
+    let ranges = || Quantity::ALL.into_iter().filter_map(|q| Some((q.name(), domain?.range(q)?)));
     let d = &vehicle.dimensions;
     if as_json {
         let surfaces = vehicle.surfaces.iter().map(|s| {

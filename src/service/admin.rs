@@ -127,6 +127,6 @@ impl Reloader {
 fn announce(model: &Model, metrics: &Metrics) {
     let vehicle = &model.vehicle().name;
     metrics.set_bundle_version(vehicle, model.version());
-    let (version, provenance) = (model.version(), &model.weights().provenance);
+    let (version, provenance) = (model.version(), model.provenance());
     tracing::info!(vehicle, version, provenance, kernel = model.isa().name(), "bundle loaded");
 }

@@ -2,10 +2,10 @@
 //!
 //! | service | pattern | request | response |
 //! | --- | --- | --- | --- |
-//! | `<namespace>/v1/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
-//! | `<namespace>/v1/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
-//! | `<namespace>/v1/wake` | event | a client wakes the server | |
-//! | `<namespace>/v1/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
+//! | `<namespace>/v2/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
+//! | `<namespace>/v2/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
+//! | `<namespace>/v2/wake` | event | a client wakes the server | |
+//! | `<namespace>/v2/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
 //!
 //! The namespace is `wade` unless the server's configuration says otherwise.
 //!
@@ -40,22 +40,22 @@ impl Names {
 
     /// A vehicle's service for single queries.
     pub fn evaluate(&self, vehicle: &str) -> String {
-        format!("{}/v1/evaluate/{vehicle}", self.namespace)
+        format!("{}/v2/evaluate/{vehicle}", self.namespace)
     }
 
     /// A vehicle's service for batches.
     pub fn evaluate_batch(&self, vehicle: &str) -> String {
-        format!("{}/v1/evaluate_batch/{vehicle}", self.namespace)
+        format!("{}/v2/evaluate_batch/{vehicle}", self.namespace)
     }
 
     /// Event service on which clients wake the server.
     pub fn wake(&self) -> String {
-        format!("{}/v1/wake", self.namespace)
+        format!("{}/v2/wake", self.namespace)
     }
 
     /// Event service on which the server wakes clients.
     pub fn done(&self) -> String {
-        format!("{}/v1/done", self.namespace)
+        format!("{}/v2/done", self.namespace)
     }
 }
 
@@ -72,7 +72,7 @@ pub const SERVER_POLLS: u32 = 1;
 /// A state and who asks. 104 bytes.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v1::Query")]
+#[type_name("wade::v2::Query")]
 pub struct Query {
     /// The client's own number, given back in the answer.
     pub sequence: u64,
@@ -103,7 +103,7 @@ pub struct Query {
 /// The answer to a [`Query`]. 1,944 bytes.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v1::Answer")]
+#[type_name("wade::v2::Answer")]
 pub struct Answer {
     /// The query's number.
     pub sequence: u64,
@@ -130,7 +130,7 @@ pub struct Answer {
     /// One standard deviation of the net force [N].
     pub uncertainty_n: [f32; 3],
     /// Distance from the training domain by [`Quantity`]; 0 within.
-    pub outside: [f32; 7],
+    pub outside: [f32; 8],
     /// Source of the training data, UTF-8 padded with zeros.
     pub provenance: [u8; PROVENANCE_LEN],
     /// Force on each surface, body frame [N].
@@ -139,14 +139,12 @@ pub struct Answer {
     pub surface_point_m: [[f32; 3]; MAX_SURFACES],
     /// Share of each surface under water.
     pub wetted_fraction: [f32; MAX_SURFACES],
-    /// Zero.
-    pub reserved: u32,
 }
 
 /// What comes before the states of a batch.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v1::BatchHeader")]
+#[type_name("wade::v2::BatchHeader")]
 pub struct BatchHeader {
     /// The client's own number, given back in the answer.
     pub sequence: u64,
@@ -161,7 +159,7 @@ pub struct BatchHeader {
 /// Up to [`MAX_BATCH`] states.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v1::BatchQuery")]
+#[type_name("wade::v2::BatchQuery")]
 pub struct BatchQuery {
     /// How many and who asks.
     pub header: BatchHeader,
@@ -172,7 +170,7 @@ pub struct BatchQuery {
 /// The answer to a [`BatchQuery`]: all of its states, or the first that is wrong.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v1::BatchAnswer")]
+#[type_name("wade::v2::BatchAnswer")]
 pub struct BatchAnswer {
     /// The query's number.
     pub sequence: u64,
@@ -252,12 +250,11 @@ impl Answer {
         moment_nm: [0.0; 3],
         about_m: [0.0; 3],
         uncertainty_n: [0.0; 3],
-        outside: [0.0; 7],
+        outside: [0.0; 8],
         provenance: [0; PROVENANCE_LEN],
         surface_force_n: [[0.0; 3]; MAX_SURFACES],
         surface_point_m: [[0.0; 3]; MAX_SURFACES],
         wetted_fraction: [0.0; MAX_SURFACES],
-        reserved: 0,
     };
 
     /// The forces of a model.
@@ -273,7 +270,7 @@ impl Answer {
             outside: forces.outside.excess.map(|excess| excess as f32),
             ..Self::EMPTY
         };
-        let provenance = model.weights().provenance.as_bytes();
+        let provenance = model.provenance().as_bytes();
         let len = provenance.len().min(PROVENANCE_LEN);
         answer.provenance[..len].copy_from_slice(&provenance[..len]);
         for (i, load) in forces.surfaces.iter().enumerate() {
@@ -331,4 +328,4 @@ const _: () = assert!(size_of::<Query>() == 104 && align_of::<Query>() == 8);
 const _: () = assert!(size_of::<Answer>() == 1944 && align_of::<Answer>() == 8);
 const _: () = assert!(size_of::<BatchQuery>() == 24 + 104 * MAX_BATCH);
 const _: () = assert!(size_of::<BatchAnswer>() == 32 + 1944 * MAX_BATCH);
-const _: () = assert!(Quantity::ALL.len() == 7);
+const _: () = assert!(Quantity::ALL.len() == 8);

@@ -134,7 +134,7 @@ pub fn response(model: &Model, forces: &Forces, compute_ns: u64) -> proto::Evalu
         in_domain: forces.outside.is_inside(),
         outside: outside(&forces.outside, 0).collect(),
         bundle_version: model.version(),
-        provenance: model.weights().provenance.clone(),
+        provenance: model.provenance().to_owned(),
         compute_ns,
         ..Default::default()
     };
@@ -171,7 +171,7 @@ pub fn batch_response(model: &Model, len: usize, with_surfaces: bool) -> proto::
         uncertainty_n: Vec::with_capacity(3 * len),
         outside: Vec::new(),
         bundle_version: model.version(),
-        provenance: model.weights().provenance.clone(),
+        provenance: model.provenance().to_owned(),
         compute_ns: 0,
     }
 }
@@ -202,7 +202,7 @@ pub fn summary(model: &Model) -> proto::VehicleSummary {
         name: model.vehicle().name.clone(),
         bundle_version: model.version(),
         surface_count: model.vehicle().surfaces.len() as u32,
-        provenance: model.weights().provenance.clone(),
+        provenance: model.provenance().to_owned(),
     }
 }
 
@@ -248,10 +248,10 @@ fn surface(surface: &Surface) -> proto::Surface {
 
 fn ranges(domain: &Domain) -> Vec<proto::Range> {
     let range = |quantity: Quantity| {
-        let range = domain.range(quantity);
-        proto::Range { quantity: quantity as i32, minimum: range.min, maximum: range.max }
+        let range = domain.range(quantity)?;
+        Some(proto::Range { quantity: quantity as i32, minimum: range.min, maximum: range.max })
     };
-    Quantity::ALL.into_iter().map(range).collect()
+    Quantity::ALL.into_iter().filter_map(range).collect()
 }
 
 /// A row of the latency table.
