@@ -169,7 +169,8 @@ fn the_workflow_keeps_silent_on_noise_and_names_what_is_hidden() {
     let hull = Hull::generated_box();
     let workflow = |trials: &Trials| {
         let body = gap::body_of(trials).expect("the box");
-        let report = gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs");
+        let report =
+            gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs");
         Ok(Answer::from_report(&serde_json::to_value(report)?)?)
     };
     let mut all = cases(&[Family::Null], 2, 1);

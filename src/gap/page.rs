@@ -295,6 +295,7 @@ fn rejected(report: &Report) -> String {
             Some(super::Refusal::Irrelevant) => "too small to matter",
             Some(super::Refusal::SmallShare) => "explains too little of what is left",
             Some(super::Refusal::Unstable) => "not in most parts, or of changing sign",
+            Some(super::Refusal::NotNew) => "says the same as the named",
             Some(super::Refusal::Placebo) => "no better than its placebos",
             None => "passes, but another set explains more",
         };

@@ -21,6 +21,8 @@ use crate::random::Random;
 
 /// Least deviate of a column that stays in a group.
 const COLUMN_DEVIATE: f64 = 2.5;
+/// Squared sine of the angle to the others of a set below which a column says the same as they.
+const NOVEL: f64 = 0.03;
 /// Share of the folds in which an effect must help and keep its sign.
 const MOST_FOLDS: f64 = 0.75;
 /// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
@@ -65,6 +67,8 @@ pub enum Refusal {
     Unstable,
     /// Placebos do as well.
     Placebo,
+    /// The others of the set say the same.
+    NotNew,
 }
 
 /// The regression with what the gates need.
@@ -171,6 +175,18 @@ impl<'a> Judge<'a> {
     fn judge_form(&self, set: &[Member], base: &[usize], before: f64, candidate: usize) -> Option<Judged> {
         let effect = self.design.candidates[candidate].effect;
         let mut own = self.design.candidates[candidate].columns.clone();
+        // two that say the same cancel each other at any size, and so explain what neither does
+        own.retain(|(column, _)| self.design.novelty(*column, base) > NOVEL);
+        if own.is_empty() {
+            let member = self.whole(candidate);
+            return Some(Judged {
+                member,
+                effect,
+                cv_loss: before,
+                gain: 0.0,
+                refused: Some(Refusal::NotNew),
+            });
+        }
         let mut refused = None;
         let fitted = loop {
             let columns: Vec<usize> = base.iter().copied().chain(own.iter().map(|(c, _)| *c)).collect();
@@ -580,7 +596,8 @@ impl<'a> Judge<'a> {
     /// Numbers that a member was fitted with, nonlinear ones included.
     fn numbers(&self, member: &Member) -> usize {
         let shape = match self.effect(member) {
-            Effect::SensorBiasStep => 1,
+            // when, and whether in a trial or between trials
+            Effect::SensorBiasStep => 2,
             // time constant, frequency, and what it remembers
             Effect::WaveMemory => 3,
             effect => effect.shape_names().len(),
