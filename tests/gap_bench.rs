@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use wade::gap::{self, Config, Predicted};
 use wade::gap_bench::answer::Answer;
 use wade::gap_bench::baselines::Method;
 use wade::gap_bench::case::{Case, Family, cases};
@@ -161,6 +162,30 @@ fn a_slice_of_the_benchmark_scores_an_oracle_and_the_baselines() {
     assert!(outcomes.iter().all(|o| o.judged.iter().all(|case| case.error.is_none())));
     // shuffled trials keep their names, and so their order in the session
     assert_eq!(outcomes[1].same_when_shuffled, [3, 3]);
+}
+
+#[test]
+fn the_workflow_keeps_silent_on_noise_and_names_what_is_hidden() {
+    let hull = Hull::generated_box();
+    let workflow = |trials: &Trials| {
+        let body = gap::body_of(trials).expect("the box");
+        let report =
+            gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs");
+        Ok(Answer::from_report(&serde_json::to_value(report)?)?)
+    };
+    let mut all = cases(&[Family::Null], 2, 1);
+    let hidden = [Effect::WaterLevelOffset, Effect::SensorBias, Effect::HullFlooding];
+    all.extend(hidden.map(|effect| single(effect, 3.0)));
+    let tools: [(&str, &Tool); 1] = [("workflow", &workflow)];
+    let outcome = run(&all, &schedule(), box_simulator(&hull), &tools, 0, &mut |_| ()).remove(0);
+    let value = |measure: &str| {
+        rows(&outcome.judged).into_iter().find(|row| row.measure.contains(measure)).unwrap().value
+    };
+    assert_eq!(value("cases without an answer"), Some(0.0));
+    assert_eq!(value("nulls in which"), Some(0.0));
+    assert_eq!(value("wrong name stated with confidence"), Some(0.0));
+    assert_eq!(value("right name, one effect, 3 x"), Some(1.0), "{:?}", outcome.judged);
+    assert!(value("held-out closure, median, 3 x").unwrap() > 0.9);
 }
 
 /// Folder of the published measurements, which are not part of the repository.

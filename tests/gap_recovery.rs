@@ -7,6 +7,7 @@
 mod planted;
 
 use planted::{Noise, State, motions, planted as plant, rms, trials};
+use wade::effects::Effect;
 use wade::frame::Vec3;
 use wade::gap::{self, Config, GapError, Predicted, Report, Verdict};
 use wade::trials::Trials;
@@ -192,6 +193,10 @@ fn the_order_of_the_trials_and_the_side_of_the_vehicle_do_not_matter() {
     let mut shuffled = trials.clone();
     shuffled.trials.reverse();
     assert_eq!(run(&shuffled), report);
+    let backwards = Config { library: Effect::ALL.into_iter().rev().collect(), ..Config::default() };
+    let body = gap::body_of(&trials).expect("a body");
+    let turned = gap::run(&trials, &body, &mut |_| Predicted::default(), &backwards).expect("runs");
+    assert_eq!((turned.verdict, turned.effects), (report.verdict, report.effects.clone()));
     let mirrored = run(&mirrored(trials));
     assert_eq!((mirrored.verdict, names(&mirrored)), (report.verdict, names(&report)));
     for (a, b) in mirrored.effects.iter().zip(&report.effects) {

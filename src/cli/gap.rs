@@ -13,6 +13,7 @@ use wade::gap::{self, Config, GapError, Predicted, Report, Verdict, effects_toml
 use wade::model::{Model, Workspace};
 use wade::trials::Trials;
 
+use super::gap_bench::GapBench;
 use super::{Vehicles, emit, usage_error};
 
 /// Find where a model and measured trials disagree, name the missing effect, and show the gap shrink
@@ -26,6 +27,7 @@ use super::{Vehicles, emit, usage_error};
   wade gap --vehicle warthog --trials trials/ --out gap/
   wade gap --vehicle warthog --trials trials/ --out gap/ --apply
   wade gap locate --vehicle warthog --trials trials/ --json
+  wade gap bench --cases 69 --out bench/
 
 OUT holds report.json and index.html, with --apply effects.toml too: the physical effects with their standard errors and the
 ranges in which they were seen. Faults of sensors and drive are never in it.")]
@@ -33,7 +35,7 @@ pub struct Gap {
     #[command(subcommand)]
     step: Option<Step>,
     #[command(flatten)]
-    source: Option<Source>,
+    source: Source,
     /// Folder for report.json and index.html; those of an earlier run are replaced
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
@@ -59,17 +61,19 @@ enum Step {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+    Bench(GapBench),
 }
 
 #[derive(Debug, Args)]
 struct Source {
     /// Name of the vehicle
-    #[arg(long)]
-    vehicle: String,
+    // optional only beside a step, which has its own
+    #[arg(long, required = true)]
+    vehicle: Option<String>,
     /// Folder of trials
-    #[arg(long, value_name = "DIR")]
-    trials: PathBuf,
-    /// Settings, TOML: seed, bin_s, block_s, folds, held_out, significance, ...
+    #[arg(long, value_name = "DIR", required = true)]
+    trials: Option<PathBuf>,
+    /// Settings, TOML: library, seed, bin_s, block_s, folds, held_out, ...
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Print JSON
@@ -82,13 +86,14 @@ struct Source {
 impl Gap {
     /// Reads and checks everything before anything is written.
     pub fn run(self) -> Result<ExitCode> {
-        match (self.step, self.source, self.out) {
-            (Some(Step::Locate(source)), ..) => source.locate(),
-            (Some(Step::Name(source)), ..) => source.name(),
-            (Some(Step::Fit(source)), ..) => source.fit(),
-            (Some(Step::Report { source, out }), ..) => source.report(&out, false),
-            (None, Some(source), Some(out)) => source.report(&out, self.apply),
-            _ => usage_error("give --vehicle, --trials and --out, or a step"),
+        match (self.step, self.out) {
+            (Some(Step::Locate(source)), _) => source.locate(),
+            (Some(Step::Name(source)), _) => source.name(),
+            (Some(Step::Fit(source)), _) => source.fit(),
+            (Some(Step::Report { source, out }), _) => source.report(&out, false),
+            (Some(Step::Bench(bench)), _) => bench.run(),
+            (None, Some(out)) => self.source.report(&out, self.apply),
+            (None, None) => usage_error("give --vehicle, --trials and --out, or a step"),
         }
     }
 }
@@ -103,22 +108,25 @@ impl Source {
     }
 
     fn run(&self) -> Result<Report> {
+        let (Some(vehicle), Some(folder)) = (&self.vehicle, &self.trials) else {
+            usage_error("give --vehicle and --trials")
+        };
         let config = self.settings()?;
-        let trials = Trials::read(&self.trials)?;
+        let trials = Trials::read(folder)?;
         trials.remarks().iter().for_each(|remark| eprintln!("{remark}"));
-        if trials.manifest.vehicle != self.vehicle {
-            let (trials, asked) = (trials.manifest.vehicle.clone(), self.vehicle.clone());
+        if trials.manifest.vehicle != *vehicle {
+            let (trials, asked) = (trials.manifest.vehicle.clone(), vehicle.clone());
             return Err(GapError::Vehicle { trials, asked }.into());
         }
-        let bundle = self.vehicles.bundle(&self.vehicle);
+        let bundle = self.vehicles.bundle(vehicle);
         let mut report = if bundle.is_dir() {
-            let model = self.vehicles.model(&self.vehicle)?;
+            let model = self.vehicles.model(vehicle)?;
             let body = Body::of_vehicle(model.vehicle());
             gap::run(&trials, &body, &mut predictor(&model), &config)?
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
             if let Some(trial) = alone {
-                let (trial, vehicle) = (trial.name.clone(), self.vehicle.clone());
+                let (trial, vehicle) = (trial.name.clone(), vehicle.clone());
                 return Err(GapError::NoPrediction { trial, vehicle }.into());
             }
             gap::run(&trials, &gap::body_of(&trials)?, &mut |_| Predicted::default(), &config)?

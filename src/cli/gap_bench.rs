@@ -1,4 +1,4 @@
-//! `wade gap-bench`.
+//! `wade gap bench`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
+use wade::gap::{self, Config, GapError, Predicted};
 use wade::gap_bench::answer::Answer;
 use wade::gap_bench::baselines::Method;
 use wade::gap_bench::case::{Case, Family, cases};
@@ -21,14 +22,15 @@ use wade::vehicle::shipped;
 
 use super::emit;
 
-/// Hide effects in generated trials and score what a tool and plain regressions say of them
+/// Hide effects in generated trials; score what the workflow and plain regressions say of them
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
 #[command(after_help = "Examples:
-  wade gap-bench --cases 69 --seed 1 --out bench/
-  wade gap-bench --cases 6 --families null,single --size slice --out bench/ --json
-  wade gap-bench --cases 69 --tool 'wade gap --vehicle generated-box --trials {trials} --out {out}' --out bench/
-  wade gap-bench import kvlcc2 --from kvlcc2_roll_decay/ --out trials/
+  wade gap bench --cases 69 --seed 1 --out bench/
+  wade gap bench --cases 6 --families null,single --size slice --out bench/ --json
+  wade gap bench --cases 69 --only squat --no-baselines --keep --out bench/
+  wade gap bench --cases 69 --tool 'mytool --trials {trials} --out {out}' --out bench/
+  wade gap bench import kvlcc2 --from kvlcc2_roll_decay/ --out trials/
 
 All trials are generated and labelled so. OUT/results.json holds the table and every case.")]
 pub struct GapBench {
@@ -90,10 +92,13 @@ struct Bench {
     /// Families of cases [default: all but timing]
     #[arg(long, value_delimiter = ',')]
     families: Vec<FamilyName>,
+    /// Only the cases whose name holds this
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
     /// Length and number of the trials of a case
     #[arg(long, value_enum, default_value_t = Size::Full)]
     size: Size,
-    /// Command that answers: {trials} stands for the folder of trials, {out} for where it leaves report.json
+    /// Command that answers beside the workflow: {trials} stands for the folder of trials, {out} for where it leaves report.json
     #[arg(long, value_name = "COMMAND")]
     tool: Option<String>,
     /// Leave the plain regressions out
@@ -168,7 +173,10 @@ impl Bench {
             Size::Full => Schedule::full(&warthog, self.seed),
             Size::Slice => Schedule::slice(&warthog, self.seed),
         };
-        let cases = cases(&self.families(), self.cases, self.seed);
+        let mut cases = cases(&self.families(), self.cases, self.seed);
+        if let Some(text) = &self.only {
+            cases.retain(|case| case.name.contains(text.as_str()));
+        }
         if self.keep {
             for case in &cases {
                 let place = out.join("cases").join(&case.name);
@@ -199,6 +207,7 @@ impl Bench {
     ) -> BTreeMap<String, Outcome> {
         type Boxed<'a> = Box<dyn Fn(&Trials) -> Result<Answer, ToolError> + 'a>;
         let mut tools: Vec<(String, Boxed)> = Vec::new();
+        tools.push(("wade gap".to_owned(), Box::new(workflow)));
         if let Some(command) = &self.tool {
             tools.push(("tool".to_owned(), Box::new(command_tool(command))));
         }
@@ -237,6 +246,15 @@ impl Bench {
         });
         Ok(serde_json::to_string_pretty(&results)? + "\n")
     }
+}
+
+/// The workflow, on trials in memory.
+fn workflow(trials: &Trials) -> Result<Answer, ToolError> {
+    let refused = |error: GapError| ToolError::Refused(Box::new(error));
+    let body = gap::body_of(trials).map_err(refused)?;
+    let report =
+        gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).map_err(refused)?;
+    Ok(Answer::from_report(&serde_json::to_value(report)?)?)
 }
 
 fn text(outcomes: &BTreeMap<String, Outcome>) -> String {

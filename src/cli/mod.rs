@@ -60,9 +60,6 @@ enum Command {
     Eval(eval::Eval),
     /// Hold a model against two laws of physics along the motion of trials
     Validate(validate::Validate),
-    /// Hide effects in generated trials and score what is said of them
-    #[command(hide = true)]
-    GapBench(gap_bench::GapBench),
     /// Find where a model and measured trials disagree, and name the missing effect
     Gap(gap::Gap),
     /// Build, check and show vehicle bundles
@@ -82,7 +79,6 @@ impl Cli {
             Command::Train(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Validate(command) => command.run(),
-            Command::GapBench(command) => command.run(),
             Command::Gap(command) => command.run(),
             Command::Vehicle(command) => command.run(),
         }

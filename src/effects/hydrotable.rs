@@ -5,7 +5,8 @@ use crate::frame::{Vec3, WaterPlane, up_from_roll_pitch};
 use crate::geometry::immersion::wet_triangles;
 use crate::geometry::mesh::Mesh;
 
-const LEVELS: usize = 25;
+/// About a centimeter apart on our vehicles: parts with flat bottoms make the volume bend sharply.
+const LEVELS: usize = 97;
 const PITCHES: usize = 11;
 const ROLLS: usize = 5;
 /// Steepest attitude of the table [rad]; a steeper one is taken as this.
@@ -116,9 +117,9 @@ mod tests {
             let exact = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &Vec3::zeros());
             let mut found = Immersion::default();
             table.immerse(&plane, &mut found);
-            assert!((found.volume / exact.displaced_volume - 1.0).abs() < 0.08, "{found:?} {exact:?}");
+            assert!((found.volume / exact.displaced_volume - 1.0).abs() < 0.03, "{found:?} {exact:?}");
             let center = exact.center_of_buoyancy.unwrap();
-            assert!((found.center_of_buoyancy - center).norm() < 0.05, "{found:?} {center}");
+            assert!((found.center_of_buoyancy - center).norm() < 0.02, "{found:?} {center}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Most coefficients of one effect.
-pub const MAX_COEFFICIENTS: usize = 6;
+pub const MAX_COEFFICIENTS: usize = 7;
 
 /// Nonlinear parameters of an effect; those it has none for are 0.
 pub type Shape = [f64; 3];
@@ -257,6 +257,8 @@ impl Effect {
                         c("mx", "1", -0.9, 3.0),
                         c("my", "1", -0.9, 3.0),
                         c("mz", "1", -0.9, 3.0),
+                        // one calibration factor of the whole sensor
+                        c("all", "1", -0.9, 3.0),
                     ]
                 }
             }
@@ -279,6 +281,7 @@ impl Effect {
     pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::HullFlooding => &[("opening_ratio", "1")],
+            Self::WaterEntrySlamming => &[("wet_at", "m")],
             Self::WaveMemory => &[("time_constant", "s"), ("frequency", "rad/s")],
             _ => &[],
         }

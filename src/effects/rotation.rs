@@ -2,7 +2,8 @@
 //!
 //! `f = D(v + omega x r) - D(v)` on each wet panel with the quadratic drag `D_i(u) = -1/2 rho C A_i |u| u_i`, `r` over four
 //! points of the panel. `C` is that of a bluff body, 0.4 to 2.1 (as `drag_coefficient_error`). The shape is 0 for
-//! strip theory, which knows the load across the hull alone, and 1 for the whole load.
+//! strips, which know the load across the hull alone, and 1 for the whole load; its second number is 0 for this law and 1
+//! for `|u_i| u_i`, the cross-flow principle (Fossen, Handbook of Marine Craft Hydrodynamics, section 6.4).
 
 use super::input::{Input, Part};
 use super::library::Shape;
@@ -17,7 +18,10 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
         if wet == 0.0 {
             continue;
         }
-        let drag = |u: &Vec3| panel.windward(u).component_mul(u) * -u.norm();
+        let drag = |u: &Vec3| {
+            let speed = if shape[1] > 0.5 { u.abs() } else { Vec3::repeat(u.norm()) };
+            -panel.windward(u).component_mul(u).component_mul(&speed)
+        };
         let scale = 0.25 * wet * input.half_density();
         for point in panel.points(part) {
             // a strip has one velocity across the hull; its two sides share it

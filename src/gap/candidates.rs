@@ -11,6 +11,9 @@ const DELAY_ARM: f64 = 0.15;
 /// Speed below which rolling resistance fades out [m/s].
 const ROLLING_SPEED: f64 = 0.05;
 
+/// Coefficient of a gain that all channels share.
+const ALL_CHANNELS: usize = 6;
+
 /// What columns depend on besides the trial.
 #[derive(Debug, Clone)]
 pub(super) struct Setting<'a> {
@@ -68,16 +71,23 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
             // a memory shorter than the waves of the hull take to leave it is added mass
             let period = (setting.body.length / GRAVITY).sqrt();
             let mut shapes = Vec::new();
-            for form in [0.0, 1.0] {
-                for tau in [1.0, 2.5, 6.0, 15.0] {
-                    for frequency in [0.0, 1.0, 2.0] {
-                        shapes.push([tau * period, frequency / period, form]);
-                    }
-                }
+            for tau in [1.0, 2.5, 6.0, 15.0] {
+                let of = |frequency: f64, form: f64| [tau * period, frequency / period, form];
+                shapes.extend([of(0.0, 0.0), of(1.0, 0.0), of(2.0, 0.0)]);
+                shapes.extend([of(0.5, 1.0), of(1.0, 1.0), of(2.0, 1.0)]);
             }
             shapes
         }
-        Effect::Rotation | Effect::Squat | Effect::BedMotion => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        // each channel by itself, or one factor of all
+        Effect::SensorGain => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::Rotation => vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        Effect::Current => vec![[0.0; 3], [0.0, 0.0, 1.0]],
+        Effect::DragCoefficientError => [0.0, 1.0, 2.0].map(|law| [law, 0.0, 0.0]).into(),
+        Effect::Squat | Effect::BedMotion => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::WaterEntrySlamming => {
+            // a bottom without deadrise, and of 10, 20 and 30 degrees
+            [0.0, 0.18, 0.36, 0.58].map(|slope| [0.5 * slope * setting.body.width, 0.0, 0.0]).into()
+        }
         Effect::SensorDelay => [0.0, 0.1, 0.25, 0.5].map(|delay| [delay, 0.0, 0.0]).into(),
         Effect::SensorDrift if setting.one_clock => vec![[0.0; 3], [1.0, 0.0, 0.0]],
         Effect::SensorBiasStep => steps(all),
@@ -122,10 +132,10 @@ pub(super) fn columns(
 fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Column]) {
     let mut memory = Memory::default();
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);
-    for sample in 0..series.t.len() {
+    for (sample, &t) in series.t.iter().enumerate() {
         let input = series.input(sample, setting.body, setting.base_drag, setting.channel_width);
         if effect.has_memory() && sample > 0 {
-            effects::advance(effect, shape, &mut memory, &input, series.t[sample] - series.t[sample - 1]);
+            effects::advance(effect, shape, &mut memory, &input, t - series.t[sample - 1]);
         }
         effects::basis(effect, shape, &memory, &input, |coefficient, _, load| {
             let sum = &mut columns[coefficient][sample];
@@ -146,8 +156,7 @@ fn chain(
     columns: &mut [Column],
 ) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
-    for sample in 0..series.t.len() {
-        let p = &series.predicted[sample];
+    for (sample, p) in series.predicted.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();
         let mut own = |value: &dyn Fn(usize) -> f64| {
@@ -165,10 +174,14 @@ fn chain(
                     if shape[0] > 0.5 { series.t[sample] - setting.first_stamp } else { since_start(sample) };
                 own(&|_| time);
             }
+            Effect::SensorGain if shape[0] > 0.5 => {
+                setting.components.iter().for_each(|&c| columns[ALL_CHANNELS][sample][c] = p[c]);
+            }
             Effect::SensorGain => own(&|c| p[c]),
             Effect::AxisMisalignment => {
                 for (axis, column) in columns.iter_mut().enumerate() {
-                    let e = Vec3::ith(axis, 1.0);
+                    // axes that are turned by an angle see the wrench turned back by it
+                    let e = Vec3::ith(axis, -1.0);
                     let force = e.cross(&Vec3::new(p[0], p[1], p[2]));
                     let moment = e.cross(&Vec3::new(p[3], p[4], p[5]));
                     column[sample] = [force.x, force.y, force.z, moment.x, moment.y, moment.z];

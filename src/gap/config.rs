@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::GapError;
 use crate::condition::GroundContact;
+use crate::effects::Effect;
 
 /// How to look, and what must hold before something is named.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -11,6 +12,8 @@ use crate::condition::GroundContact;
 pub struct Config {
     /// Whether the predictions have water under the tires.
     pub ground_contact: GroundContact,
+    /// Effects that are looked for, by name; the whole library unless said otherwise.
+    pub library: Vec<Effect>,
     /// Seed of everything random.
     pub seed: u64,
     /// Length of a bin, over which samples are averaged [s].
@@ -45,6 +48,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             ground_contact: GroundContact::Wetted,
+            library: Effect::ALL.to_vec(),
             seed: 1,
             bin_s: 0.1,
             block_s: 1.5,

@@ -4,10 +4,14 @@
 //! is taken off in the share that this scatter has in it (the transform of the random-effects model; Baltagi, Econometric
 //! Analysis of Panel Data, section 2.3), so that the rows are about independent.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
+use super::Config;
 use super::candidates::{Column, Setting, columns};
 use super::series::Series;
+use super::split::folds;
 use crate::effects::{Effect, Shape};
 
 /// An effect of one shape with the columns of its coefficients.
@@ -48,15 +52,27 @@ pub(super) struct Rows {
     /// Trial of each block.
     pub block_trial: Vec<usize>,
     /// Bins of each block, within its trial.
-    pub block_bins: Vec<std::ops::Range<usize>>,
+    pub block_bins: Vec<Range<usize>>,
+    /// Rows of each trial.
+    pub of_trial: Vec<Range<usize>>,
+    /// Rows of a bin: the components.
+    pub width: usize,
 }
 
 impl Rows {
     /// Rows of the trials listed, cut into blocks of about `block_s`.
     pub fn new(all: &[Series], trials: &[usize], components: &[usize], block_s: f64) -> Self {
-        let mut this = Self { rows: Vec::new(), blocks: 0, block_trial: Vec::new(), block_bins: Vec::new() };
+        let mut this = Self {
+            rows: Vec::new(),
+            blocks: 0,
+            block_trial: Vec::new(),
+            block_bins: Vec::new(),
+            of_trial: Vec::new(),
+            width: components.len(),
+        };
         for &trial in trials {
             let series = &all[trial];
+            let first = this.rows.len();
             for run in &series.runs {
                 let time = |bin: usize| series.t[series.bins[bin].start];
                 let length = time(run.end - 1) - time(run.start);
@@ -75,6 +91,7 @@ impl Rows {
                     start = end;
                 }
             }
+            this.of_trial.push(first..this.rows.len());
         }
         this
     }
@@ -176,14 +193,12 @@ impl Design {
         setting: &Setting,
         library: &[(Effect, Shape)],
         noise: RowNoise,
-        block_s: f64,
-        block_fold: impl Fn(&Rows) -> Vec<usize>,
-        folds: usize,
+        config: &Config,
     ) -> Self {
-        let rows = Rows::new(all, &trials, &setting.components, block_s);
+        let rows = Rows::new(all, &trials, &setting.components, config.block_s);
         let gap = |trial: usize| all[trial].gap.clone();
         let y = DVector::from_vec(to_rows(all, &rows, &trials, &setting.components, &noise, gap));
-        let block_fold = block_fold(&rows);
+        let block_fold = folds(all, &rows, config);
         let mut this = Self {
             x: DMatrix::zeros(rows.rows.len(), 0),
             trials,
@@ -210,7 +225,7 @@ impl Design {
             }
         }
         this.x = DMatrix::from_vec(this.y.len(), this.scale.len(), values);
-        this.sum(folds);
+        this.sum(config.folds);
         this
     }
 
@@ -250,6 +265,51 @@ impl Design {
                 self.resum(column);
             }
         }
+    }
+
+    /// Loss of some columns beside a candidate of another shape, of which the coefficients listed are in use.
+    pub fn loss_with(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        candidate: usize,
+        shape: &Shape,
+        coefficients: &[usize],
+        others: &[usize],
+    ) -> f64 {
+        let found = self.candidate_columns(all, setting, self.candidates[candidate].effect, shape);
+        let own: Vec<DVector<f64>> = found
+            .into_iter()
+            .filter(|(coefficient, ..)| coefficients.contains(coefficient))
+            .map(|(_, column, _)| DVector::from_vec(column))
+            .collect();
+        let Some((beta, loss)) = self.solve(others) else { return f64::INFINITY };
+        loss - self.gain(&own, others, &self.residual(others, &beta))
+    }
+
+    /// Gain of columns that are no part of the design beside a base of which `residual` is what it leaves.
+    pub fn gain(&self, columns: &[DVector<f64>], base: &[usize], residual: &DVector<f64>) -> f64 {
+        let inverse = self.inverse(base).filter(|_| !base.is_empty());
+        let clean: Vec<DVector<f64>> = columns
+            .iter()
+            .map(|column| {
+                let mut column = column.clone();
+                if let Some(inverse) = &inverse {
+                    let cross = base.iter().map(|&c| self.x.column(c).dot(&column));
+                    let weights = inverse * DVector::from_iterator(base.len(), cross);
+                    base.iter()
+                        .enumerate()
+                        .for_each(|(i, &c)| column.axpy(-weights[i], &self.x.column(c), 1.0));
+                }
+                column
+            })
+            .collect();
+        let count = clean.len();
+        let ridge = 1e-9 * clean.iter().map(DVector::norm_squared).fold(0.0, f64::max);
+        let xx =
+            DMatrix::from_fn(count, count, |i, j| clean[i].dot(&clean[j]) + if i == j { ridge } else { 0.0 });
+        let xy = DVector::from_iterator(count, clean.iter().map(|column| column.dot(residual)));
+        xx.cholesky().map_or(0.0, |factor| xy.dot(&factor.solve(&xy)))
     }
 
     /// Change of the rows with the logarithm of a nonlinear parameter, for columns with their scaled coefficients.

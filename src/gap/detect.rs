@@ -19,6 +19,8 @@ use crate::trials::{Manifest, WRENCH};
 const POWER: f64 = 1.28;
 /// Below this share of signal in its columns an effect is not excited: the rest is noise of the kinematics.
 const LEAST_SIGNAL: f64 = 0.3;
+/// Share of a rate that hangs together, below which it is noise.
+const COHERENT: f64 = 0.1;
 /// A trial excites an effect when its mean square is this share of that of the trial that does so most.
 const EXCITED: f64 = 0.1;
 
@@ -134,11 +136,13 @@ fn of_effect(
     let candidate = &design.candidates[form];
     let raw: Vec<Vec<Column>> =
         all.iter().enumerate().map(|(rank, s)| columns(effect, &candidate.shape, s, rank, setting)).collect();
+    let coherent = is_coherent(effect, all, &setting.components);
+    let changes = if effect == Effect::SensorDelay { change_signal(all, &setting.components) } else { 1.0 };
     let mut plausible = false;
     let mut excited = false;
     for &(column, coefficient) in &candidate.columns {
         let (signal, trials) = signal(&raw, coefficient, all, setting, design);
-        let smooth = signal.min(kinematic_signal(effect, all, &setting.components)).max(0.0);
+        let smooth = if coherent { signal.min(changes).max(0.0) } else { 0.0 };
         found.trials = found.trials.max(if smooth > LEAST_SIGNAL { trials } else { 0 });
         excited |= smooth > LEAST_SIGNAL;
         let Some(error) = errors(design, &[column], residual).map(|errors| errors[0]) else { continue };
@@ -200,38 +204,39 @@ fn signal(
     (if total > 0.0 { 1.0 - noise / total } else { 0.0 }, trials)
 }
 
-/// Share of signal in the rates that an effect lives on, which are smoothed: their noise does not show in differences.
-pub(super) fn kinematic_signal(effect: Effect, all: &[Series], components: &[usize]) -> f64 {
-    let (mut noise, mut power) = (0.0, 0.0);
-    for series in all {
-        let count = series.t.len() as f64;
-        let mut add = |index: usize, of: &dyn Fn(usize) -> f64| {
-            noise += series.rate_noise[index] * count;
-            power += (0..series.t.len()).map(|i| of(i).powi(2)).sum::<f64>();
-        };
-        match effect {
-            Effect::AddedMass | Effect::MassError | Effect::WaveMemory => {
-                // pitch comes with surge, roll with sway
-                let felt = [[0, 4], [1, 3], [2, 2]];
-                for (axis, with) in felt.into_iter().enumerate() {
-                    if with.iter().any(|c| components.contains(c)) {
-                        add(axis, &|i| series.conditions[i].acceleration[axis]);
-                    }
-                }
-            }
-            Effect::WaterEntrySlamming => add(6, &|i| series.wetting_rate[i]),
-            Effect::SensorDelay => {
-                for &c in components {
-                    let values = series.binned(|i| series.predicted[i][c]);
-                    let white = white_variance(&values);
-                    let changes = values.windows(4).map(|w| (w[3] - w[0]).powi(2));
-                    // the difference of two bins has twice their noise
-                    noise += 2.0 * white * values.len() as f64 / white.max(1e-12);
-                    power += changes.sum::<f64>() / white.max(1e-12);
-                }
-            }
-            _ => return 1.0,
+/// True where a rate that an effect lives on hangs together for longer than the filter that made it: what is left of the
+/// noise of a motion after differentiating it does not, however smooth it looks.
+fn is_coherent(effect: Effect, all: &[Series], components: &[usize]) -> bool {
+    let share = |index: usize| {
+        let sums = all.iter().map(|series| series.coherence[index]);
+        let (power, covariance) = sums.fold((0.0, 0.0), |(p, c), s| (p + s.power, c + s.covariance));
+        if power > 0.0 { covariance / power } else { 0.0 }
+    };
+    let felt = |rates: [usize; 3], with: [[usize; 2]; 3]| {
+        let seen = |with: &[usize; 2]| with.iter().any(|c| components.contains(c));
+        rates.into_iter().zip(with).filter(|(_, with)| seen(with)).any(|(rate, _)| share(rate) > COHERENT)
+    };
+    match effect {
+        // pitch comes with surge, roll with sway
+        Effect::AddedMass | Effect::MassError | Effect::WaveMemory => {
+            felt([0, 1, 2], [[0, 4], [1, 3], [2, 2]])
         }
+        Effect::WaterEntrySlamming => share(6) > COHERENT,
+        Effect::Rotation => felt([7, 8, 9], [[3, 3], [2, 4], [1, 5]]),
+        _ => true,
+    }
+}
+
+/// Share of signal in the changes of the prediction, on which a delay lives.
+fn change_signal(all: &[Series], components: &[usize]) -> f64 {
+    let (mut noise, mut power) = (0.0, 0.0);
+    for (series, &c) in all.iter().flat_map(|s| components.iter().map(move |c| (s, c))) {
+        let values = series.binned(|i| series.predicted[i][c]);
+        let white = white_variance(&values).max(1e-12);
+        let changes = values.windows(4).map(|w| (w[3] - w[0]).powi(2));
+        // the difference of two bins has twice their noise
+        noise += 2.0 * values.len() as f64;
+        power += changes.sum::<f64>() / white;
     }
     if power > 0.0 { 1.0 - noise / power } else { 0.0 }
 }

@@ -2,7 +2,8 @@
 //!
 //! Least squares on the rows of the design, corrected for noise in the accelerations: a column with a share `s` of noise in
 //! its variance pulls its coefficient down by `1 - s` (Fuller, Measurement Error Models, section 1.2), so that share is
-//! taken off the normal matrix. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect.
+//! taken off the normal matrix. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, and what
+//! the formula itself leaves open.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -10,15 +11,21 @@ use serde::Serialize;
 use super::Config;
 use super::candidates::Setting;
 use super::design::Design;
+use super::rates::accelerations;
 use super::robust::errors;
 use super::select::Member;
 use super::series::Series;
 use super::statistics::quantile;
-use crate::effects::{Effect, Shape};
+use crate::effects::{Effect, Kind, Shape};
 use crate::random::Random;
 
+/// Two-sided 90 % of a normal distribution.
+const Z90: f64 = 1.645;
 /// Fewest trials, in effect, that let an interval rest on the scatter between trials.
 const ENOUGH_TRIALS: f64 = 8.0;
+/// Share of a coefficient of the water that its formula leaves open, one standard deviation: no law of the library holds
+/// to better than some per cent on a hull, and no number of trials shows it.
+const FORMULA: f64 = 0.03;
 /// Fewer trials than this, in effect: one condition.
 const ONE_CONDITION: f64 = 2.5;
 
@@ -89,12 +96,20 @@ pub(super) fn fit(
     let draws = bootstrap(&groups, &noise, config);
     let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
     let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
-    let covariance = DMatrix::from_fn(count, count, |i, j| covariance(&draws, i, j) / (scale[i] * scale[j]));
-    let interval = |i: usize, scale: f64| {
-        let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale).collect();
-        [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)]
+    let formula = |i: usize| match design.candidates[set[used[i].0].candidate].effect.kind() {
+        Kind::Physics => FORMULA * values[i],
+        _ => 0.0,
     };
-    let intervals = (0..count).map(|i| interval(i, scale[i])).collect();
+    let covariance = DMatrix::from_fn(count, count, |i, j| {
+        let open = if i == j { formula(i).powi(2) } else { 0.0 };
+        covariance(&draws, i, j) / (scale[i] * scale[j]) + open
+    });
+    let interval = |i: usize| {
+        let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale[i]).collect();
+        let drawn = [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)];
+        drawn.map(|end| values[i] + (end - values[i]).signum() * (end - values[i]).hypot(Z90 * formula(i)))
+    };
+    let intervals = (0..count).map(interval).collect();
     let mut shape_std = vec![[0.0; 3]; set.len()];
     for (place, &(m, axis)) in shapes.iter().enumerate() {
         let value = design.candidates[set[m].candidate].shape[axis];
@@ -209,14 +224,10 @@ fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Seri
     for &trial in &design.trials {
         let series = &all[trial];
         for axis in axes.clone() {
-            let of = |c: &crate::condition::Condition| match axis {
-                0..3 => c.acceleration[axis],
-                _ => c.angular_acceleration[axis - 3],
-            };
             noise += series.rate_noise[axis] * series.t.len() as f64;
-            power += series.conditions.iter().map(|c| of(c).powi(2)).sum::<f64>();
+            power += series.conditions.iter().map(|c| accelerations(c)[axis].powi(2)).sum::<f64>();
         }
     }
     // an axis that does not move has no coefficient worth a correction
-    if power > 0.0 { (noise / power).min(0.2) } else { 0.0 }
+    if power > 0.0 { (noise / power).clamp(0.0, 0.3) } else { 0.0 }
 }

@@ -14,9 +14,6 @@ use super::{Config, Named};
 use crate::random::Random;
 use crate::trials::WRENCH;
 
-/// True for the features of a sample inside a region.
-type IsInside = Box<dyn Fn(&[f64; 9]) -> bool>;
-
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
@@ -125,6 +122,9 @@ pub(super) fn closures(
     closures
 }
 
+/// Feature, lower and upper limit.
+type Limits = Vec<(usize, f64, f64)>;
+
 /// Regions, and thirds of depth and speed, where the gap of the trials kept back grows by more than a twentieth.
 pub(super) fn worse(
     named: &[Named],
@@ -153,9 +153,9 @@ pub(super) fn worse(
         let after = size(&|i, c| series.gap[i][c] - added[i][c]);
         points.extend(of_bins(series).into_iter().zip(before).zip(after).map(|((f, b), a)| (f, b, a)));
     }
-    let mut places: Vec<(String, IsInside)> = Vec::new();
+    let mut places: Vec<(String, Limits)> = Vec::new();
     for region in regions {
-        let limits: Vec<(usize, f64, f64)> = region
+        let limits: Limits = region
             .conditions
             .iter()
             .filter_map(|c| {
@@ -163,24 +163,19 @@ pub(super) fn worse(
                 Some((index, c.above.unwrap_or(f64::NEG_INFINITY), c.at_most.unwrap_or(f64::INFINITY)))
             })
             .collect();
-        places.push((
-            region.place.clone(),
-            Box::new(move |f| limits.iter().all(|&(i, low, high)| f[i] > low && f[i] <= high)),
-        ));
+        places.push((region.place.clone(), limits));
     }
     for (feature, name) in [(0, "depth"), (2, "speed")] {
         let mut values: Vec<f64> = points.iter().map(|(f, ..)| f[feature]).collect();
         let cuts = [quantile(&mut values.clone(), 1.0 / 3.0), quantile(&mut values, 2.0 / 3.0)];
         let limits = [(f64::NEG_INFINITY, cuts[0]), (cuts[0], cuts[1]), (cuts[1], f64::INFINITY)];
         for (third, (low, high)) in ["lowest", "middle", "highest"].into_iter().zip(limits) {
-            places.push((
-                format!("{third} third of {name}"),
-                Box::new(move |f| f[feature] > low && f[feature] <= high),
-            ));
+            places.push((format!("{third} third of {name}"), vec![(feature, low, high)]));
         }
     }
     let mut worse = Vec::new();
-    for (place, within) in places {
+    for (place, limits) in places {
+        let within = |f: &[f64; 9]| limits.iter().all(|&(i, low, high)| f[i] > low && f[i] <= high);
         let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
         for (features, b, a) in &points {
             if within(features) {

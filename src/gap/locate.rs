@@ -93,15 +93,40 @@ pub(super) fn locate(
     let mut tried = 0;
     let mut leaves = Vec::new();
     split(&grow, &check, OPEN, DEPTH, &mut leaves, &mut tried);
+    let overall = mean(&grow);
+    let ahead = |limits: &Limits| {
+        let within: Vec<&Point> = grow.iter().filter(|p| inside(limits, &p.features)).copied().collect();
+        mean(&within) > overall
+    };
+    let boxes = merged(leaves.into_iter().filter(|limits| *limits != OPEN && ahead(limits)).collect());
     let mut random = Random::new(config.seed ^ 0x9e21);
-    let mut regions: Vec<Region> = leaves
-        .into_iter()
-        .filter(|limits| *limits != OPEN)
-        .filter_map(|limits| region(&limits, &check, trials.len(), &mut random))
-        .collect();
+    let mut regions: Vec<Region> =
+        boxes.iter().filter_map(|limits| region(limits, &check, trials.len(), &mut random)).collect();
     regions.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap).then(a.place.cmp(&b.place)));
     regions.truncate(5);
     (regions, tried)
+}
+
+/// Boxes that touch along one feature and agree in all others become one.
+fn merged(mut boxes: Vec<Limits>) -> Vec<Limits> {
+    let join = |a: &Limits, b: &Limits| -> Option<Limits> {
+        let differ: Vec<usize> = (0..a.len()).filter(|&f| a[f] != b[f]).collect();
+        let &[feature] = &differ[..] else { return None };
+        let touch = a[feature][1] == b[feature][0] || b[feature][1] == a[feature][0];
+        let mut joined = *a;
+        joined[feature] = [a[feature][0].min(b[feature][0]), a[feature][1].max(b[feature][1])];
+        touch.then_some(joined)
+    };
+    loop {
+        let pairs = (0..boxes.len()).flat_map(|i| (i + 1..boxes.len()).map(move |j| (i, j)));
+        let Some((i, j, joined)) =
+            pairs.filter_map(|(i, j)| Some((i, j, join(&boxes[i], &boxes[j])?))).next()
+        else {
+            return boxes;
+        };
+        boxes.remove(j);
+        boxes[i] = joined;
+    }
 }
 
 fn mean(points: &[&Point]) -> f64 {
@@ -257,9 +282,9 @@ fn text(condition: &Condition) -> String {
     let Condition { quantity, unit, above, at_most } = condition;
     let unit = if *unit == "1" { String::new() } else { format!(" {unit}") };
     match (above, at_most) {
-        (Some(above), Some(at_most)) => format!("{quantity} between {above:.3} and {at_most:.3}{unit}"),
-        (Some(above), None) => format!("{quantity} above {above:.3}{unit}"),
-        (None, Some(at_most)) => format!("{quantity} at most {at_most:.3}{unit}"),
+        (Some(above), Some(at_most)) => format!("{above:.3} < {quantity} <= {at_most:.3}{unit}"),
+        (Some(above), None) => format!("{quantity} > {above:.3}{unit}"),
+        (None, Some(at_most)) => format!("{quantity} <= {at_most:.3}{unit}"),
         (None, None) => quantity.to_string(),
     }
 }

@@ -3,12 +3,14 @@
 //!
 //! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
 //!
-//! Reading order: `config`, `measurement` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
-//! library as columns), `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that hold),
-//! `select` (which effects), `features` and `locate` (where; structure without a name), `fit`, `holdout`, `detect` (what would
-//! have shown), `experiment`, `report`, `page` and `effects_file`.
+//! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
+//! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
+//! hold), `select` (which effects), `nonlinear`, `features` and `locate` (where; structure without a name), `verdict`, `fit`,
+//! `holdout`, `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
 
+mod base_drag;
 mod candidates;
+mod compose;
 mod config;
 mod design;
 mod detect;
@@ -20,8 +22,10 @@ mod holdout;
 mod locate;
 mod measurement;
 mod noise;
+mod nonlinear;
 mod page;
 mod plot;
+mod rates;
 mod report;
 mod robust;
 mod run;
@@ -29,6 +33,7 @@ mod select;
 mod series;
 mod split;
 mod statistics;
+mod verdict;
 
 pub use config::Config;
 pub use detect::{Detectable, Excitation, GapSize};

@@ -42,8 +42,14 @@ impl Floor {
     }
 }
 
-/// The floor of each compared component; the others are 0.
-pub(super) fn floors(all: &[Series], manifest: &Manifest, components: &[usize]) -> [Floor; 6] {
+/// The floor of each compared component from the trials `naming`; the others are 0. Repeats may be of any trials: what
+/// differs between them is noise, whatever effect they share.
+pub(super) fn floors(
+    all: &[Series],
+    naming: &[usize],
+    manifest: &Manifest,
+    components: &[usize],
+) -> [Floor; 6] {
     std::array::from_fn(|component| {
         let name = WRENCH[component];
         let stated = manifest.sensor_noise.get(name).copied();
@@ -52,15 +58,16 @@ pub(super) fn floors(all: &[Series], manifest: &Manifest, components: &[usize]) 
         if !components.contains(&component) {
             return floor;
         }
-        floor.sample = high_frequency(all.iter(), component);
+        floor.sample = high_frequency(naming.iter().map(|&trial| &all[trial]), component);
         if let Some(repeats) = repeats(all, manifest, component) {
             floor = Floor { sample: repeats, source: FloorSource::Repeats, ..floor };
         }
         if let Some(stated) = stated.filter(|&stated| stated > floor.sample) {
             floor = Floor { sample: stated, source: FloorSource::Stated, ..floor };
         }
-        let squares = all.iter().flat_map(|s| s.uncertainty.iter().map(|u| u[component].powi(2)));
-        let count = all.iter().map(|s| s.t.len()).sum::<usize>().max(1);
+        let squares =
+            naming.iter().flat_map(|&trial| all[trial].uncertainty.iter().map(|u| u[component].powi(2)));
+        let count = naming.iter().map(|&trial| all[trial].t.len()).sum::<usize>().max(1);
         floor.model = (squares.sum::<f64>() / count as f64).sqrt();
         floor
     })

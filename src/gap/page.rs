@@ -12,7 +12,8 @@ h1{font-size:22px;margin:0 0 4px}h2{font-size:17px;margin:28px 0 4px}p{margin:4p
 .nothing_missing{border-color:#2a8c4a;background:#eef8f0}.ambiguous{border-color:#d97a06;background:#fdf6ec}\
 .no_candidate_fits{border-color:#b91c1c;background:#fdf0f0}.note{border-color:#d97a06;background:#fdf6ec;font-size:15px}\
 .wide{overflow-x:auto}table{border-collapse:collapse;margin:8px 0}th,td{padding:4px 12px;border-bottom:1px solid #e3e6ea;\
-text-align:right;white-space:nowrap}th:first-child,td:first-child{text-align:left;padding-left:0}td.text{text-align:left;white-space:normal}\
+text-align:right;white-space:nowrap}th{white-space:normal;vertical-align:bottom;font-weight:600}th:first-child,td:first-child{text-align:left;\
+padding-left:0;white-space:normal}.text{text-align:left;white-space:normal}\
 .bar{display:flex;height:26px;margin:8px 0;border-radius:4px;overflow:hidden}.bar div{color:#fff;font-size:13px;padding:3px 6px;white-space:nowrap;overflow:hidden}\
 svg{max-width:100%;height:auto;display:block}.small{color:#57606a;font-size:13px}\
 .key span{display:inline-block;width:18px;height:4px;vertical-align:middle;margin:0 6px 0 14px}";
@@ -65,13 +66,22 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Four significant digits.
+/// Three significant digits.
 fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".into() } else { "–".into() };
     }
-    let digits = (3 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
-    format!("{value:.digits$}")
+    let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{value:.digits$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+/// A name for people.
+fn plain(name: &str) -> String {
+    name.replace('_', " ")
 }
 
 fn percent(share: f64) -> String {
@@ -80,13 +90,13 @@ fn percent(share: f64) -> String {
 
 fn table(heads: &[&str], text_columns: &[usize], rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut text = "<div class=\"wide\"><table><tr>".to_owned();
-    heads.iter().for_each(|head| text += &format!("<th>{head}</th>"));
+    let class = |column: usize| if text_columns.contains(&column) { " class=\"text\"" } else { "" };
+    heads.iter().enumerate().for_each(|(i, head)| text += &format!("<th{}>{head}</th>", class(i)));
     text += "</tr>";
     for row in rows {
         text += "<tr>";
         for (column, cell) in row.iter().enumerate() {
-            let class = if text_columns.contains(&column) { " class=\"text\"" } else { "" };
-            text += &format!("<td{class}>{cell}</td>");
+            text += &format!("<td{}>{cell}</td>", class(column));
         }
         text += "</tr>";
     }
@@ -129,14 +139,13 @@ fn effects(report: &Report) -> String {
             };
             let unit = if parameter.unit == "1" { "" } else { parameter.unit };
             let [low, high] = parameter.interval;
-            let band = parameter.literature.map_or("–".into(), |[a, b]| {
-                let inside = (a..=b).contains(&parameter.value);
-                format!("{} to {}{}", number(a), number(b), if inside { "" } else { " (outside)" })
-            });
+            let band = parameter
+                .literature
+                .map_or(String::new(), |band| against(band, parameter.value, [low, high]));
             vec![
-                format!("{}{}", effect.name, if effect.provisional { " (provisional)" } else { "" }),
+                format!("{}{}", plain(effect.name), if effect.provisional { " (provisional)" } else { "" }),
                 kind.into(),
-                (*name).into(),
+                plain(name),
                 format!("{} {unit}", number(parameter.value)),
                 format!("{} to {}", number(low), number(high)),
                 band,
@@ -159,10 +168,10 @@ fn effects(report: &Report) -> String {
         "<h2>Named effects</h2>{}<p class=\"small\">Share of gap: what comes back when the effect alone is left out. Best \
          placebo: the most that the same effect, shifted in time within each trial, explains of what the real one does. \
          Provisional: seen in one condition only.</p>\n",
-        table(&heads, &[], rows)
+        table(&heads, &[5], rows)
     );
     if !report.alternatives.is_empty() {
-        let sets: Vec<String> = report.alternatives.iter().map(|set| set.join(" and ")).collect();
+        let sets: Vec<String> = report.alternatives.iter().map(|set| plain(&set.join(" and "))).collect();
         let _ = writeln!(text, "<p>Explains as much: {}.</p>", escape(&sets.join("; ")));
     }
     for effect in report.effects.iter().filter(|effect| !effect.surfaces.is_empty()) {
@@ -171,10 +180,34 @@ fn effects(report: &Report) -> String {
             .iter()
             .map(|(name, share)| format!("{} {}", escape(name), percent(*share)))
             .collect();
-        let _ =
-            writeln!(text, "<p class=\"small\">{} is carried by: {}.</p>", effect.name, surfaces.join(", "));
+        let _ = writeln!(
+            text,
+            "<p class=\"small\">{} is carried by: {}.</p>",
+            plain(effect.name),
+            surfaces.join(", ")
+        );
     }
     text
+}
+
+/// A published band as a bar, with the estimate and its interval over it.
+fn against(band: [f64; 2], value: f64, interval: [f64; 2]) -> String {
+    const WIDTH: f64 = 120.0;
+    let all = [band[0], band[1], interval[0], interval[1]];
+    let (low, high) = all.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let at = |v: f64| 4.0 + (WIDTH - 8.0) * (v - low) / (high - low).max(f64::MIN_POSITIVE);
+    let [a, b, c, d] = all.map(at);
+    let color = if (band[0]..=band[1]).contains(&value) { "#1d5fb0" } else { "#b91c1c" };
+    format!(
+        "<svg width=\"{WIDTH}\" height=\"14\" style=\"display:inline-block;vertical-align:middle\"><rect x=\"{a:.1}\" y=\"3\" \
+         width=\"{:.1}\" height=\"8\" fill=\"#d9dbdf\"/><path d=\"M{c:.1} 7H{d:.1}\" stroke=\"{color}\" stroke-width=\"2\"/>\
+         <circle cx=\"{:.1}\" cy=\"7\" r=\"3.5\" fill=\"{color}\"/></svg> {} to {}{}",
+        b - a,
+        at(value),
+        number(band[0]),
+        number(band[1]),
+        if (band[0]..=band[1]).contains(&value) { "" } else { " (outside)" }
+    )
 }
 
 fn held_out(report: &Report) -> String {
@@ -262,10 +295,11 @@ fn rejected(report: &Report) -> String {
             Some(super::Refusal::Irrelevant) => "too small to matter",
             Some(super::Refusal::SmallShare) => "explains too little of what is left",
             Some(super::Refusal::Unstable) => "not in most parts, or of changing sign",
+            Some(super::Refusal::NotNew) => "says the same as the named",
             Some(super::Refusal::Placebo) => "no better than its placebos",
             None => "passes, but another set explains more",
         };
-        vec![r.name.into(), percent(r.share_alone), percent(r.share_of_gap), why.into()]
+        vec![plain(r.name), percent(r.share_alone), percent(r.share_of_gap), why.into()]
     });
     let rows: Vec<Vec<String>> = rows.collect();
     if rows.is_empty() {
@@ -281,11 +315,12 @@ fn excitation(report: &Report) -> String {
             .minimum_detectable
             .iter()
             .map(|(name, d)| {
-                format!("{name} {} {}", number(d.value), if d.unit == "1" { "" } else { d.unit })
+                let unit = if d.unit == "1" { String::new() } else { format!(" {}", d.unit) };
+                format!("{} {}{unit}", plain(name), number(d.value))
             })
             .collect();
         vec![
-            e.name.into(),
+            plain(e.name),
             e.trials.to_string(),
             smallest.join(", "),
             e.not_testable.clone().unwrap_or_default(),
@@ -296,11 +331,12 @@ fn excitation(report: &Report) -> String {
 }
 
 fn limits(report: &Report) -> String {
-    let ranges: Vec<String> = report
-        .validity
-        .iter()
-        .map(|(name, [low, high])| format!("{name} {} to {}", number(*low), number(*high)))
-        .collect();
+    let range = |(name, [low, high]): (&&str, &[f64; 2])| {
+        let (quantity, unit) = name.rsplit_once('_').unwrap_or((name, ""));
+        let unit = unit.replace('p', "/").replace('2', "²").replace('3', "³");
+        format!("{} {} to {} {unit}", plain(quantity), number(*low), number(*high))
+    };
+    let ranges: Vec<String> = report.validity.iter().map(range).collect();
     let mut text = format!("<h2>Limits</h2><p>Seen within: {}.</p>", escape(&ranges.join(", ")));
     for remark in &report.remarks {
         let _ = write!(text, "<p class=\"small\">{}</p>", escape(remark));

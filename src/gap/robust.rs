@@ -6,6 +6,8 @@
 //! the residual of all trials together, up to two seconds (Newey and West, Econometrica 1987, with pooled covariances), or
 //! by the sandwich over blocks where that is larger.
 
+use std::cell::OnceCell;
+
 use nalgebra::DVector;
 
 use super::design::Design;
@@ -45,14 +47,14 @@ impl Error {
 /// Standard errors of a fit.
 pub(super) fn errors(design: &Design, columns: &[usize], residual: &DVector<f64>) -> Option<Vec<Error>> {
     let inverse = design.inverse(columns)?;
-    let noise = Noise::of(design, residual);
+    let noise = Noise::of(residual);
     let of = |index: usize| {
         // the weight of each row in the estimate
         let mut weights = DVector::zeros(residual.len());
         for (other, &column) in columns.iter().enumerate() {
             weights.axpy(inverse[(index, other)], &design.x.column(column), 1.0);
         }
-        noise.error(design, &weights, &design.x.column(columns[index]).into_owned(), residual)
+        noise.error(design, &weights, design.x.column(columns[index]).as_slice())
     };
     Some((0..columns.len()).map(of).collect())
 }
@@ -74,84 +76,76 @@ pub(super) fn group(
         base.iter().enumerate().for_each(|(i, &c)| sum.axpy(-weights[i], &design.x.column(c), 1.0));
     }
     let weights = &sum / sum.norm_squared().max(f64::MIN_POSITIVE);
-    Some(Noise::of(design, residual).error(design, &weights, &sum, residual))
+    Some(Noise::of(residual).error(design, &weights, sum.as_slice()))
 }
 
 /// Variance of a weighted sum of rows under the autocovariance of a residual.
 pub(super) fn noise_of(design: &Design, residual: &DVector<f64>, weights: &DVector<f64>) -> f64 {
-    Noise::of(design, residual).pooled(design, weights)
+    Noise::of(residual).pooled(design, weights)
 }
 
-/// Autocovariance of a residual by component and lag, over all trials.
-struct Noise {
-    covariance: Vec<[f64; LAGS]>,
-    /// Rows between a bin and the next.
-    width: usize,
+/// A residual, with its autocovariance by component and lag over all trials once that is asked for.
+struct Noise<'a> {
+    residual: &'a DVector<f64>,
+    covariance: OnceCell<Vec<[f64; LAGS]>>,
 }
 
-impl Noise {
-    fn of(design: &Design, residual: &DVector<f64>) -> Self {
-        let rows = &design.rows.rows;
-        let width =
-            rows.iter().take_while(|row| row.bin == rows[0].bin && row.trial == rows[0].trial).count();
+impl<'a> Noise<'a> {
+    fn of(residual: &'a DVector<f64>) -> Self {
+        Self { residual, covariance: OnceCell::new() }
+    }
+
+    fn covariance(&self, design: &Design) -> Vec<[f64; LAGS]> {
+        let width = design.rows.width;
         let mut sums = vec![[0.0; LAGS]; width];
         let mut counts = vec![[0.0; LAGS]; width];
-        for (start, end) in trials(design) {
-            for row in start..end {
-                for lag in 0..LAGS.min((end - row).div_ceil(width)) {
-                    let place = (row - start) % width;
-                    sums[place][lag] += residual[row] * residual[row + lag * width];
-                    counts[place][lag] += 1.0;
+        for rows in &design.rows.of_trial {
+            for component in 0..width {
+                let values = strided(&self.residual.as_slice()[rows.clone()], component, width);
+                for lag in 0..LAGS.min(values.len()) {
+                    sums[component][lag] += product(&values, lag);
+                    counts[component][lag] += (values.len() - lag) as f64;
                 }
             }
         }
         // Bartlett's weights keep the sum positive
         let taper = |lag: usize| 1.0 - lag as f64 / LAGS as f64;
-        let covariance = sums
-            .iter()
-            .zip(&counts)
-            .map(|(s, n)| std::array::from_fn(|lag| taper(lag) * s[lag] / f64::max(n[lag], 1.0)))
-            .collect();
-        Self { covariance, width }
+        let of = |(s, n): (&[f64; LAGS], &[f64; LAGS])| {
+            std::array::from_fn(|lag| taper(lag) * s[lag] / f64::max(n[lag], 1.0))
+        };
+        sums.iter().zip(&counts).map(of).collect()
     }
 
-    fn error(
-        &self,
-        design: &Design,
-        weights: &DVector<f64>,
-        column: &DVector<f64>,
-        residual: &DVector<f64>,
-    ) -> Error {
+    fn error(&self, design: &Design, weights: &DVector<f64>, column: &[f64]) -> Error {
         let rows = &design.rows;
-        let count = rows.block_trial.iter().max().map_or(0, |last| last + 1);
-        let (mut by_trial, mut by_block) = (vec![0.0; count], vec![0.0; rows.blocks]);
-        let mut energy = vec![0.0; count];
-        for (row, place) in rows.rows.iter().enumerate() {
-            let part = weights[row] * residual[row];
-            by_trial[place.trial] += part;
-            by_block[place.block] += part;
-            energy[place.trial] += column[row] * column[row];
-        }
+        let energy: Vec<f64> =
+            rows.of_trial.iter().map(|r| column[r.clone()].iter().map(|v| v * v).sum()).collect();
         let trials = effective(&energy);
+        let part = |row: usize| weights[row] * self.residual[row];
         if trials >= ENOUGH_TRIALS {
+            let by_trial: Vec<f64> = rows.of_trial.iter().map(|r| r.clone().map(part).sum()).collect();
             return Error { std: sandwich(&by_trial).sqrt(), freedom: trials - 1.0, trials };
         }
+        let mut by_block = vec![0.0; rows.blocks];
+        rows.rows.iter().enumerate().for_each(|(row, place)| by_block[place.block] += part(row));
         let variance = self.pooled(design, weights).max(sandwich(&by_block));
         Error { std: variance.sqrt(), freedom: rows.blocks as f64 - 1.0, trials }
     }
 
     /// Variance of a weighted sum of noise with the pooled autocovariance.
     fn pooled(&self, design: &Design, weights: &DVector<f64>) -> f64 {
+        let covariance = self.covariance.get_or_init(|| self.covariance(design));
+        let width = design.rows.width;
         let mut variance = 0.0;
-        for (start, end) in trials(design) {
-            for row in start..end {
-                if weights[row] == 0.0 {
+        for rows in &design.rows.of_trial {
+            for (component, covariance) in covariance.iter().enumerate() {
+                let values = strided(&weights.as_slice()[rows.clone()], component, width);
+                if values.iter().all(|v| *v == 0.0) {
                     continue;
                 }
-                let covariance = &self.covariance[(row - start) % self.width];
-                for lag in 0..LAGS.min((end - row).div_ceil(self.width)) {
+                for (lag, covariance) in covariance.iter().enumerate().take(values.len()) {
                     let both = if lag == 0 { 1.0 } else { 2.0 };
-                    variance += both * covariance[lag] * weights[row] * weights[row + lag * self.width];
+                    variance += both * covariance * product(&values, lag);
                 }
             }
         }
@@ -159,13 +153,14 @@ impl Noise {
     }
 }
 
-/// First row of each trial and that after its last.
-fn trials(design: &Design) -> Vec<(usize, usize)> {
-    let rows = &design.rows.rows;
-    let starts: Vec<usize> =
-        (0..rows.len()).filter(|&row| row == 0 || rows[row].trial != rows[row - 1].trial).collect();
-    let ends = starts.iter().skip(1).copied().chain([rows.len()]);
-    starts.iter().copied().zip(ends).collect()
+/// The rows of one component.
+fn strided(rows: &[f64], component: usize, width: usize) -> Vec<f64> {
+    rows.iter().skip(component).step_by(width).copied().collect()
+}
+
+/// Sum of the products of values so many places apart.
+fn product(values: &[f64], lag: usize) -> f64 {
+    values[..values.len() - lag].iter().zip(&values[lag..]).map(|(a, b)| a * b).sum()
 }
 
 fn sandwich(parts: &[f64]) -> f64 {

@@ -1,23 +1,33 @@
 //! Which effects: forward selection with swaps and deletions over the whole library.
 //!
-//! Physics, sensors and drive compete in one regression. Each effect of a set must pass every gate given the others:
+//! Physics, sensors and drive compete in one regression, scored by the loss of blocks left out (Burman, Chow, Nolan,
+//! Biometrika 1994) and Schwarz's price of a number (Annals of Statistics 1978). Each effect of a set must pass every gate given the others:
 //! significant by cluster-robust errors, inside its physical bounds, of one sign in every fold, better in most folds and in
 //! most of the blocks that excite it, a stated share of the remaining gap above the floor, larger than its phase-shifted
 //! placebos, and large enough to matter beside the noise of a sample and the model's own uncertainty.
 
-use nalgebra::{DMatrix, DVector};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
 
 use super::design::{Design, Fitted};
 use super::noise::Floor;
 use super::robust::{Error, errors, group, noise_of};
+use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
 use crate::random::Random;
 
 /// Least deviate of a column that stays in a group.
-const COLUMN_DEVIATE: f64 = 4.0;
+const COLUMN_DEVIATE: f64 = 2.5;
+/// Squared sine of the angle to the others of a set below which a column says the same as they.
+const NOVEL: f64 = 0.03;
 /// Share of the folds in which an effect must help and keep its sign.
 const MOST_FOLDS: f64 = 0.75;
+/// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
+/// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
+const MOST_SCATTER: f64 = 0.6;
 /// A shifted column that still points the same way is no placebo.
 const SAME_DIRECTION: f64 = 0.9;
 
@@ -57,6 +67,8 @@ pub enum Refusal {
     Unstable,
     /// Placebos do as well.
     Placebo,
+    /// The others of the set say the same.
+    NotNew,
 }
 
 /// The regression with what the gates need.
@@ -67,9 +79,20 @@ pub(super) struct Judge<'a> {
     pub floors: &'a [Floor; 6],
     /// Loss that nothing explains.
     pub floor_loss: f64,
+    passed: RefCell<BTreeMap<(Vec<usize>, Effect), Option<Judged>>>,
 }
 
-impl Judge<'_> {
+impl<'a> Judge<'a> {
+    pub fn new(
+        design: &'a Design,
+        setting: &'a Setting<'a>,
+        config: &'a Config,
+        floors: &'a [Floor; 6],
+        floor_loss: f64,
+    ) -> Self {
+        Self { design, setting, config, floors, floor_loss, passed: RefCell::default() }
+    }
+
     /// Columns of a set.
     pub fn columns(&self, set: &[Member]) -> Vec<usize> {
         set.iter().flat_map(|member| member.columns.iter().map(|(column, _)| *column)).collect()
@@ -79,10 +102,22 @@ impl Judge<'_> {
         self.design.candidates[member.candidate].effect
     }
 
-    /// The best form of an effect beside a set, without regard to the gates that need most work.
+    /// The best form of an effect beside a set, by every gate but the placebos.
     pub fn judge(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let ranked = self.ranked(set, effect)?;
+        let before = self.design.solve(&self.columns(set))?.1;
+        let &(least, candidate) = ranked.first()?;
+        let Some(refused) = self.hopeless(set, before, least) else {
+            return self.judge_ranked(set, &ranked);
+        };
+        let member = self.whole(candidate);
+        let (gain, refused) = (before - least, Some(refused));
+        Some(Judged { member, effect, cv_loss: f64::INFINITY, gain, refused })
+    }
+
+    /// Loss and candidate of each form of an effect beside a set, the least first.
+    fn ranked(&self, set: &[Member], effect: Effect) -> Option<Vec<(f64, usize)>> {
         let base = self.columns(set);
-        let (_, before) = self.design.solve(&base)?;
         let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
         let mut ranked: Vec<(f64, usize)> = forms
             .filter_map(|(index, candidate)| {
@@ -92,6 +127,18 @@ impl Judge<'_> {
             })
             .collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        (!ranked.is_empty()).then_some(ranked)
+    }
+
+    /// A candidate with all of its columns.
+    fn whole(&self, candidate: usize) -> Member {
+        Member { candidate, columns: self.design.candidates[candidate].columns.clone() }
+    }
+
+    /// The first of the best two forms that passes, or else the best one.
+    fn judge_ranked(&self, set: &[Member], ranked: &[(f64, usize)]) -> Option<Judged> {
+        let base = self.columns(set);
+        let before = self.design.solve(&base)?.1;
         let mut first = None;
         for &(_, candidate) in ranked.iter().take(2) {
             let judged = self.judge_form(set, &base, before, candidate)?;
@@ -103,9 +150,43 @@ impl Judge<'_> {
         first
     }
 
+    /// A gate that no choice among an effect's columns can pass, from the gain of all of them: most of the library is not
+    /// there, and the errors of a fit take most of the time.
+    fn hopeless(&self, set: &[Member], before: f64, after: f64) -> Option<Refusal> {
+        // a third of the variance that rows of their own residual would give
+        const CERTAIN: f64 = 3.0;
+        let gain = before - after;
+        if gain < self.least_gain(set, before) {
+            return Some(Refusal::SmallShare);
+        }
+        let variance = after / self.design.y.len().max(1) as f64;
+        let deviate = deviate_of(self.config.significance);
+        (CERTAIN * gain < deviate * deviate * variance).then_some(Refusal::NotSignificant)
+    }
+
+    /// What an effect beside a set must gain.
+    fn least_gain(&self, set: &[Member], before: f64) -> f64 {
+        let remaining = (before - self.floor_loss).max(0.0);
+        let whole = (self.design.empty_loss() - self.floor_loss).max(0.0);
+        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * whole };
+        f64::max(self.config.share_of_remaining * remaining, of_whole)
+    }
+
     fn judge_form(&self, set: &[Member], base: &[usize], before: f64, candidate: usize) -> Option<Judged> {
         let effect = self.design.candidates[candidate].effect;
         let mut own = self.design.candidates[candidate].columns.clone();
+        // two that say the same cancel each other at any size, and so explain what neither does
+        own.retain(|(column, _)| self.design.novelty(*column, base) > NOVEL);
+        if own.is_empty() {
+            let member = self.whole(candidate);
+            return Some(Judged {
+                member,
+                effect,
+                cv_loss: before,
+                gain: 0.0,
+                refused: Some(Refusal::NotNew),
+            });
+        }
         let mut refused = None;
         let fitted = loop {
             let columns: Vec<usize> = base.iter().copied().chain(own.iter().map(|(c, _)| *c)).collect();
@@ -162,11 +243,7 @@ impl Judge<'_> {
         if !self.relevant(member, base.len(), fitted) {
             return Some(Refusal::Irrelevant);
         }
-        let gain = before - fitted.loss;
-        let remaining = (before - self.floor_loss).max(0.0);
-        let whole = (self.design.empty_loss() - self.floor_loss).max(0.0);
-        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * whole };
-        if gain < self.config.share_of_remaining * remaining || gain < of_whole {
+        if before - fitted.loss < self.least_gain(set, before) {
             return Some(Refusal::SmallShare);
         }
         (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
@@ -201,6 +278,12 @@ impl Judge<'_> {
         let strongest = (0..member.columns.len())
             .max_by(|&a, &b| fitted.beta[base.len() + a].abs().total_cmp(&fitted.beta[base.len() + b].abs()));
         let Some(strongest) = strongest else { return false };
+        let columns: Vec<usize> =
+            base.iter().copied().chain(member.columns.iter().map(|(c, _)| *c)).collect();
+        let scatter = scatter(self.design, &columns, &fitted.beta, base.len() + strongest);
+        if scatter > MOST_SCATTER * fitted.beta[base.len() + strongest].abs() {
+            return false;
+        }
         let sign = fitted.beta[base.len() + strongest].signum();
         let kept = fitted.fold_betas.iter().all(|beta| beta[base.len() + strongest].signum() == sign);
         helped >= MOST_FOLDS * folds && kept && self.helps_most_blocks(member, base, fitted, &without)
@@ -241,8 +324,9 @@ impl Judge<'_> {
         2 * better > looked
     }
 
-    /// True where a member beats copies of itself that are shifted in time within each trial.
-    pub fn beats_placebos(&self, set: &[Member], member: &Member) -> Option<(f64, f64)> {
+    /// Gain of a member, and that of the best of copies of itself that are shifted in time around each trial, which have its
+    /// spectrum but not its phase (surrogate data; Theiler and others, Physica D 1992).
+    pub fn placebo_gains(&self, set: &[Member], member: &Member) -> Option<(f64, f64)> {
         let design = self.design;
         let others: Vec<Member> = set.iter().filter(|other| *other != member).cloned().collect();
         let base = self.columns(&others);
@@ -264,7 +348,7 @@ impl Judge<'_> {
                 shifted.dot(&original) / (shifted.norm() * original.norm()).max(1e-12) > SAME_DIRECTION
             });
             if !alike {
-                strongest = strongest.max(projected(design, &base, &columns, &residual));
+                strongest = strongest.max(design.gain(&columns, &base, &residual));
             }
         }
         Some((real, strongest))
@@ -272,19 +356,15 @@ impl Judge<'_> {
 
     /// For every row the row of the same component whose time is shifted within its trial.
     fn shifted(&self, random: &mut Random) -> Vec<usize> {
-        let rows = &self.design.rows.rows;
-        let width = self.setting.components.len();
-        let mut order = Vec::with_capacity(rows.len());
-        let mut start = 0;
-        while start < rows.len() {
-            let end = start + rows[start..].iter().take_while(|row| row.trial == rows[start].trial).count();
-            let bins = (end - start) / width;
+        let rows = &self.design.rows;
+        let mut order = Vec::with_capacity(rows.rows.len());
+        for trial in &rows.of_trial {
+            let bins = trial.len() / rows.width;
             let shift = ((0.25 + 0.5 * random.unit()) * bins as f64) as usize;
             for bin in 0..bins {
-                let from = start + (bin + shift) % bins * width;
-                order.extend(from..from + width);
+                let from = trial.start + (bin + shift) % bins * rows.width;
+                order.extend(from..from + rows.width);
             }
-            start = end;
         }
         order
     }
@@ -322,11 +402,22 @@ impl Judge<'_> {
         set.iter().any(|member| self.effect(member) == effect)
     }
 
+    /// An effect beside a set where it passes every gate; the search asks again and again.
     fn passes(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let key = (self.columns(set), effect);
+        if let Some(known) = self.passed.borrow().get(&key) {
+            return known.clone();
+        }
+        let found = self.passes_anew(set, effect);
+        self.passed.borrow_mut().insert(key, found.clone());
+        found
+    }
+
+    fn passes_anew(&self, set: &[Member], effect: Effect) -> Option<Judged> {
         let judged = self.judge(set, effect).filter(|judged| judged.refused.is_none())?;
         let mut whole = set.to_vec();
         whole.push(judged.member.clone());
-        let (real, placebo) = self.beats_placebos(&whole, &judged.member)?;
+        let (real, placebo) = self.placebo_gains(&whole, &judged.member)?;
         (real > 1.05 * placebo).then_some(judged)
     }
 
@@ -445,16 +536,7 @@ impl Judge<'_> {
 
     /// The best form of an effect beside a set by least squares alone.
     fn judge_quick(&self, set: &[Member], effect: Effect) -> Option<Member> {
-        let base = self.columns(set);
-        let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
-        let best = forms
-            .filter_map(|(index, candidate)| {
-                let mut columns = base.clone();
-                columns.extend(candidate.columns.iter().map(|(column, _)| *column));
-                Some((self.design.solve(&columns)?.1, index))
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Member { candidate: best.1, columns: self.design.candidates[best.1].columns.clone() })
+        Some(self.whole(self.ranked(set, effect)?.first()?.1))
     }
 
     /// Sets in which one effect is exchanged that explain as much within two standard errors, with no more numbers.
@@ -469,8 +551,8 @@ impl Judge<'_> {
             let explained = (without - fitted.loss).max(0.0);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
                 let Some(judged) = self.passes(&others, effect) else { continue };
-                // what needs more numbers to say the same is no rival
-                if self.numbers(&judged.member) > self.numbers(&out) {
+                // what needs many more numbers to say the same is no rival
+                if self.numbers(&judged.member) > self.numbers(&out) + 1 {
                     continue;
                 }
                 let mut rival = others.clone();
@@ -499,12 +581,14 @@ impl Judge<'_> {
 
     /// Two rivals together, where each is significant beside the other.
     fn both(&self, ours: Effect, theirs: Effect) -> Option<Vec<Member>> {
-        let significant =
-            |judged: &Judged| !matches!(judged.refused, Some(refused) if refused != Refusal::SmallShare);
-        let a = self.judge(&[], ours)?;
-        let b = self.judge(std::slice::from_ref(&a.member), theirs).filter(significant)?;
-        let a = self.judge(std::slice::from_ref(&b.member), ours).filter(significant)?;
-        let mut both = vec![a.member, b.member];
+        let significant = |set: &[Member], effect: Effect| {
+            let judged = self.judge_ranked(set, &self.ranked(set, effect)?)?;
+            matches!(judged.refused, None | Some(Refusal::SmallShare)).then_some(judged.member)
+        };
+        let a = self.judge(&[], ours)?.member;
+        let b = significant(&[a], theirs)?;
+        let a = significant(std::slice::from_ref(&b), ours)?;
+        let mut both = vec![a, b];
         both.sort_by_key(|member| self.effect(member));
         Some(both)
     }
@@ -512,7 +596,8 @@ impl Judge<'_> {
     /// Numbers that a member was fitted with, nonlinear ones included.
     fn numbers(&self, member: &Member) -> usize {
         let shape = match self.effect(member) {
-            Effect::SensorBiasStep => 1,
+            // when, and whether in a trial or between trials
+            Effect::SensorBiasStep => 2,
             // time constant, frequency, and what it remembers
             Effect::WaveMemory => 3,
             effect => effect.shape_names().len(),
@@ -559,24 +644,25 @@ impl Judge<'_> {
     }
 }
 
-/// Gain of columns that are no part of the design beside a base of which `residual` is what it leaves.
-fn projected(design: &Design, base: &[usize], columns: &[DVector<f64>], residual: &DVector<f64>) -> f64 {
-    let inverse = design.inverse(base);
-    let mut clean: Vec<DVector<f64>> = Vec::new();
-    for column in columns {
-        let mut column = column.clone();
-        if let Some(inverse) = inverse.as_ref().filter(|_| !base.is_empty()) {
-            let cross =
-                DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&column)));
-            let weights = inverse * cross;
-            base.iter().enumerate().for_each(|(i, &c)| column.axpy(-weights[i], &design.x.column(c), 1.0));
-        }
-        clean.push(column);
+/// Standard deviation of a coefficient between trials beyond what noise explains, by moments (DerSimonian and Laird,
+/// Controlled Clinical Trials 1986); 0 where its excess is as likely chance.
+fn scatter(design: &Design, columns: &[usize], beta: &DVector<f64>, index: usize) -> f64 {
+    let residual = design.residual(columns, beta);
+    let x = design.x.column(columns[index]);
+    let noise = residual.norm_squared() / residual.len().max(1) as f64;
+    let trials: Vec<(f64, f64)> = design
+        .rows
+        .of_trial
+        .iter()
+        .map(|rows| rows.clone().fold((0.0, 0.0), |(xx, xr), r| (xx + x[r] * x[r], xr + x[r] * residual[r])))
+        .filter(|(xx, _)| *xx > 0.0)
+        .collect();
+    let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), (xx, _)| (s + xx, q + xx * xx));
+    let freedom = trials.len().max(2) as f64 - 1.0;
+    let excess =
+        trials.iter().map(|(xx, xr)| xr * xr / xx).sum::<f64>() / noise.max(f64::MIN_POSITIVE) - freedom;
+    if excess < 5.0 * (2.0 * freedom).sqrt() {
+        return 0.0;
     }
-    let count = clean.len();
-    let ridge = 1e-9 * clean.iter().map(DVector::norm_squared).fold(0.0, f64::max);
-    let xx =
-        DMatrix::from_fn(count, count, |i, j| clean[i].dot(&clean[j]) + if i == j { ridge } else { 0.0 });
-    let xy = DVector::from_iterator(count, clean.iter().map(|column| column.dot(residual)));
-    xx.cholesky().map_or(0.0, |factor| xy.dot(&factor.solve(&xy)))
+    (excess * noise / (sum - squares / sum).max(f64::MIN_POSITIVE)).sqrt()
 }

@@ -3,12 +3,12 @@
 use std::ops::Range;
 
 use super::measurement::{measured, other_force};
-use super::statistics::white_variance;
+use super::rates::{Coherence, accelerations, smooth_accelerations, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
 use crate::frame::Vec3;
-use crate::signal::{SavitzkyGolay, pieces};
+use crate::signal::pieces;
 use crate::trials::{Trial, Trials, WRENCH};
 use crate::wrench::Wrench;
 
@@ -31,8 +31,11 @@ pub(super) struct Series {
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one.
     pub other: Vec<[f64; 6]>,
-    /// Noise that is left in the acceleration, the angular acceleration and the wetting rate: variance of a sample.
-    pub rate_noise: [f64; 7],
+    /// Noise that is left in the acceleration and the angular acceleration: an estimate of the variance of a sample, which
+    /// scatters about 0 where there is none.
+    pub rate_noise: [f64; 6],
+    /// Accelerations, angular accelerations, wetting rate and angular velocities: how far each hangs together.
+    pub coherence: [Coherence; 10],
     /// Samples of each bin.
     pub bins: Vec<Range<usize>>,
     /// Bins of each run without a hole.
@@ -140,9 +143,20 @@ fn of_trial(
         immersions.push(immersion);
         conditions.push(condition);
     }
-    let mut rate_noise = [0.0; 7];
-    smooth_accelerations(&trial.t, &mut conditions, &mut rate_noise);
-    let wetting_rate = wetting_rate(&trial.t, &trial.depth, &mut rate_noise[6]);
+    // before anything is smoothed, or noise would hang together as well
+    let mut coherence = [Coherence::default(); 10];
+    for axis in 0..3 {
+        coherence[axis] = Coherence::of(&trial.t, |i| conditions[i].acceleration[axis]);
+        coherence[axis + 3] = Coherence::of(&trial.t, |i| conditions[i].angular_acceleration[axis]);
+        coherence[axis + 7] = Coherence::of(&trial.t, |i| conditions[i].angular_velocity[axis]);
+    }
+    smooth_accelerations(&trial.t, &mut conditions);
+    let rate_noise = std::array::from_fn(|rate| {
+        let squares = conditions.iter().map(|c| accelerations(c)[rate].powi(2)).sum::<f64>();
+        squares / count.max(1) as f64 - coherence[rate].signal
+    });
+    let wetting_rate = wetting_rate(&trial.t, &trial.depth);
+    coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
     let other: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| other_force(trial, c));
     let gap = (0..count).map(|i| {
         std::array::from_fn(|c| match (&measured[c], present[c]) {
@@ -157,6 +171,7 @@ fn of_trial(
         other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
         wetting_rate,
         rate_noise,
+        coherence,
         wheels: (0..count)
             .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
             .collect(),
@@ -171,76 +186,6 @@ fn of_trial(
         runs,
     };
     Ok((series, present))
-}
-
-/// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
-const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
-
-/// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
-fn smooth_accelerations(t: &[f64], conditions: &mut [Condition], noise: &mut [f64; 7]) {
-    let pieces = pieces(t);
-    for (angular, axis) in
-        [false, true].into_iter().flat_map(|angular| (0..3).map(move |axis| (angular, axis)))
-    {
-        let read = |c: &Condition| if angular { c.angular_acceleration[axis] } else { c.acceleration[axis] };
-        let values: Vec<f64> = conditions.iter().map(read).collect();
-        let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
-        let white = white_variance(&values);
-        let left = &mut noise[axis + if angular { 3 } else { 0 }];
-        *left = white;
-        let share = white / power.max(f64::MIN_POSITIVE);
-        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else {
-            continue;
-        };
-        for piece in &pieces {
-            let span = t[piece.end - 1] - t[piece.start];
-            let step = span / (piece.len().max(2) - 1) as f64;
-            let odd = (piece.len() - 1) / 2 * 2 + 1;
-            let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
-            // the middle weight of a parabola over w samples is about 9 / 4w, and so is its gain of variance
-            *left = white * (2.25 / window as f64).min(1.0);
-            let smooth = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
-            for (sample, value) in piece.clone().zip(smooth.into_iter().flatten()) {
-                let condition = &mut conditions[sample];
-                if angular {
-                    condition.angular_acceleration[axis] = value;
-                } else {
-                    condition.acceleration[axis] = value;
-                }
-            }
-        }
-    }
-}
-
-/// Rate of the depth, smoothed over at most a third of a second: noise must not look like entry, nor smoothing take its
-/// peak off.
-fn wetting_rate(t: &[f64], depth: &[f64], noise: &mut f64) -> Vec<f64> {
-    let mut rate = Vec::with_capacity(t.len());
-    for piece in pieces(t) {
-        let (times, depth) = (&t[piece.clone()], &depth[piece]);
-        let count = times.len();
-        let step = (times[count - 1] - times[0]) / (count.max(2) - 1) as f64;
-        let window = rate_window(depth, step).min((count.max(1) - 1) / 2 * 2 + 1);
-        *noise = white_variance(depth) * 12.0 / (window as f64).powi(3) / (step * step).max(1e-12);
-        // jitter of the stamps moves the rate by less than noise does
-        let derivative = SavitzkyGolay::new(window, 2.min(window.saturating_sub(1)))
-            .and_then(|filter| filter.derivative(depth, 1, step))
-            .unwrap_or_else(|_| vec![0.0; count]);
-        rate.extend(derivative);
-    }
-    rate
-}
-
-/// Samples of the window whose noise is a fiftieth of the fastest rate.
-fn rate_window(depth: &[f64], step: f64) -> usize {
-    let longest = ((0.33 / step.max(1e-6)) as usize).clamp(5, 101);
-    let change =
-        depth.windows(longest.min(depth.len())).map(|w| (w[w.len() - 1] - w[0]).abs()).fold(0.0, f64::max);
-    let fastest = change / (step * longest as f64);
-    // the slope of a window of w samples has the variance 12 / w^3 of that of a sample
-    let noise = white_variance(depth).sqrt() / step.max(1e-6);
-    let needed = (12.0 * (noise / (0.02 * fastest).max(1e-9)).powi(2)).cbrt();
-    (needed.min(1e3) as usize).clamp(5, longest) | 1
 }
 
 /// Bins of about `length` within each run without a hole; at least one sample each.

@@ -274,7 +274,7 @@ impl Scene<'_> {
                 draft: DRAFT,
                 mass: hull.mass,
                 displaced_volume: hull.volume(DRAFT),
-                center_of_mass: hull.center_of_mass.into(),
+                center_of_mass: (hull.center_of_mass - Vec3::z() * (hull.z0 + 0.5 * DRAFT)).into(),
             }),
         }
     }

@@ -39,6 +39,8 @@ pub struct Hull {
 pub(super) struct Strip {
     /// Its middle from the center of mass, along x [m].
     pub x: f64,
+    /// The middle of its wet height from the center of mass, along z [m].
+    pub z: f64,
     /// Length along x [m].
     pub dx: f64,
     /// Local water depth above the ground-contact plane [m]; not below 0.
@@ -113,7 +115,8 @@ impl Hull {
             // positive pitch lowers the nose
             let draft = (state.depth + raise + x * slope).clamp(0.0, self.height);
             let beam = if draft > 0.0 { self.width * self.filled(draft) / draft } else { 0.0 };
-            Strip { x: x - self.center_of_mass.x, dx, draft, beam }
+            let z = self.z0 + 0.5 * draft - self.center_of_mass.z;
+            Strip { x: x - self.center_of_mass.x, z, dx, draft, beam }
         })
     }
 

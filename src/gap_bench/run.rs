@@ -26,6 +26,9 @@ pub enum ToolError {
     /// The report is not what it should be.
     #[error("report.json: {0}")]
     Report(#[from] serde_json::Error),
+    /// The tool refused the trials.
+    #[error(transparent)]
+    Refused(Box<dyn std::error::Error + Send + Sync>),
     /// The command ended with a failure.
     #[error("the command ended with {status}: {stderr}")]
     Failed {

@@ -94,7 +94,7 @@ pub struct Body {
     pub mass: f64,
     /// Volume under water [m3].
     pub displaced_volume: f64,
-    /// Center of mass, body frame [m].
+    /// Center of mass, from a point amidships half a draft above the ground-contact plane [m].
     pub center_of_mass: [f64; 3],
 }
 

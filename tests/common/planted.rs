@@ -273,7 +273,7 @@ pub fn planted(name: &str, motion: &[State]) -> Vec<[f64; 6]> {
             "sensor_bias" => [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             "sensor_drift" => [s.t, 0.0, 0.0, 0.0, 0.0, 0.0],
             "sensor_gain" => [sim[0], 0.0, 0.0, 0.0, 0.0, 0.0],
-            "axis_misalignment" => [sim[2], 0.0, -sim[0], 0.0, 0.0, 0.0],
+            "axis_misalignment" => [-sim[2], 0.0, sim[0], 0.0, 0.0, 0.0],
             "outside_sine" => [0.0, 0.0, (7.0 * s.v.x).sin(), 0.0, 0.0, (5.0 * s.v.x).cos()],
             _ => [0.0; 6],
         };

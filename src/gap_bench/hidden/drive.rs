@@ -1,10 +1,11 @@
 //! Faults of a wrench that is inferred from motion, `m a` less the force of the drive.
 //!
 //! A driven body obeys `m a = D + F + R` with the drive's force D, the water's F and the rolling resistance R. What is
-//! inferred is `m' a - D'` with the mass and the drive force that were stated.
+//! inferred is `m' a - D'` with the mass and the drive force that were stated. On a slope the weight along it belongs to
+//! `a`.
 
 use super::{Effect, Hidden, Setting};
-use crate::frame::GRAVITY;
+use crate::frame::{GRAVITY, up_from_roll_pitch};
 use crate::gap_bench::{Track, Wrench6};
 
 /// Speed over which rolling resistance changes sign [m/s].
@@ -25,7 +26,10 @@ pub(super) fn change(hidden: &Hidden, setting: &Setting, track: &Track, wrench: 
                 let drive = mass * a.x - water[0];
                 Wrench6::x() * (drive * hidden.size / (1.0 + hidden.size))
             }
-            _ => Wrench6::new(a.x, a.y, 0.0, 0.0, 0.0, 0.0) * hidden.size,
+            _ => {
+                let weight = up_from_roll_pitch(state.attitude[0], state.attitude[1]).scale(GRAVITY);
+                Wrench6::new(a.x + weight.x, a.y + weight.y, 0.0, 0.0, 0.0, 0.0) * hidden.size
+            }
         }
     });
     change.collect()

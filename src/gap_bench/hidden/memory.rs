@@ -2,12 +2,13 @@
 
 use super::{Hidden, Setting};
 use crate::frame::Vec3;
+use crate::gap_bench::hull::wrench;
 use crate::gap_bench::{Track, Wrench6};
 
 /// Draft at which the kernel is as stated; it is proportional to the draft [m].
-const DRAFT: f64 = 0.2;
+pub(super) const DRAFT: f64 = 0.2;
 /// Sway and heave over surge.
-const RATIO: [f64; 3] = [1.0, 1.5, 1.2];
+pub(super) const RATIO: [f64; 3] = [1.0, 1.5, 1.2];
 
 /// Retardation function `exp(-a t) (cos b t - a / b sin b t)`, whose integral is 0: steady motion radiates nothing.
 pub(super) fn kernel(t: f64, a: f64, b: f64) -> f64 {
@@ -21,12 +22,13 @@ pub(super) fn convolution(hidden: &Hidden, setting: &Setting, track: &Track) -> 
     let [a, b, _] = hidden.shape;
     let velocity: Vec<Vec3> = track.states.iter().map(|state| state.velocity).collect();
     let remembered = remembered(&velocity, track.step, a, b);
-    let wrench = remembered.iter().zip(&track.states).map(|(v, state)| {
+    let loads = remembered.iter().zip(&track.states).map(|(v, state)| {
         let draft = state.depth.clamp(0.0, setting.simulator.hull.height);
         let force = -v.component_mul(&Vec3::from(RATIO)) * (hidden.size * draft / DRAFT);
-        Wrench6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0)
+        let hull = setting.simulator.hull;
+        wrench(force, Vec3::z() * (hull.z0 + 0.5 * draft) - hull.center_of_mass)
     });
-    wrench.collect()
+    loads.collect()
 }
 
 fn remembered(velocity: &[Vec3], step: f64, a: f64, b: f64) -> Vec<Vec3> {

@@ -1,8 +1,9 @@
-//! Loads by strips along the length: each moves with its own velocity `v + r x`.
+//! Loads by strips along the length: each moves with its own velocity `v + r x` and is loaded at the middle of its wet
+//! height.
 
 use super::{Hidden, Setting};
 use crate::frame::Vec3;
-use crate::gap_bench::hull::Strip;
+use crate::gap_bench::hull::{Strip, wrench};
 use crate::gap_bench::simulator::DRAG;
 use crate::gap_bench::track::DENSITY;
 use crate::gap_bench::{State, Track, Wrench6};
@@ -41,16 +42,15 @@ pub(super) fn added_mass(hidden: &Hidden, setting: &Setting, track: &Track) -> V
 /// Linear and angular momentum of the water that moves with the body, about its center of mass.
 fn momenta(strips: &[Strip], volume: f64, state: &State) -> (Vec3, Vec3) {
     let (v, omega) = (state.velocity, state.angular_velocity);
-    let mut sum = (Vec3::new(SURGE_SHARE * DENSITY * volume * v.x, 0.0, 0.0), Vec3::zeros());
+    let along = SURGE_SHARE * DENSITY * volume / strips.len() as f64;
+    let mut sum = (Vec3::zeros(), Vec3::zeros());
     for strip in strips {
         let [side, down] = section_mass(strip);
-        let p = Vec3::new(
-            0.0,
-            side * strip.dx * (v.y + omega.z * strip.x),
-            down * strip.dx * (v.z - omega.y * strip.x),
-        );
+        let place = Vec3::new(strip.x, 0.0, strip.z);
+        let mass = Vec3::new(along, side * strip.dx, down * strip.dx);
+        let p = mass.component_mul(&(v + omega.cross(&place)));
         sum.0 += p;
-        sum.1 += Vec3::new(strip.x, 0.0, 0.0).cross(&p);
+        sum.1 += place.cross(&p);
     }
     sum
 }
@@ -65,7 +65,7 @@ pub(super) fn linear_damping(hidden: &Hidden, setting: &Setting, track: &Track) 
             let per_length = hidden.size * strip.draft * strip.dx;
             let side = -per_length * (v.y + r * strip.x);
             let along = -per_length * hull.width / hull.length * v.x;
-            sum += Wrench6::new(along, side, 0.0, 0.0, 0.0, strip.x * side);
+            sum += wrench(Vec3::new(along, side, 0.0), Vec3::new(strip.x, 0.0, strip.z));
         }
         sum
     };
@@ -91,7 +91,7 @@ pub(super) fn rotation(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec
             let area = strip.draft * strip.beam / hull.width * strip.dx;
             let local = v + r * strip.x;
             let side = -0.5 * DENSITY * DRAG[1] * hidden.size * area * (local * local.abs() - v * v.abs());
-            sum += Wrench6::new(0.0, side, 0.0, 0.0, 0.0, strip.x * side);
+            sum += wrench(Vec3::new(0.0, side, 0.0), Vec3::new(strip.x, 0.0, strip.z));
         }
         sum
     };

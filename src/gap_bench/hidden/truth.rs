@@ -1,6 +1,8 @@
 //! The planted parameters, as a tool may state them.
 
 use super::{Effect, Hidden, Setting};
+use crate::frame::GRAVITY;
+use crate::gap_bench::simulator::DRAG;
 use crate::gap_bench::track::DENSITY;
 use crate::gap_bench::{State, Track};
 
@@ -27,16 +29,27 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
             let per_area = Parameter { names: &["b", "coefficient"], unit: "N s/m3", value: size };
             let along =
                 Parameter { names: &["b_x", "surge", "coefficient_x"], unit: "N s/m", value: damping };
-            vec![per_area, along]
+            // over the density, the speed of waves as long as the body, and both sides that look along the motion
+            let waves = (GRAVITY * setting.simulator.hull.length).sqrt();
+            let number = Parameter { names: &["surge"], unit: "1", value: size / (2.0 * DENSITY * waves) };
+            vec![per_area, along, number]
         }
-        Effect::DragCoefficientError => one(&["relative_error", "share", "factor", "error"], "1", size),
-        Effect::Rotation => one(&["coefficient", "factor", "scale"], "1", size),
+        Effect::DragCoefficientError => {
+            let share =
+                Parameter { names: &["relative_error", "share", "factor", "error"], unit: "1", value: size };
+            let coefficient = |names, of: f64| Parameter { names, unit: "1", value: size * of };
+            vec![share, coefficient(&["surge"], DRAG[0]), coefficient(&["sway"], DRAG[1])]
+        }
+        Effect::Rotation => {
+            let factor = Parameter { names: &["coefficient", "factor", "scale"], unit: "1", value: size };
+            vec![factor, Parameter { names: &["drag_coefficient"], unit: "1", value: size * DRAG[1] }]
+        }
         Effect::Current => {
             let along = |names, value| Parameter { names, unit: "m/s", value };
             let [direction, ..] = hidden.shape;
             vec![
-                along(&["x", "u_x", "current_x", "cx", "u"], size * direction.cos()),
-                along(&["y", "u_y", "current_y", "cy", "v"], size * direction.sin()),
+                along(&["x", "u_x", "current_x", "cx", "u", "east"], size * direction.cos()),
+                along(&["y", "u_y", "current_y", "cy", "v", "north"], size * direction.sin()),
             ]
         }
         Effect::WaterLevelOffset => one(&["offset", "level", "water_level"], "m", size),
@@ -54,14 +67,23 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
                 unit: "m2",
                 value: size * hull.length * hull.width,
             };
-            let share = Parameter { names: &["share", "permeability", "fraction"], unit: "1", value: size };
+            let share = Parameter {
+                names: &["share", "permeability", "fraction", "flooded_share"],
+                unit: "1",
+                value: size,
+            };
             vec![area, share]
         }
         Effect::WaterEntrySlamming => one(&["coefficient", "c_s", "factor"], "1", size),
-        Effect::WaveMemory => one(&["k0", "kernel", "stiffness"], "N/m", size),
-        Effect::ChannelBlockage | Effect::Squat => one(&["coefficient", "factor", "scale"], "1", size),
+        Effect::WaveMemory => wave_memory(size, setting),
+        Effect::ChannelBlockage => one(&["coefficient", "factor", "scale", "strength"], "1", size),
+        Effect::Squat => one(&["coefficient", "factor", "scale"], "1", size),
         Effect::WheelPaddleThrust => one(&["lug_coefficient"], "1", size),
-        Effect::BedMotion => one(&["coefficient", "drag", "c_x"], "1", size),
+        Effect::BedMotion => {
+            // it pushes forward: a drag that is taken away
+            let push = Parameter { names: &["coefficient", "c_x"], unit: "1", value: size };
+            vec![push, Parameter { names: &["drag"], unit: "1", value: -size }]
+        }
         Effect::SensorDelay => one(&["delay", "tau", "time"], "s", size),
         Effect::SensorBias | Effect::SensorBiasStep => {
             one([&["fx", "bias_fx"], &["fy", "bias_fy"], &["fz", "bias_fz"]][component(hidden)], "N", size)
@@ -74,7 +96,9 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
         Effect::SensorGain => {
             let error = Parameter { names: &["error", "relative_error", "share"], unit: "1", value: size };
             let gain = Parameter { names: &["gain"], unit: "1", value: 1.0 + size };
-            vec![error, gain]
+            let names: &[&str] =
+                if hidden.shape[0] < 0.0 { &["all"] } else { [&["fx"], &["fy"], &["fz"]][component(hidden)] };
+            vec![error, gain, Parameter { names, unit: "1", value: size }]
         }
         Effect::AxisMisalignment => one(&["pitch", "angle_y", "y", "about_y"], "rad", size),
         Effect::RollingResistance => one(&["coefficient", "c_rr"], "1", size),
@@ -83,13 +107,30 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
             let gain = Parameter { names: &["gain"], unit: "1", value: 1.0 + size };
             vec![error, gain]
         }
-        Effect::MassError => one(&["mass", "error", "difference"], "kg", size),
+        Effect::MassError => {
+            let stated = Parameter { names: &["mass", "error", "difference"], unit: "kg", value: size };
+            // what is stated is too much, so that the truth is less
+            let relative = -size / setting.simulator.hull.mass;
+            vec![stated, Parameter { names: &["relative_error"], unit: "1", value: relative }]
+        }
         Effect::VortexShedding
         | Effect::Tether
         | Effect::ThermalGain
         | Effect::MudSuction
         | Effect::Seiche => Vec::new(),
     }
+}
+
+/// The kernel at the draft for which it is stated, and over the weight of the water displaced there and the length.
+fn wave_memory(size: f64, setting: &Setting) -> Vec<Parameter> {
+    let hull = setting.simulator.hull;
+    let number = size * hull.length / (DENSITY * GRAVITY * hull.volume(super::memory::DRAFT));
+    let [surge, sway, _] = super::memory::RATIO.map(|ratio| ratio * number);
+    vec![
+        Parameter { names: &["k0", "kernel", "stiffness"], unit: "N/m", value: size },
+        Parameter { names: &["surge"], unit: "1", value: surge },
+        Parameter { names: &["sway"], unit: "1", value: sway },
+    ]
 }
 
 fn component(hidden: &Hidden) -> usize {

@@ -1,0 +1,382 @@
+//! The report of what was found.
+
+use std::collections::BTreeMap;
+
+use sha2::{Digest, Sha256};
+
+use super::candidates::Setting;
+use super::design::Design;
+use super::detect::{self, Excitation};
+use super::experiment::separating;
+use super::fit::{Fit, Parameter, fit};
+use super::holdout::{closures, explained, worse};
+use super::noise::{Floor, floors_of};
+use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
+use super::select::{Judge, Member};
+use super::series::Series;
+use super::statistics::quantile;
+use super::verdict::{Found, STRUCTURE};
+use super::{Named, locate};
+use crate::condition::Condition;
+use crate::effects::{self, Effect, Kind, Memory, Part};
+use crate::trials::{Trials, WRENCH};
+
+fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
+    let mut values = fit.values.iter();
+    members
+        .iter()
+        .map(|member| {
+            let candidate = &design.candidates[member.candidate];
+            let coefficients = member
+                .columns
+                .iter()
+                .map(|&(_, coefficient)| (coefficient, values.next().copied().unwrap_or(0.0)))
+                .collect();
+            Named { effect: candidate.effect, shape: candidate.shape, coefficients }
+        })
+        .collect()
+}
+
+pub(super) fn compose(
+    trials: &Trials,
+    all: &[Series],
+    judge: &Judge,
+    found: Found,
+    held: Vec<usize>,
+    library: &[Effect],
+) -> Report {
+    let (design, setting, config) = (judge.design, judge.setting, judge.config);
+    let fitted = fit(design, &found.members, all, setting, config);
+    // nothing that does not fit is applied or shown as if it did
+    let holds = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
+    let named = match &fitted {
+        Some(fitted) if holds => named(design, &found.members, fitted),
+        _ => Vec::new(),
+    };
+    let effects = match &fitted {
+        Some(fitted) if holds => named_effects(judge, &found, &named, fitted, all),
+        _ => Vec::new(),
+    };
+    let gap_excess = |trial: usize| excess(all, design, setting, trial);
+    let (regions, regions_tried) = match found.verdict {
+        Verdict::NothingMissing => (Vec::new(), 0),
+        _ => locate::locate(all, &design.trials, gap_excess, config),
+    };
+    let excitation =
+        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &config.library, config);
+    let not_testable = excitation.iter().filter_map(not_testable).collect();
+    let alternatives: Vec<Vec<&'static str>> = match holds {
+        true => found.alternatives.iter().map(|set| names(judge, set)).collect(),
+        false => Vec::new(),
+    };
+    let separating_experiment = found.alternatives.first().filter(|_| holds).map(|rival| {
+        let effects = |set: &[Member]| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
+        separating(&effects(&found.members), &effects(rival))
+    });
+    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
+    let unexplained = unexplained(judge, &found);
+    let gap = GapReport {
+        held_out: closures(&named, all, &held, setting, &held_floors, config),
+        size: detect::sizes(all, judge.floors, &setting.components, config),
+        shares: shares(judge, &found),
+        floors: setting.components.iter().map(|&c| (WRENCH[c], judge.floors[c])).collect(),
+        worse_regions: worse(&named, all, &held, setting, judge.floors, &regions),
+        held_out_trials: held.iter().map(|&trial| all[trial].name.clone()).collect(),
+        unexplained,
+    };
+    let mut report = Report {
+        verdict: found.verdict,
+        summary: String::new(),
+        vehicle: trials.manifest.vehicle.clone(),
+        generated: trials.manifest.generated.clone(),
+        rejected: rejected(judge, &found, library),
+        effects,
+        alternatives,
+        separating_experiment,
+        not_testable,
+        regions,
+        regions_tried,
+        gap,
+        excitation,
+        validity: validity(all),
+        base_drag: setting.base_drag.into(),
+        trials: all.len(),
+        samples: all.iter().map(|s| s.t.len()).sum(),
+        remarks: trials.remarks().iter().map(ToString::to_string).collect(),
+        sources: Sources { trials: hash(trials), ..Sources::default() },
+        traces: traces(&named, all, &held, setting, judge.floors),
+    };
+    report.summary = summary(&report);
+    report
+}
+
+fn names(judge: &Judge, set: &[Member]) -> Vec<&'static str> {
+    set.iter().map(|member| judge.effect(member).name()).collect()
+}
+
+fn named_effects(
+    judge: &Judge,
+    found: &Found,
+    named: &[Named],
+    fitted: &Fit,
+    all: &[Series],
+) -> Vec<NamedEffect> {
+    let design = judge.design;
+    let whole = (design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let mut first = 0;
+    let mut effects = Vec::new();
+    for (index, (member, one)) in found.members.iter().zip(named).enumerate() {
+        let count = member.columns.len();
+        let others: Vec<Member> =
+            found.members.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, m)| m.clone()).collect();
+        let without = design.solve(&judge.columns(&others)).map_or(found.loss, |(_, loss)| loss);
+        let placebo = judge.placebo_gains(&found.members, member).unwrap_or_default();
+        let specs = one.effect.coefficients();
+        let mut parameters = BTreeMap::new();
+        for (i, &(coefficient, value)) in one.coefficients.iter().enumerate() {
+            let spec = &specs[coefficient];
+            let std = fitted.covariance[(first + i, first + i)].max(0.0).sqrt();
+            let interval = fitted.intervals[first + i];
+            parameters.insert(
+                spec.name,
+                Parameter { value, std, unit: spec.unit, interval, literature: spec.literature },
+            );
+        }
+        for (axis, &(name, unit)) in one.effect.shape_names().iter().enumerate() {
+            let (value, std) = (one.shape[axis], fitted.shape_std[index][axis]);
+            let interval = [value - 1.645 * std, value + 1.645 * std];
+            parameters.insert(name, Parameter { value, std, unit, interval, literature: None });
+        }
+        effects.push(NamedEffect {
+            name: one.effect.name(),
+            kind: one.effect.kind(),
+            parameters,
+            share_of_gap: ((without - found.loss) / whole).clamp(0.0, 1.0),
+            provisional: fitted.provisional[index],
+            placebo: [placebo.0, placebo.1],
+            surfaces: surfaces(one, all, judge.setting),
+            covariance: (0..count)
+                .map(|i| (0..count).map(|j| fitted.covariance[(first + i, first + j)]).collect())
+                .collect(),
+            coefficients: one.coefficients.iter().map(|&(c, _)| specs[c].name).collect(),
+            effect: one.effect,
+            shape: one.shape,
+        });
+        first += count;
+    }
+    effects
+}
+
+/// Shares of the load of an effect by surface, over a sample of the bins; what acts on the hull as a whole is `hull`.
+fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String, f64> {
+    let mut loads: BTreeMap<String, f64> = BTreeMap::new();
+    if named.effect.kind() != Kind::Physics {
+        return loads;
+    }
+    for series in all {
+        let mut memory = Memory::default();
+        for (index, bin) in series.bins.iter().enumerate() {
+            let input = series.input(bin.start, setting.body, setting.base_drag, setting.channel_width);
+            if index > 0 {
+                let dt = series.t[bin.start] - series.t[series.bins[index - 1].start];
+                effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
+            }
+            effects::basis(named.effect, &named.shape, &memory, &input, |coefficient, part, load| {
+                let value =
+                    named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
+                let name = match part {
+                    Part::Panel(panel) => setting.body.panels[panel].name.clone(),
+                    Part::Hull => "hull".to_owned(),
+                };
+                *loads.entry(name).or_default() += (load.force * value).norm();
+            });
+        }
+    }
+    let whole: f64 = loads.values().sum();
+    loads.retain(|_, load| *load > 0.01 * whole);
+    loads.values_mut().for_each(|load| *load /= whole.max(f64::MIN_POSITIVE));
+    loads
+}
+
+fn rejected(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Rejected> {
+    let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let share = |gain: f64| (gain / whole).clamp(0.0, 1.0);
+    let free = library.iter().filter(|effect| !found.members.iter().any(|m| judge.effect(m) == **effect));
+    let mut all: Vec<Rejected> = free
+        .filter_map(|&effect| {
+            let beside = judge.judge(&found.members, effect)?;
+            let alone = judge.judge(&[], effect)?;
+            let (why, name) = (beside.refused, effect.name());
+            Some(Rejected { name, why, share_of_gap: share(beside.gain), share_alone: share(alone.gain) })
+        })
+        .collect();
+    all.sort_by(|a, b| b.share_alone.total_cmp(&a.share_alone).then(a.name.cmp(b.name)));
+    all
+}
+
+fn not_testable(excitation: &Excitation) -> Option<NotTestable> {
+    let why = excitation.not_testable.clone()?;
+    Some(NotTestable {
+        name: excitation.name,
+        why,
+        minimum_detectable: excitation.minimum_detectable.clone(),
+    })
+}
+
+fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
+    let whole = judge.design.empty_loss().max(f64::MIN_POSITIVE);
+    let holds = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
+    let loss = if holds { found.loss } else { judge.design.empty_loss() };
+    let noise = judge.floor_loss.min(loss) / whole;
+    let explained = (1.0 - loss / whole).max(0.0);
+    BTreeMap::from([
+        ("noise", noise),
+        ("explained", explained),
+        ("unexplained", (1.0 - noise - explained).max(0.0)),
+    ])
+}
+
+fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
+    let left = &found.left;
+    let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let share = left.gain / whole;
+    let matters = match found.verdict {
+        Verdict::NothingMissing => false,
+        Verdict::NoCandidateFits => true,
+        _ => left.deviate > STRUCTURE && share > 0.05,
+    };
+    if !matters {
+        return None;
+    }
+    let functions: Vec<String> =
+        left.strongest.iter().map(|(name, share)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
+    Some(format!(
+        "{:.0} % of the gap above the floor can be predicted from the state beyond the named effects; it goes most with {}",
+        (100.0 * share).clamp(0.0, 100.0),
+        functions.join(", ")
+    ))
+}
+
+/// Squared standardised gap of each bin less that of noise.
+fn excess(all: &[Series], design: &Design, setting: &Setting, trial: usize) -> Vec<f64> {
+    let series = &all[trial];
+    let mut sum = vec![0.0; series.bins.len()];
+    for &component in &setting.components {
+        let values = series.binned(|sample| series.gap[sample][component]);
+        for (sum, value) in sum.iter_mut().zip(values) {
+            *sum += (value / design.noise.bin[component]).powi(2) - 1.0;
+        }
+    }
+    sum
+}
+
+fn validity(all: &[Series]) -> BTreeMap<&'static str, [f64; 2]> {
+    type Quantity = fn(&Condition) -> f64;
+    let quantities: [(&'static str, Quantity); 5] = [
+        ("depth_m", |c| c.depth),
+        ("speed_mps", |c| c.velocity.norm()),
+        ("acceleration_mps2", |c| c.acceleration.norm()),
+        ("angular_speed_radps", |c| c.angular_velocity.norm()),
+        ("density_kgpm3", |c| c.density),
+    ];
+    let range = |of: Quantity| {
+        let mut values: Vec<f64> = all.iter().flat_map(|s| s.conditions.iter().map(of)).collect();
+        // single samples of noise do not widen what was tested
+        [quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995)]
+    };
+    quantities.into_iter().map(|(name, of)| (name, range(of))).collect()
+}
+
+/// Hash over all numbers, whatever the order of the trials.
+fn hash(trials: &Trials) -> String {
+    let mut sorted: Vec<_> = trials.trials.iter().collect();
+    sorted.sort_by(|a, b| a.name.cmp(&b.name));
+    let mut digest = Sha256::new();
+    digest.update(trials.manifest.to_toml());
+    for trial in sorted {
+        digest.update(&trial.name);
+        let columns = [&trial.t, &trial.depth, &trial.density, &trial.roll, &trial.pitch, &trial.yaw];
+        let measured = trial.measured.iter().chain(&trial.simulated).flatten();
+        for column in columns.into_iter().chain(measured).chain(trial.other_forces.values()) {
+            column.iter().for_each(|value| digest.update(value.to_le_bytes()));
+        }
+        for vectors in [&trial.velocity, &trial.angular_velocity, &trial.acceleration] {
+            vectors.iter().flat_map(|v| v.iter()).for_each(|value| digest.update(value.to_le_bytes()));
+        }
+    }
+    digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Bins of the trials with the largest gap in their worst component: of those that took no part, then of the others.
+fn traces(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    setting: &Setting,
+    floors: &[Floor; 6],
+) -> Vec<Trace> {
+    const MOST: usize = 2;
+    let mut worst: Vec<(f64, usize, usize)> = Vec::new();
+    for (trial, series) in all.iter().enumerate() {
+        let size = |&c: &usize| {
+            let squares = series.gap.iter().map(|gap| gap[c].powi(2)).sum::<f64>();
+            ((squares / series.gap.len() as f64).sqrt() / floors[c].total().max(1e-12), trial, c)
+        };
+        worst.extend(setting.components.iter().map(size).max_by(|a, b| a.0.total_cmp(&b.0)));
+    }
+    worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let (kept, others): (Vec<_>, Vec<_>) = worst.into_iter().partition(|(_, trial, _)| held.contains(trial));
+    let chosen = kept.into_iter().take(MOST).chain(others.into_iter().take(MOST));
+    chosen.map(|(_, trial, component)| trace(named, &all[trial], trial, component, setting, floors)).collect()
+}
+
+fn trace(
+    named: &[Named],
+    series: &Series,
+    trial: usize,
+    component: usize,
+    setting: &Setting,
+    floors: &[Floor; 6],
+) -> Trace {
+    let added = explained(named, series, trial, setting);
+    let samples = series.bins.iter().map(|bin| bin.len()).max().unwrap_or(1) as f64;
+    Trace {
+        trial: series.name.clone(),
+        component: WRENCH[component],
+        t: series.binned(|i| series.t[i] - series.t[0]),
+        before: series.binned(|i| series.gap[i][component]),
+        after: series.binned(|i| series.gap[i][component] - added[i][component]),
+        noise: floors[component].sample / samples.sqrt(),
+    }
+}
+
+fn summary(report: &Report) -> String {
+    let names = |effects: &[NamedEffect]| {
+        effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
+    };
+    let closed = report.gap.held_out.get("all").and_then(|all| all.closure);
+    let closed = closed.map_or_else(String::new, |c| {
+        format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c)
+    });
+    match report.verdict {
+        Verdict::NothingMissing => {
+            "Nothing is missing that these trials can show: the gap holds no structure beyond its noise."
+                .into()
+        }
+        Verdict::Named => format!("What is missing is {}.{closed}", names(&report.effects)),
+        Verdict::Ambiguous => format!(
+            "What is missing is {}, or {}: these trials cannot tell them apart.{closed}",
+            names(&report.effects),
+            report
+                .alternatives
+                .iter()
+                .map(|set| set.join(" and ").replace('_', " "))
+                .collect::<Vec<_>>()
+                .join(", or "),
+        ),
+        Verdict::NoCandidateFits => {
+            "There is a gap with structure, and no effect of the library explains it; nothing is applied."
+                .into()
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Parameters in which an effect is not linear: a current, a delay, a time to fill, a memory.
+
+use super::candidates::Setting;
+use super::design::Design;
+use super::select::Member;
+use super::series::Series;
+use crate::effects::{Effect, Shape};
+use crate::frame::GRAVITY;
+
+/// Sets the shapes that are estimates of the effect's own coefficients: a current, a delay.
+pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
+    for candidate in 0..design.candidates.len() {
+        if design.candidates[candidate].effect == Effect::Current {
+            iterate(design, all, setting, candidate, &[], 3);
+        }
+    }
+}
+
+/// Fixed point of a shape that is the effect's own estimate, beside other columns.
+fn iterate(
+    design: &mut Design,
+    all: &[Series],
+    setting: &Setting,
+    candidate: usize,
+    others: &[usize],
+    times: usize,
+) {
+    for _ in 0..times {
+        let own = design.candidates[candidate].columns.clone();
+        let columns: Vec<usize> =
+            own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
+        let Some((beta, _)) = design.solve(&columns) else { return };
+        let effect = design.candidates[candidate].effect;
+        let mut shape = design.candidates[candidate].shape;
+        for (index, &(column, coefficient)) in own.iter().enumerate() {
+            let [low, high] = effect.coefficients()[coefficient].bounds;
+            shape[coefficient] = (beta[index] / design.scale[column]).clamp(low, high);
+        }
+        design.reshape(all, setting, candidate, shape);
+    }
+}
+
+/// Fits the nonlinear parameters of the named effects beside each other.
+pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, members: &[Member]) {
+    for _ in 0..2 {
+        for index in 0..members.len() {
+            let others: Vec<usize> = members
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != index)
+                .flat_map(|(_, member)| member.columns.iter().map(|(column, _)| *column))
+                .collect();
+            let candidate = members[index].candidate;
+            match design.candidates[candidate].effect {
+                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, candidate, &others, 3),
+                Effect::HullFlooding | Effect::WaterEntrySlamming => {
+                    search(design, all, setting, &members[index], &others, &[0]);
+                }
+                Effect::WaveMemory => search(design, all, setting, &members[index], &others, &[0, 1]),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Coordinate search over the nonlinear parameters of a member, by factors that shrink.
+fn search(
+    design: &mut Design,
+    all: &[Series],
+    setting: &Setting,
+    member: &Member,
+    others: &[usize],
+    axes: &[usize],
+) {
+    const TRIES: usize = 8;
+    let coefficients: Vec<usize> = member.columns.iter().map(|(_, coefficient)| *coefficient).collect();
+    let loss = |shape: &Shape| design.loss_with(all, setting, member.candidate, shape, &coefficients, others);
+    let memory = design.candidates[member.candidate].effect == Effect::WaveMemory;
+    let shortest = if memory { 0.8 * (setting.body.length / GRAVITY).sqrt() } else { 0.0 };
+    let mut shape = design.candidates[member.candidate].shape;
+    let mut best = loss(&shape);
+    for step in [1.5, 1.15, 1.05, 1.015] {
+        for &axis in axes {
+            for factor in [step, 1.0 / step] {
+                for _ in 0..TRIES {
+                    let mut tried = shape;
+                    tried[axis] *= factor;
+                    // a frequency of zero has no factor
+                    if tried[axis] == shape[axis] || (axis == 0 && tried[0] < shortest) {
+                        break;
+                    }
+                    let found = loss(&tried);
+                    if found >= best {
+                        break;
+                    }
+                    (best, shape) = (found, tried);
+                }
+            }
+        }
+    }
+    design.reshape(all, setting, member.candidate, shape);
+}

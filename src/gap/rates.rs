@@ -1,0 +1,132 @@
+//! Rates of a motion that was differentiated: how much of them is signal, and smoothing where it is little.
+
+use super::statistics::white_variance;
+use crate::condition::Condition;
+use crate::signal::{SavitzkyGolay, pieces};
+
+/// Longer than the filters that differentiate a motion reach, shorter than a maneuver [s].
+const COHERENT: f64 = 0.35;
+/// Reach of two filters of nine samples, one on places and one on velocities, at the rate of a camera [s]; and that of one
+/// with the sample's own at slower rates.
+const REACH_S: f64 = 0.155;
+const REACH: usize = 11;
+/// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
+const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
+
+/// How a rate hangs together in time.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Coherence {
+    /// Sum of the squares.
+    pub power: f64,
+    /// Sum of the products [`COHERENT`] apart.
+    pub covariance: f64,
+    /// Mean square of the signal alone: the autocovariance beyond the reach `r` of the filters, back to 0 by a parabola,
+    /// `c(0) = c(r) + (c(r) - c(2 r)) / 3`, since the noise of one sample does not reach the other.
+    pub signal: f64,
+}
+
+impl Coherence {
+    /// Of the samples of a trial.
+    pub fn of(t: &[f64], value: impl Fn(usize) -> f64) -> Self {
+        let values: Vec<f64> = (0..t.len()).map(value).collect();
+        let step = (t[t.len() - 1] - t[0]) / (t.len().max(2) - 1) as f64;
+        let lag = |seconds: f64| (seconds / step.max(1e-6)).ceil() as usize;
+        let reach = lag(REACH_S).max(REACH);
+        let at = |lag: usize| {
+            let pairs = pieces(t).into_iter().flat_map(|piece| {
+                let values = &values[piece];
+                values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b)
+            });
+            pairs.fold((0.0, 0.0), |(sum, count), product| (sum + product, count + 1.0))
+        };
+        let mean = |(sum, count): (f64, f64)| sum / f64::max(count, 1.0);
+        let (near, far) = (mean(at(reach)), mean(at(2 * reach)));
+        let (power, count) = at(0);
+        let signal = (near + (near - far) / 3.0).clamp(0.0, power / f64::max(count, 1.0));
+        Self { power, covariance: at(lag(COHERENT)).0, signal }
+    }
+}
+
+/// Linear and angular acceleration in one row.
+pub(super) fn accelerations(condition: &Condition) -> [f64; 6] {
+    let (a, b) = (condition.acceleration, condition.angular_acceleration);
+    [a.x, a.y, a.z, b.x, b.y, b.z]
+}
+
+/// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
+pub(super) fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
+    let pieces = pieces(t);
+    for rate in 0..6 {
+        let values: Vec<f64> = conditions.iter().map(|c| accelerations(c)[rate]).collect();
+        let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
+        let share = white_variance(&values) / power.max(f64::MIN_POSITIVE);
+        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else {
+            continue;
+        };
+        for piece in &pieces {
+            let span = t[piece.end - 1] - t[piece.start];
+            let step = span / (piece.len().max(2) - 1) as f64;
+            let odd = (piece.len() - 1) / 2 * 2 + 1;
+            let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
+            let smooth = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
+            for (sample, value) in piece.clone().zip(smooth.into_iter().flatten()) {
+                let condition = &mut conditions[sample];
+                match rate {
+                    0..3 => condition.acceleration[rate] = value,
+                    _ => condition.angular_acceleration[rate - 3] = value,
+                }
+            }
+        }
+    }
+}
+
+/// Rate of the depth [m/s], smoothed over at most a third of a second: noise must not look like entry, nor smoothing take
+/// its peak off.
+pub(super) fn wetting_rate(t: &[f64], depth: &[f64]) -> Vec<f64> {
+    let mut rate = Vec::with_capacity(t.len());
+    for piece in pieces(t) {
+        let (times, depth) = (&t[piece.clone()], &depth[piece]);
+        let count = times.len();
+        let step = (times[count - 1] - times[0]) / (count.max(2) - 1) as f64;
+        let window = rate_window(depth, step).min((count.max(1) - 1) / 2 * 2 + 1);
+        // jitter of the stamps moves the rate by less than noise does
+        let derivative = SavitzkyGolay::new(window, 2.min(window.saturating_sub(1)))
+            .and_then(|filter| filter.derivative(depth, 1, step))
+            .unwrap_or_else(|_| vec![0.0; count]);
+        rate.extend(derivative);
+    }
+    rate
+}
+
+/// Samples of the window whose noise is a fiftieth of the fastest rate.
+fn rate_window(depth: &[f64], step: f64) -> usize {
+    let longest = ((0.33 / step.max(1e-6)) as usize).clamp(5, 101);
+    let change =
+        depth.windows(longest.min(depth.len())).map(|w| (w[w.len() - 1] - w[0]).abs()).fold(0.0, f64::max);
+    let fastest = change / (step * longest as f64);
+    // the slope of a window of w samples has the variance 12 / w^3 of that of a sample
+    let noise = white_variance(depth).sqrt() / step.max(1e-6);
+    let needed = (12.0 * (noise / (0.02 * fastest).max(1e-9)).powi(2)).cbrt();
+    (needed.min(1e3) as usize).clamp(5, longest) | 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_that_a_filter_made_smooth_is_told_from_a_maneuver() {
+        let mut random = crate::random::Random::new(3);
+        let white: Vec<f64> = (0..4000).map(|_| 12_f64.sqrt() * (random.unit() - 0.5)).collect();
+        let t: Vec<f64> = (0..white.len()).map(|i| i as f64 * 0.009).collect();
+        let filtered =
+            SavitzkyGolay::new(9, 2).and_then(|f| f.derivative(&white, 1, 0.009)).expect("long enough");
+        let noise = filtered.iter().map(|v| v * v).sum::<f64>() / filtered.len() as f64;
+        let wave = |i: usize| 2.0 * noise.sqrt() * (3.0 * t[i]).sin();
+        let both = Coherence::of(&t, |i| filtered[i] + wave(i));
+        // the wave's mean square is twice that of the noise
+        assert!((both.signal / (2.0 * noise) - 1.0).abs() < 0.05, "{both:?} {noise}");
+        let alone = Coherence::of(&t, |i| filtered[i]);
+        assert!(alone.covariance / alone.power < 0.05 && alone.signal < 0.05 * noise, "{alone:?} {noise}");
+    }
+}

@@ -1,0 +1,100 @@
+//! What the search found, and the verdict on it.
+
+use nalgebra::DVector;
+
+use super::Config;
+use super::design::Design;
+use super::features::{General, Structure, energy};
+use super::report::Verdict;
+use super::select::{Judge, Member};
+use super::series::Series;
+use crate::effects::Effect;
+
+/// Deviates that structure without a name needs.
+pub(super) const STRUCTURE: f64 = 5.0;
+/// Deviates that energy without a phase needs; with a score a trial it cannot exceed the root of their number, so that
+/// few trials need this share of the root.
+const ENERGY: [f64; 2] = [4.5, 0.8];
+
+/// What the search found.
+pub(super) struct Found {
+    pub verdict: Verdict,
+    pub members: Vec<Member>,
+    pub alternatives: Vec<Vec<Member>>,
+    pub residual: DVector<f64>,
+    /// What is left, without a name.
+    pub left: Structure,
+    pub loss: f64,
+}
+
+impl Found {
+    pub fn of(
+        judge: &Judge,
+        members: &[Member],
+        library: &[Effect],
+        general: &General,
+        gap_structure: &Structure,
+        config: &Config,
+        all: &[Series],
+    ) -> Self {
+        let design = judge.design;
+        let columns = judge.columns(members);
+        let (beta, loss) =
+            design.solve(&columns).unwrap_or_else(|| (DVector::zeros(columns.len()), design.empty_loss()));
+        let residual = design.residual(&columns, &beta);
+        let left = general.structure(design, &judge.setting.components, &residual);
+        let whole = design.empty_loss() - judge.floor_loss;
+        let coverage = if whole > 0.0 { (design.empty_loss() - loss) / whole } else { 1.0 };
+        let alternatives = judge.alternatives(members, library);
+        let mut found =
+            Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
+        found.verdict = if members.is_empty() {
+            match found.is_structured(judge, gap_structure, config, all) {
+                true => Verdict::NoCandidateFits,
+                false => Verdict::NothingMissing,
+            }
+        } else if coverage < config.coverage {
+            Verdict::NoCandidateFits
+        } else if found.alternatives.is_empty() {
+            Verdict::Named
+        } else {
+            Verdict::Ambiguous
+        };
+        found
+    }
+
+    /// Predictable from the state, and large enough to matter.
+    fn is_structured(&self, judge: &Judge, structure: &Structure, config: &Config, all: &[Series]) -> bool {
+        let design = judge.design;
+        let rows = design.y.len().max(1) as f64;
+        // gain per row is in bins' noise; relevance is in samples' noise
+        let relative = judge
+            .setting
+            .components
+            .iter()
+            .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].model) / design.noise.bin[c])
+            .fold(f64::INFINITY, f64::min);
+        let least = config.relevance * relative;
+        let size = (structure.gain / rows).sqrt();
+        // a force that comes and goes with no phase of its own shows in its energy alone
+        let (deviate, _, energy) = energy(all, design, &design.y);
+        let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
+        structure.deviate > STRUCTURE && size > least || deviate > bar && energy > 2.0 * least.max(0.5)
+    }
+}
+
+/// Loss that nothing explains: the whole library at once, or the general model, whichever leaves less.
+pub(super) fn floor_loss(design: &Design, structure: &Structure) -> f64 {
+    let mut columns: Vec<usize> = Vec::new();
+    for candidate in &design.candidates {
+        for &(column, _) in &candidate.columns {
+            if design.novelty(column, &columns) > 1e-3 {
+                columns.push(column);
+            }
+        }
+    }
+    let rows = design.y.len() as f64;
+    let freedom = rows / (rows - columns.len() as f64).max(1.0);
+    let library = design.solve(&columns).map_or(f64::INFINITY, |(_, loss)| loss * freedom);
+    library.min(structure.loss).min(design.empty_loss()).max(0.0)
+}
