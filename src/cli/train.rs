@@ -252,6 +252,10 @@ impl Train {
             let Some(bundle) = loaded.bundles.get_mut(&of_vehicle.name) else {
                 bail!("{}: there is no bundle of it", of_vehicle.name);
             };
+            // effects close the gap of the weights that they were fitted to
+            if bundle.effects.take().is_some() {
+                eprintln!("{}: its effects are taken out with its former weights; run wade gap again", of_vehicle.name);
+            }
             bundle.trained = Some(weights);
             bundle.version += 1;
             bundle::write(&self.data.vehicles.bundle(&of_vehicle.name), bundle)?;

@@ -3,6 +3,7 @@
 use super::hydrotable::Hydrotable;
 use super::immersion::{Immersion, WetPanel};
 use crate::condition::Condition;
+use crate::forces::SurfaceForce;
 use crate::frame::{Vec3, WaterPlane};
 use crate::vehicle::{SurfaceKind, Vehicle};
 
@@ -152,6 +153,16 @@ impl Body {
                 immerse_box(block, *height, self.z0, &plane, out);
             }
         }
+    }
+
+    /// The same where a model has found the wet part of each surface already.
+    pub fn immerse_as(&self, condition: &Condition, surfaces: &[SurfaceForce], out: &mut Immersion) {
+        let Hull::Mesh { table, .. } = &self.hull else { return self.immerse(condition, out) };
+        out.depth = condition.depth.max(0.0);
+        out.panels.clear();
+        let wet = |surface: &SurfaceForce| WetPanel { fraction: surface.wetted_fraction, point: surface.point };
+        out.panels.extend(surfaces.iter().map(wet));
+        table.immerse(&condition.water_plane(self.z0), out);
     }
 
     /// True where the wheels' places and sizes are known, not assumed.
