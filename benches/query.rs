@@ -181,7 +181,7 @@ fn effects(vehicle: &str) -> Vec<Subject> {
         model.evaluate(&condition, &mut Workspace::new(), &mut forces);
         let (mut session, mut loads) = (Session::default(), EffectLoads::default());
         let work = move || {
-            active.evaluate(black_box(&condition), &told, &forces, Some(&mut session), &mut loads);
+            active.evaluate(black_box(&condition), &told, (&forces, true), Some(&mut session), &mut loads);
         };
         subjects.push((Row::new(format!("{vehicle} all 14 effects {name}"), 0), Box::new(work)));
     }

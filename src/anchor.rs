@@ -11,6 +11,7 @@
 
 use crate::condition::{Condition, GroundContact};
 use crate::features::direction;
+use crate::forces::SurfaceForce;
 use crate::frame::{GRAVITY, VISCOSITY, Vec3};
 use crate::geometry::mesh::Bounds;
 use crate::geometry::wetting::{Wetting, WettingTable};
@@ -131,12 +132,38 @@ pub struct SurfaceReading {
     pub dynamic: [f32; DYNAMIC],
 }
 
+impl Reading {
+    /// Room for a vehicle of so many surfaces.
+    pub fn with_capacity(surfaces: usize) -> Self {
+        Self {
+            surfaces: Vec::with_capacity(surfaces),
+            wetting: Vec::with_capacity(surfaces),
+            ..Self::default()
+        }
+    }
+}
+
 impl SurfaceReading {
     /// The dynamic force that the network's answer means [N].
     pub fn force(&self, output: &[f32; OUTPUTS]) -> Vec3 {
         let o = output.map(f64::from);
         let aside = o[1] * self.lateral[0] + o[3] * self.lateral[1];
         self.drag + Vec3::new(o[0], aside, o[2]) * self.unit
+    }
+
+    /// The whole load that the network's answer means, hydrostatics included, as a force at one point: on the line along
+    /// which it has the moment of its parts the point nearest to the wet centroid, as far as it lies in the box around
+    /// the wet part.
+    pub fn load(&self, output: &[f32; OUTPUTS]) -> SurfaceForce {
+        let dynamic = self.force(output);
+        let force = self.hydrostatic.force + dynamic;
+        let moment = self.hydrostatic.moment + self.center_of_pressure(output).cross(&dynamic);
+        let [low, high] = self.wet_box;
+        // x cross F = M - (M . F) F / F^2 for x = c + F cross (M - c cross F) / F^2
+        let shift = force.cross(&(moment - self.center.cross(&force)));
+        let size = force.norm_squared();
+        let point = if size > 0.0 { self.center + shift / size } else { self.center };
+        SurfaceForce { force, point: point.sup(&low).inf(&high), wetted_fraction: self.wet_fraction }
     }
 
     /// Where the dynamic force acts, inside the box around the wet part [m].

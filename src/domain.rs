@@ -25,11 +25,13 @@ pub enum Quantity {
     VerticalSpeed = 6,
     /// Magnitude of the angular velocity [rad/s].
     AngularSpeed = 7,
+    /// Distance to the nearest state that was learnt from, in units of what is usual among these [-].
+    Distance = 8,
 }
 
 impl Quantity {
     /// Every quantity, in the order of the wire.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Speed,
         Self::Angle,
         Self::Density,
@@ -37,6 +39,7 @@ impl Quantity {
         Self::Tilt,
         Self::VerticalSpeed,
         Self::AngularSpeed,
+        Self::Distance,
     ];
 
     /// The name with its unit, as bundles and reports spell it.
@@ -49,6 +52,7 @@ impl Quantity {
             Self::Tilt => "tilt_rad",
             Self::VerticalSpeed => "vertical_speed_mps",
             Self::AngularSpeed => "angular_speed_radps",
+            Self::Distance => "distance",
         }
     }
 }
@@ -104,9 +108,9 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// The range of one quantity.
-    pub fn range(&self, quantity: Quantity) -> Range {
-        match quantity {
+    /// The range of one quantity; `None` of the distance, which no range describes.
+    pub fn range(&self, quantity: Quantity) -> Option<Range> {
+        Some(match quantity {
             Quantity::Speed => self.speed_mps,
             Quantity::Angle => self.angle_rad,
             Quantity::Density => self.density_kgpm3,
@@ -114,15 +118,16 @@ impl Domain {
             Quantity::Tilt => self.tilt_rad,
             Quantity::VerticalSpeed => self.vertical_speed_mps,
             Quantity::AngularSpeed => self.angular_speed_radps,
-        }
+            Quantity::Distance => return None,
+        })
     }
 
     /// How far each quantity of a state lies outside.
     pub fn outside(&self, condition: &Condition) -> Outside {
         let mut outside = Outside::default();
         for quantity in Quantity::ALL {
-            if let Some(value) = value_of(quantity, condition) {
-                outside.excess[quantity as usize - 1] = self.range(quantity).excess(value);
+            if let (Some(range), Some(value)) = (self.range(quantity), value_of(quantity, condition)) {
+                outside.excess[quantity as usize - 1] = range.excess(value);
             }
         }
         outside
@@ -141,6 +146,7 @@ fn value_of(quantity: Quantity, condition: &Condition) -> Option<f64> {
         Quantity::Tilt => condition.up.x.hypot(condition.up.y).atan2(condition.up.z),
         Quantity::VerticalSpeed => v.z,
         Quantity::AngularSpeed => condition.angular_velocity.norm(),
+        Quantity::Distance => return None,
     })
 }
 

@@ -3,7 +3,7 @@
 use crate::condition::Condition;
 use crate::effects::{ActiveEffects, Circumstances, EffectLoads, EffectsFile, Session};
 use crate::forces::Forces;
-use crate::model::{Model, Workspace};
+use crate::model::{Form, Model, Workspace};
 
 /// What a served vehicle answers. Reused from query to query.
 #[derive(Debug, Clone, Default)]
@@ -52,7 +52,9 @@ impl ServedVehicle {
         self.model.evaluate(condition, workspace, forces);
         match &self.effects {
             Some(effects) => {
-                effects.evaluate(condition, circumstances, forces, session, added);
+                // the wet parts of an anchored model are not those of the samples, with which effects are fitted
+                let known = matches!(self.model.weights().form, Form::Paper(_));
+                effects.evaluate(condition, circumstances, (forces, known), session, added);
                 forces.wrench += added.sum();
             }
             None => added.clear(),

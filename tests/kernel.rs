@@ -7,8 +7,8 @@ use wade::condition::Condition;
 use wade::features;
 use wade::forces::Forces;
 use wade::frame::Vec3;
-use wade::model::Workspace;
-use wade::model::kernel::{Buffers, Isa, Kernel, WetSurface};
+use wade::model::kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, WetSurface};
+use wade::model::{Form, Workspace};
 
 #[test]
 fn every_instruction_set_agrees_with_the_reference() {
@@ -20,10 +20,11 @@ fn every_instruction_set_agrees_with_the_reference() {
             let mut wet = 0;
             for _ in 0..200 {
                 let mut condition = numbers.state().check().expect("a valid state");
-                condition.ground_contact = model.weights().ground_contact;
+                condition.ground_contact = model.weights().ground_contact().unwrap_or_default();
                 model.evaluate(&condition, &mut workspace, &mut forces);
                 // the error of a sum is measured by the size of its terms: the spread of the targets
-                let scale = condition.density * f64::from(model.weights().scaling.target_std[2]);
+                let Form::Paper(form) = &model.weights().form else { panic!("the paper's weights") };
+                let scale = condition.density * f64::from(form.scaling.target_std[2]);
                 for (load, expected) in forces.surfaces.iter().zip(model.reference(&condition)) {
                     let error = (load.force - expected).norm() / (expected.norm() + scale);
                     assert!(error < 1e-5, "{} {vehicle}: {} against {expected}", isa.name(), load.force);
@@ -40,7 +41,7 @@ fn a_row_has_the_same_bits_alone_and_in_any_company() {
     let model = model_on("husky", Isa::available()[0]);
     let (vehicle, weights) = (model.vehicle(), model.weights());
     for isa in Isa::available() {
-        let kernel = Kernel::new(&weights.network, isa);
+        let kernel = Kernel::new(&weights.network, (features::STATIC, features::DYNAMIC), isa);
         let fixed = vehicle
             .surfaces
             .iter()
@@ -51,7 +52,7 @@ fn a_row_has_the_same_bits_alone_and_in_any_company() {
         for _ in 0..20 {
             let global = [(); features::GLOBAL].map(|()| numbers.between(-2.0, 2.0));
             let wet: Vec<WetSurface> = (0..vehicle.surfaces.len())
-                .map(|surface| WetSurface { surface, dynamic: [(); 3].map(|()| numbers.between(0.0, 1.0)) })
+                .map(|surface| WetSurface { surface, dynamic: [(); MAX_DYNAMIC].map(|()| numbers.between(0.0, 1.0)) })
                 .collect();
             let together = kernel.forward(&global, &statics, &wet, &mut buffers).to_vec();
             for (alone, expected) in wet.iter().zip(&together) {

@@ -7,7 +7,7 @@ use wade::analytic;
 use wade::condition::{Condition, GroundContact};
 use wade::forces::Forces;
 use wade::frame::{GRAVITY, Vec3};
-use wade::model::{Model, Workspace};
+use wade::model::{Form, Model, Workspace};
 use wade::random::Random;
 use wade::train::plan::Table;
 
@@ -36,7 +36,7 @@ fn dry_surfaces_are_exactly_zero_and_wet_ones_are_not() {
         let mut counts = [0, 0];
         for _ in 0..100 {
             let mut condition = numbers.state().check().expect("valid");
-            condition.ground_contact = model.weights().ground_contact;
+            condition.ground_contact = model.weights().ground_contact().unwrap_or_default();
             for load in evaluate(&model, &condition).surfaces {
                 let wet = load.wetted_fraction > 0.0;
                 counts[usize::from(wet)] += 1;
@@ -110,7 +110,8 @@ fn the_shipped_weights_answer_what_they_were_taught() {
         assert_eq!(model.weights().provenance, analytic::PROVENANCE);
         // cases of another seed than those of the training
         let cases = table.latin_hypercube(100, &mut Random::new(99));
-        let stated = Vec3::from(model.weights().held_out_rms);
+        let Form::Paper(form) = &model.weights().form else { panic!("the paper's weights") };
+        let stated = Vec3::from(form.held_out_rms);
         let within = cases.iter().filter(|condition| {
             let taught: Vec3 = analytic::loads(model.vehicle(), condition).iter().sum();
             let error = (evaluate(&model, condition).wrench.force - taught) / condition.density;

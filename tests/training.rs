@@ -19,14 +19,14 @@ use wade::dataset::{self, Dataset, Image, Rest, SurfaceLoad};
 use wade::features;
 use wade::forces::Forces;
 use wade::frame::{GRAVITY, Vec3};
-use wade::model::{Model, Weights, Workspace, kernel::Isa};
+use wade::model::{Model, Workspace, kernel::Isa};
 use wade::train::checkpoint::Checkpoint;
 use wade::train::label::{at_rest, labels, order};
 use wade::train::plan::Table;
 use wade::train::report::Record;
 use wade::train::samples::samples;
 use wade::train::task::Task;
-use wade::train::{self, Analytic, Config, Keep, Sides, Source, TrainError, Trained, Variant};
+use wade::train::{self, Analytic, Config, Keep, Published, Sides, Source, TrainError, Trained, Variant};
 use wade::vehicle::{Vehicle, shipped};
 
 const BY: By = By::Case { share: 0.2 };
@@ -53,13 +53,13 @@ fn by_case(source: &Source) -> Split {
     split(&source.data, BY, 1).unwrap().remove(0)
 }
 
-fn run(config: &Config) -> Trained {
+fn run(config: &Config) -> Trained<Published> {
     let source = source();
     let split = by_case(&source);
     train::train(&source, Sides { split: &split, by: BY }, Variant::Paper, config, None, &|_| ()).unwrap()
 }
 
-fn same(a: &Trained, b: &Trained) -> bool {
+fn same(a: &Trained<Published>, b: &Trained<Published>) -> bool {
     a.layers == b.layers && a.history == b.history && a.vehicles == b.vehicles
 }
 
@@ -190,13 +190,7 @@ fn the_bundle_answers_as_the_trainer_s_own_forward_pass() {
     for (index, of_vehicle) in trained.vehicles.iter().enumerate() {
         let path = folder.path().join(&of_vehicle.name);
         let mut bundle = bundle::read(&common::vehicles().join(&of_vehicle.name)).unwrap();
-        let weights = Weights {
-            network: trained.layers.network(),
-            scaling: trained.scaling.clone(),
-            provenance: "test".into(),
-            ground_contact: source.data.meta.ground_contact,
-            held_out_rms: of_vehicle.held_out_rms,
-        };
+        let weights = trained.weights(of_vehicle, source.data.meta.ground_contact, "test".into());
         bundle.trained = Some((weights, of_vehicle.domain));
         bundle::write(&path, &bundle).unwrap();
         let model: Model = bundle::load(&path, Isa::available()[0]).unwrap();

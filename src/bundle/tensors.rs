@@ -7,13 +7,14 @@ use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::anchor;
 use crate::condition::GroundContact;
-use crate::features::{GLOBAL, GLOBAL_NAMES, INPUTS, SURFACE_NAMES};
+use crate::features::{GLOBAL_NAMES, SURFACE_NAMES};
 use crate::frame::Vec3;
 use crate::geometry::distance::{GridError, SignedDistanceGrid};
 use crate::geometry::submergence::Samples;
-use crate::model::Weights;
 use crate::model::network::{Network, OUTPUTS, Scaling, WIDTH};
+use crate::model::{Anchored, Form, Paper, SPREAD, Weights};
 
 /// No weight or statistic is larger: with 256 inputs a layer and bounded states, every sum then stays finite.
 const LARGEST: f32 = 1e6;
@@ -72,6 +73,12 @@ pub enum TensorError {
         /// The names in the file.
         found: String,
     },
+    /// The paper's weights without the convention that they have baked in.
+    #[error("metadata: the paper's weights must state their ground_contact")]
+    NoGroundContact,
+    /// No training case, from which no distance can be told.
+    #[error("tensor cases has no row")]
+    NoCases,
     /// A grid that is none.
     #[error("{0}")]
     Grid(#[from] GridError),
@@ -85,15 +92,45 @@ struct WeightsMetadata {
     global_features: Vec<String>,
     surface_features: Vec<String>,
     provenance: String,
-    ground_contact: GroundContact,
+    /// Of weights that have a convention baked in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ground_contact: Option<GroundContact>,
 }
 
 /// Kinds of model.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {
     /// The paper's network as published.
     Paper,
+    /// Hydrostatics, a simple drag, and a learned remainder.
+    Anchored,
+}
+
+impl Kind {
+    fn global_features(self) -> Vec<String> {
+        let names: &[&str] = match self {
+            Self::Paper => &GLOBAL_NAMES,
+            Self::Anchored => &anchor::GLOBAL_NAMES,
+        };
+        names.iter().copied().map(str::to_owned).collect()
+    }
+
+    /// The static features, then those that change with the state.
+    fn surface_features(self) -> Vec<String> {
+        let names = match self {
+            Self::Paper => SURFACE_NAMES.to_vec(),
+            Self::Anchored => [&anchor::STATIC_NAMES[..], &anchor::DYNAMIC_NAMES[..]].concat(),
+        };
+        names.into_iter().map(str::to_owned).collect()
+    }
+
+    fn outputs(self) -> usize {
+        match self {
+            Self::Paper => OUTPUTS,
+            Self::Anchored => SPREAD + 1,
+        }
+    }
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -259,55 +296,98 @@ pub fn write_distance(grid: &SignedDistanceGrid) -> Vec<u8> {
 pub fn read_weights(bytes: &[u8]) -> Result<Weights, TensorError> {
     let file = File::new(bytes)?;
     let meta: WeightsMetadata = metadata(bytes)?;
-    let Kind::Paper = meta.kind;
-    if meta.global_features != GLOBAL_NAMES || meta.surface_features != SURFACE_NAMES {
+    let kind = meta.kind;
+    let (of_state, of_surface) = (kind.global_features(), kind.surface_features());
+    if meta.global_features != of_state || meta.surface_features != of_surface {
         let found = [meta.surface_features, meta.global_features].concat().join(" ");
         return Err(TensorError::Features { found });
     }
+    let network = read_network(&file, of_surface.len() + of_state.len(), kind.outputs())?;
+    let form = match kind {
+        Kind::Paper => Form::Paper(Paper {
+            scaling: Scaling {
+                global_mean: file.array("global_mean")?,
+                global_std: file.deviations("global_std")?,
+                target_mean: file.array("target_mean")?,
+                target_std: file.deviations("target_std")?,
+            },
+            ground_contact: meta.ground_contact.ok_or(TensorError::NoGroundContact)?,
+            held_out_rms: file.array::<OUTPUTS>("held_out_rms")?.map(f64::from),
+        }),
+        Kind::Anchored => Form::Anchored(Box::new(read_anchored(&file)?)),
+    };
+    Ok(Weights { network, form, provenance: meta.provenance })
+}
+
+fn read_network(file: &File<'_>, inputs: usize, outputs: usize) -> Result<Network, TensorError> {
     let matrix = |name, rows, columns| file.floats(name, &[Some(rows), Some(columns)]);
     let bias = |name, rows| file.floats(name, &[Some(rows)]);
-    Ok(Weights {
-        network: Network {
-            w1: matrix("w1", WIDTH, INPUTS)?,
-            b1: bias("b1", WIDTH)?,
-            w2: matrix("w2", WIDTH, WIDTH)?,
-            b2: bias("b2", WIDTH)?,
-            w3: matrix("w3", OUTPUTS, WIDTH)?,
-            b3: bias("b3", OUTPUTS)?,
-        },
-        scaling: Scaling {
-            global_mean: file.array("global_mean")?,
-            global_std: file.deviations("global_std")?,
-            target_mean: file.array("target_mean")?,
-            target_std: file.deviations("target_std")?,
-        },
-        provenance: meta.provenance,
-        ground_contact: meta.ground_contact,
-        held_out_rms: file.array::<OUTPUTS>("held_out_rms")?.map(f64::from),
+    Ok(Network {
+        inputs,
+        outputs,
+        w1: matrix("w1", WIDTH, inputs)?,
+        b1: bias("b1", WIDTH)?,
+        w2: matrix("w2", WIDTH, WIDTH)?,
+        b2: bias("b2", WIDTH)?,
+        w3: matrix("w3", outputs, WIDTH)?,
+        b3: bias("b3", outputs)?,
+    })
+}
+
+fn read_anchored(file: &File<'_>) -> Result<Anchored, TensorError> {
+    let cases = file.floats("cases", &[None, Some(anchor::COORDINATES)])?;
+    let cases = cases.as_chunks().0.to_vec();
+    if cases.is_empty() {
+        return Err(TensorError::NoCases);
+    }
+    let [near] = file.deviations("near")?;
+    Ok(Anchored {
+        global_mean: file.array("global_mean")?,
+        global_std: file.deviations("global_std")?,
+        spread: file.deviations("spread")?,
+        cases,
+        coordinate_scale: file.deviations("coordinate_scale")?,
+        near,
     })
 }
 
 pub fn write_weights(weights: &Weights) -> Vec<u8> {
-    let scaling = &weights.scaling;
     let mut tensors: Vec<_> = weights
         .network
         .tensors()
         .into_iter()
         .map(|(name, shape, values)| floats(name, shape, values))
         .collect();
-    tensors.extend([
-        floats("global_mean", vec![GLOBAL], &scaling.global_mean),
-        floats("global_std", vec![GLOBAL], &scaling.global_std),
-        floats("target_mean", vec![OUTPUTS], &scaling.target_mean),
-        floats("target_std", vec![OUTPUTS], &scaling.target_std),
-        floats("held_out_rms", vec![OUTPUTS], &weights.held_out_rms.map(|rms| rms as f32)),
-    ]);
+    let vector = |name, values: &[f32]| floats(name, vec![values.len()], values);
+    let kind = match &weights.form {
+        Form::Paper(Paper { scaling, held_out_rms, .. }) => {
+            tensors.extend([
+                vector("global_mean", &scaling.global_mean),
+                vector("global_std", &scaling.global_std),
+                vector("target_mean", &scaling.target_mean),
+                vector("target_std", &scaling.target_std),
+                vector("held_out_rms", &held_out_rms.map(|rms| rms as f32)),
+            ]);
+            Kind::Paper
+        }
+        Form::Anchored(form) => {
+            tensors.extend([
+                vector("global_mean", &form.global_mean),
+                vector("global_std", &form.global_std),
+                vector("spread", &form.spread),
+                floats("cases", vec![form.cases.len(), anchor::COORDINATES], form.cases.as_flattened()),
+                vector("coordinate_scale", &form.coordinate_scale),
+                vector("near", &[form.near]),
+            ]);
+            Kind::Anchored
+        }
+    };
     let meta = WeightsMetadata {
-        kind: Kind::Paper,
-        global_features: GLOBAL_NAMES.map(str::to_owned).to_vec(),
-        surface_features: SURFACE_NAMES.map(str::to_owned).to_vec(),
+        kind,
+        global_features: kind.global_features(),
+        surface_features: kind.surface_features(),
         provenance: weights.provenance.clone(),
-        ground_contact: weights.ground_contact,
+        ground_contact: weights.ground_contact(),
     };
     write(&tensors, Some(&meta))
 }

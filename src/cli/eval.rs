@@ -15,10 +15,10 @@ use wade::geometry::distance::SignedDistanceGrid;
 use wade::model::Model;
 use wade::model::kernel::Isa;
 use wade::train::report::Record;
-use wade::train::{self, Config, Sides, Source, Trained, Variant};
+use wade::train::{self, Config, Published, Sides, Source, Trained, Variant};
 
-use super::train::{Data, Loaded, Progress, Rule};
-use super::{emit, usage_error};
+use super::train::{Data, Loaded, Progress, Rule, Served};
+use super::{PROGRAM, emit, usage_error};
 
 /// Judge the weights of the bundles by the states that their training held out
 ///
@@ -39,6 +39,9 @@ pub struct Eval {
     /// Trains anew for each part that is held out in turn, with the settings of --config, instead of judging the bundles
     #[arg(long, value_enum, conflicts_with = "trained")]
     split: Option<Rule>,
+    /// What is trained anew; the first is the one under evaluation
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "paper", requires = "split")]
+    variants: Vec<Served>,
     /// Trains the paper's three ablations with the same settings and split
     #[arg(long)]
     ablations: bool,
@@ -49,8 +52,6 @@ pub struct Eval {
     #[arg(long)]
     json: bool,
 }
-
-const PROGRAM: &str = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
 
 impl Eval {
     /// Prints the tables and writes the page.
@@ -84,7 +85,7 @@ impl Eval {
             held_out::check_weights(&record, name, &weights)?;
             let model =
                 Model::new(bundle.vehicle.clone(), bundle.version, domain, weights, Isa::available()[0]);
-            models.insert(name.clone(), model);
+            models.insert(name.clone(), vec![model]);
         }
         let by = if record.split.by_sample { Rule::Sample } else { Rule::Case }.by(&record.config);
         let sides = Sides { split: &split, by };
@@ -96,7 +97,8 @@ impl Eval {
 
     /// One training a part; the held-out states of all parts are pooled.
     fn anew(&self, rule: Rule) -> Result<Report> {
-        let config = self.data.settings()?;
+        let first = self.variants.first().copied().unwrap_or(Served::Paper);
+        let config = self.data.settings(first)?;
         let loaded = self.data.load(&config)?;
         let source = loaded.source(&config)?;
         let by = rule.by(&config);
@@ -104,15 +106,16 @@ impl Eval {
         let mut contest = Contest::new();
         for split in &splits {
             let sides = Sides { split, by };
-            let trained = learn(&source, sides, Variant::Paper, &config)?;
-            let mut models = BTreeMap::new();
-            for of_vehicle in &trained.vehicles {
-                let (weights, domain) = loaded.weights(&trained, of_vehicle);
-                let vehicle = source.vehicles[&of_vehicle.name].clone();
-                models.insert(
-                    of_vehicle.name.clone(),
-                    Model::new(vehicle, 0, domain, weights, Isa::available()[0]),
-                );
+            let mut models: BTreeMap<String, Vec<Model>> = BTreeMap::new();
+            for variant in &self.variants {
+                let config = self.data.settings(*variant)?;
+                eprintln!("training {variant:?}, held out: {}", split.name);
+                let learnt = variant.train(&loaded, &source, (sides, 1), &config, None)?;
+                for (name, (weights, domain)) in learnt.weights {
+                    let vehicle = source.vehicles[&name].clone();
+                    let model = Model::new(vehicle, 0, domain, weights, Isa::available()[0]);
+                    models.entry(name).or_default().push(model);
+                }
             }
             self.enter(&mut contest, &source, sides, &config, (&loaded, &models))?;
         }
@@ -126,7 +129,7 @@ impl Eval {
         source: &Source,
         sides: Sides<'_>,
         config: &Config,
-        (loaded, models): (&Loaded, &BTreeMap<String, Model>),
+        (loaded, models): (&Loaded, &BTreeMap<String, Vec<Model>>),
     ) -> Result<()> {
         let mut ablations = Vec::new();
         if self.ablations {
@@ -141,7 +144,7 @@ impl Eval {
     }
 }
 
-fn learn(source: &Source, sides: Sides<'_>, variant: Variant, config: &Config) -> Result<Trained> {
+fn learn(source: &Source, sides: Sides<'_>, variant: Variant, config: &Config) -> Result<Trained<Published>> {
     eprintln!("training {}, held out: {}", variant.name(), sides.split.name);
     let progress = Progress::new(config.epochs)?;
     Ok(train::train(source, sides, variant, config, None, &|epoch| progress.epoch(epoch))?)

@@ -27,6 +27,9 @@ use wade::model::Model;
 use wade::model::kernel::Isa;
 use wade::served::ServedVehicle;
 
+/// This program, its version and commit, as reports name it.
+const PROGRAM: &str = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
+
 /// Hydrodynamic forces on wading ground vehicles.
 #[derive(Debug, Parser)]
 #[command(version = concat!(env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")"), propagate_version = true)]

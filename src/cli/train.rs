@@ -17,10 +17,10 @@ use wade::domain::Domain;
 use wade::model::Weights;
 use wade::train::checkpoint::Checkpoint;
 use wade::train::fit::Epoch;
-use wade::train::report::{DataFile, Record, sha256_of};
-use wade::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant};
+use wade::train::report::{DataFile, Record, VehicleRecord, sha256_of};
+use wade::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant, anchored};
 
-use super::{Vehicles, bundle_names, usage_error};
+use super::{PROGRAM, Vehicles, bundle_names, usage_error};
 
 /// Train one network for the vehicles of a data set and write it into their bundles
 ///
@@ -51,7 +51,16 @@ Settings that a file (--config) leaves out are the paper's:
   epsilon = 0.01
   net_weight = 0.1
   dry_weight = 0.5
-Without --config, --data analytic takes epochs = 2000, patience = 60, least_learning_rate = 1e-6.")]
+  [anchored]
+  folds = 5                    # networks besides, from whose held-out errors the uncertainty is learnt
+  [anchored.loss]
+  net_weight = 1.0
+  moment_weight = 0.1
+  delta = 0.1                  # error up to which the loss is a square
+  exponent = 0.5               # 0 judges errors in newtons, 1 in shares of the load
+  floor = 0.01
+Without --config, --data analytic takes epochs = 2000, patience = 60, least_learning_rate = 1e-6, and --variant anchored
+epochs = 1500, patience = 60, least_learning_rate = 1e-6, weight_decay = 0.01.")]
 pub struct Train {
     #[command(flatten)]
     data: Data,
@@ -94,10 +103,58 @@ pub struct Data {
     pub vehicles: Vehicles,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Served {
+/// What can be learnt and served.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Served {
     /// The paper's network as published
     Paper,
+    /// Hydrostatics of the hull, a simple drag, and a learned remainder without a dimension
+    Anchored,
+}
+
+/// What a training comes to: weights for each vehicle, and its record without that of the data.
+pub struct Learnt {
+    /// Weights and domain by vehicle.
+    pub weights: BTreeMap<String, (Weights, Domain)>,
+    /// The record of it.
+    pub record: Record,
+}
+
+impl Served {
+    /// Trains it.
+    pub fn train(
+        self,
+        loaded: &Loaded,
+        source: &Source,
+        (sides, part): (Sides<'_>, usize),
+        config: &Config,
+        checkpoint: Option<&Checkpoint>,
+    ) -> Result<Learnt> {
+        let progress = Progress::new(config.epochs)?;
+        let epoch = |epoch: &Epoch| progress.epoch(epoch);
+        let label = loaded.file.label();
+        Ok(match self {
+            Self::Paper => {
+                let trained = train::train(source, sides, Variant::Paper, config, checkpoint, &epoch)?;
+                let contact = loaded.data.meta.ground_contact;
+                let weights = |of_vehicle: &_| trained.weights(of_vehicle, contact, label.clone());
+                loaded.learnt(&trained, weights, source, (sides, part), config)
+            }
+            Self::Anchored => {
+                let trained = anchored::train(source, sides, config, checkpoint, &epoch)?;
+                loaded.learnt(&trained, |_| trained.weights(label.clone()), source, (sides, part), config)
+            }
+        })
+    }
+
+    /// The settings that suit it.
+    fn settings(self, analytic: bool) -> Config {
+        match self {
+            Self::Anchored => Config::anchored(),
+            Self::Paper if analytic => Config::analytic(),
+            Self::Paper => Config::default(),
+        }
+    }
 }
 
 /// What is held out.
@@ -145,11 +202,9 @@ impl Data {
         self.data == Path::new("analytic")
     }
 
-    /// The settings of the file, or those that suit the data.
-    pub fn settings(&self) -> Result<Config> {
-        let Some(path) = &self.config else {
-            return Ok(if self.is_analytic() { Config::analytic() } else { Config::default() });
-        };
+    /// The settings of the file, or those that suit the data and what is learnt.
+    pub fn settings(&self, variant: Served) -> Result<Config> {
+        let Some(path) = &self.config else { return Ok(variant.settings(self.is_analytic())) };
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let mut config: Config = toml::from_str(&text).with_context(|| path.display().to_string())?;
         for (vehicle, table) in Config::default().analytic.tables {
@@ -204,24 +259,30 @@ impl Loaded {
         source.with_context(|| self.file.name.clone())
     }
 
-    /// What weights that were learnt from it say of themselves to a vehicle.
-    pub fn weights(&self, trained: &Trained, of_vehicle: &TrainedVehicle) -> (Weights, Domain) {
-        let weights = Weights {
-            network: trained.layers.network(),
-            scaling: trained.scaling.clone(),
-            provenance: self.file.label(),
-            ground_contact: self.data.meta.ground_contact,
-            held_out_rms: of_vehicle.held_out_rms,
+    /// Weights of each vehicle with the ranges that their states were drawn from, and the record.
+    fn learnt<L>(
+        &self,
+        trained: &Trained<L>,
+        weights: impl Fn(&TrainedVehicle) -> Weights,
+        source: &Source,
+        (sides, part): (Sides<'_>, usize),
+        config: &Config,
+    ) -> Learnt {
+        let of = |of_vehicle: &TrainedVehicle| {
+            let domain = self.domains.get(&of_vehicle.name).copied().unwrap_or(of_vehicle.domain);
+            (of_vehicle.name.clone(), (weights(of_vehicle), domain))
         };
-        (weights, self.domains.get(&of_vehicle.name).copied().unwrap_or(of_vehicle.domain))
+        Learnt {
+            weights: trained.vehicles.iter().map(of).collect(),
+            record: Record::new(trained, source, sides, part, self.file.clone(), (config, PROGRAM)),
+        }
     }
 }
 
 impl Train {
     /// Writes the next version of each bundle and the report.
     pub fn run(self) -> Result<ExitCode> {
-        let Served::Paper = self.variant;
-        let mut config = self.data.settings()?;
+        let mut config = self.data.settings(self.variant)?;
         config.epochs = self.epochs.unwrap_or(config.epochs);
         config.seed = self.seed.unwrap_or(config.seed);
         let mut loaded = self.data.load(&config)?;
@@ -237,37 +298,28 @@ impl Train {
         eprintln!("held out: {}; {} samples to learn from", split.name, split.training.len());
         let checkpoint =
             self.checkpoint.as_ref().map(|path| Checkpoint { path: path.clone(), resume: self.resume });
-        let progress = Progress::new(config.epochs)?;
-        let trained = train::train(&source, sides, Variant::Paper, &config, checkpoint.as_ref(), &|epoch| {
-            progress.epoch(epoch);
-        })?;
-        progress.bar.finish_and_clear();
-
-        let program = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
-        let record =
-            Record::new(&trained, &source, sides, self.part, loaded.file.clone(), (&config, program));
+        let learnt = self.variant.train(&loaded, &source, (sides, self.part), &config, checkpoint.as_ref())?;
+        let record = &learnt.record;
         record.write(&self.out)?;
-        for of_vehicle in &trained.vehicles {
-            let weights = loaded.weights(&trained, of_vehicle);
-            let Some(bundle) = loaded.bundles.get_mut(&of_vehicle.name) else {
-                bail!("{}: there is no bundle of it", of_vehicle.name);
+        for of_vehicle in &record.vehicles {
+            let name = &of_vehicle.name;
+            let (Some(bundle), Some(weights)) = (loaded.bundles.get_mut(name), learnt.weights.get(name)) else {
+                bail!("{name}: there is no bundle of it");
             };
             // effects close the gap of the weights that they were fitted to
             if bundle.effects.take().is_some() {
-                eprintln!("{}: its effects are taken out with its former weights; run wade gap again", of_vehicle.name);
+                eprintln!("{name}: its effects are taken out with its former weights; run wade gap again");
             }
-            bundle.trained = Some(weights);
+            bundle.trained = Some(weights.clone());
             bundle.version += 1;
-            bundle::write(&self.data.vehicles.bundle(&of_vehicle.name), bundle)?;
+            bundle::write(&self.data.vehicles.bundle(name), bundle)?;
             report(of_vehicle, bundle.version);
         }
-        if let Some(path) = &self.checkpoint
-            && path.exists()
-        {
-            std::fs::remove_file(path).with_context(|| path.display().to_string())?;
+        if let Some(checkpoint) = &checkpoint {
+            checkpoint.remove().with_context(|| checkpoint.path.display().to_string())?;
         }
-        let time = trained.epoch_s.map_or_else(String::new, |s| format!(", {s:.3} s each"));
-        println!("{} epochs{time}; weights of epoch {}", trained.history.len(), trained.kept_epoch);
+        let time = record.epoch_s.map_or_else(String::new, |s| format!(", {s:.3} s each"));
+        println!("{} epochs{time}; weights of epoch {}", record.history.len(), record.kept_epoch);
         println!("{}", self.out.join("index.html").display());
         Ok(ExitCode::SUCCESS)
     }
@@ -317,7 +369,7 @@ impl Progress {
     }
 }
 
-fn report(trained: &TrainedVehicle, version: u32) {
+fn report(trained: &VehicleRecord, version: u32) {
     let score = &trained.score;
     println!("{}, version {version}: {} held-out states", trained.name, score.samples);
     if score.samples == 0 {

@@ -216,7 +216,7 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     let domain = bundle.trained.as_ref().map(|&(_, domain)| domain);
     let provenance = bundle.trained.as_ref().map(|(weights, _)| weights.provenance.as_str());
     let ranges =
-        || Quantity::ALL.into_iter().filter_map(|q| domain.map(|domain| (q.name(), domain.range(q))));
+        || Quantity::ALL.into_iter().filter_map(|q| Some((q.name(), domain?.range(q)?)));
     let d = &vehicle.dimensions;
     let effects: Vec<&ActiveEffect> = bundle.effects.iter().flat_map(|file| &file.effects).collect();
     if as_json {

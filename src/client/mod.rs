@@ -119,7 +119,7 @@ impl Reply {
         };
         Self {
             version: model.version(),
-            provenance: model.weights().provenance.clone(),
+            provenance: model.provenance().to_owned(),
             surfaces: forces.surfaces.iter().map(surface).collect(),
             force: single(&forces.wrench.force),
             moment: single(&forces.wrench.moment),

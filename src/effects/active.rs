@@ -182,14 +182,15 @@ impl ActiveEffects {
         &self.file
     }
 
-    /// The loads in a state for which the model gave `forces`. Allocates nothing.
+    /// The loads in a state for which the model gave `forces`, of which `wet_parts_known` says that wetted fractions and
+    /// points are those of the hull's samples. Allocates nothing.
     ///
     /// The memory of a session moves on by the time step with the state at its end, as it does along a trial in fitting.
     pub fn evaluate(
         &self,
         condition: &Condition,
         circumstances: &Circumstances,
-        forces: &Forces,
+        (forces, wet_parts_known): (&Forces, bool),
         mut session: Option<&mut Session>,
         out: &mut EffectLoads,
     ) {
@@ -197,7 +198,7 @@ impl ActiveEffects {
         out.outside = self.file.validity.outside(condition);
         out.surface_forces.resize(forces.surfaces.len(), Vec3::zeros());
         let state = self.file.validity.clamped(condition);
-        if state.depth == condition.depth {
+        if wet_parts_known && state.depth == condition.depth {
             self.body.immerse_as(&state, &forces.surfaces, &mut out.immersion);
         } else {
             self.body.immerse(&state, &mut out.immersion);

@@ -10,7 +10,7 @@ use super::states::{State, states};
 use crate::dataset::split::Split;
 use crate::geometry::distance::SignedDistanceGrid;
 use crate::model::Model;
-use crate::train::{Source, Trained};
+use crate::train::{Published, Source, Trained};
 
 /// What one model says of every held-out state of a vehicle.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,12 +36,12 @@ pub type Contest = BTreeMap<String, Heat>;
 /// Models to judge beside the simple ones, which are fitted here.
 #[derive(Debug)]
 pub struct Contestants<'a> {
-    /// The model of each vehicle, as it is served.
-    pub models: &'a BTreeMap<String, Model>,
+    /// The models of each vehicle, as they are served; the first of each is the one under evaluation.
+    pub models: &'a BTreeMap<String, Vec<Model>>,
     /// Signed distance to each hull, for the pontoons.
     pub distances: &'a BTreeMap<String, &'a SignedDistanceGrid>,
     /// Networks that cannot be served.
-    pub ablations: &'a [Trained],
+    pub ablations: &'a [Trained<Published>],
 }
 
 /// Adds the held-out side of a split to a contest.
@@ -58,9 +58,10 @@ pub fn enter(
             continue;
         }
         let no_model = || EvaluateError::NoModel { vehicle: name.clone() };
-        let model = contestants.models.get(name).ok_or_else(no_model)?;
+        let models = contestants.models.get(name).ok_or_else(no_model)?;
         let distance = contestants.distances.get(name).ok_or_else(no_model)?;
-        let mut entries = vec![(model_name(), served(model, &held_out))];
+        let name_of = |model: &Model| model.weights().form.name().to_owned();
+        let mut entries: Vec<_> = models.iter().map(|model| (name_of(model), served(model, &held_out))).collect();
         let learnt: Vec<&State> = training.iter().filter(|state| state.vehicle == *name).collect();
         // a vehicle that is held out as a whole leaves nothing to fit its simple models to
         if !learnt.is_empty() {
@@ -69,7 +70,7 @@ pub fn enter(
             }
         }
         for ablation in contestants.ablations {
-            entries.push((ablation.variant.name().to_owned(), by_trainer(ablation, &held_out)));
+            entries.push((ablation.name.to_owned(), by_trainer(ablation, &held_out)));
         }
         let heat = contest.entry(name.clone()).or_default();
         heat.states.extend(held_out.into_iter().cloned());
@@ -81,8 +82,4 @@ pub fn enter(
         }
     }
     if contest.is_empty() { Err(EvaluateError::NothingHeldOut) } else { Ok(()) }
-}
-
-fn model_name() -> String {
-    crate::train::Variant::Paper.name().to_owned()
 }

@@ -4,7 +4,7 @@ use super::states::State;
 use crate::forces::Forces;
 use crate::frame::Vec3;
 use crate::model::{Model, Workspace};
-use crate::train::{Trained, Variant};
+use crate::train::{Published, Trained, Variant};
 
 /// What a model says of a state, body frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,18 +36,18 @@ pub fn served(model: &Model, states: &[&State]) -> Vec<Prediction> {
 }
 
 /// By the trainer's own forward pass, of a network that cannot be served.
-pub fn by_trainer(trained: &Trained, states: &[&State]) -> Vec<Prediction> {
+pub fn by_trainer(trained: &Trained<Published>, states: &[&State]) -> Vec<Prediction> {
     let predict = |state: &&State| {
         let density = state.condition.density;
         let forces = trained.force_over_density(&state.features);
-        let targets = trained.variant.view(&state.features).targets;
+        let targets = trained.learnt.variant.view(&state.features).targets;
         let error =
             |(force, target): (&[f64; 3], &[f64; 3])| (Vec3::from(*force) - Vec3::from(*target)) * density;
         let errors = || forces.iter().zip(&targets).map(error).collect();
         Prediction {
             force: forces.iter().map(|force| Vec3::from(*force)).sum::<Vec3>() * density,
             moment: None,
-            surface_errors: if trained.variant == Variant::GlobalOnly { Vec::new() } else { errors() },
+            surface_errors: if trained.learnt.variant == Variant::GlobalOnly { Vec::new() } else { errors() },
             uncertainty: None,
         }
     };

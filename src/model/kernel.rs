@@ -16,8 +16,14 @@
     reason = "lanes in lock step, by index, are what the compiler vectorizes"
 )]
 
-use super::network::{Network, OUTPUTS, WIDTH};
-use crate::features::{DYNAMIC, GLOBAL, STATIC};
+use super::network::{Network, WIDTH};
+
+/// Features of a surface that change with the state, at most.
+pub const MAX_DYNAMIC: usize = 12;
+/// Answers for a surface, at most.
+pub const MAX_OUTPUTS: usize = 8;
+/// Dynamic features that are multiplied in one pass over a row.
+const PASS: usize = 3;
 
 /// A row of activations, aligned to a cache line.
 #[derive(Debug, Clone, Copy)]
@@ -33,8 +39,8 @@ impl Row {
 pub struct WetSurface {
     /// Index of the surface in the vehicle.
     pub surface: usize,
-    /// Its features that change with the state.
-    pub dynamic: [f32; DYNAMIC],
+    /// Its features that change with the state; of these as many as the network has.
+    pub dynamic: [f32; MAX_DYNAMIC],
 }
 
 /// The part of layer 1 that a vehicle's surfaces contribute whatever the state, a row a surface.
@@ -89,7 +95,7 @@ pub struct Buffers {
     h2: Vec<Row>,
     /// One entry a block of rows.
     live: Vec<Live>,
-    outputs: Vec<[f32; OUTPUTS]>,
+    outputs: Vec<[f32; MAX_OUTPUTS]>,
 }
 
 impl Buffers {
@@ -100,7 +106,7 @@ impl Buffers {
             h1: vec![Row::ZERO; surfaces],
             h2: vec![Row::ZERO; surfaces],
             live: Vec::with_capacity(surfaces.div_ceil(BLOCK_ROWS)),
-            outputs: vec![[0.0; OUTPUTS]; surfaces],
+            outputs: vec![[0.0; MAX_OUTPUTS]; surfaces],
         }
     }
 
@@ -180,33 +186,42 @@ impl Isa {
 #[derive(Debug, Clone)]
 pub struct Kernel {
     isa: Isa,
-    w1_global: [Row; GLOBAL],
-    w1_dynamic: [Row; DYNAMIC],
-    w1_static: [Row; STATIC],
+    w1_global: Vec<Row>,
+    /// In passes: a network with fewer features has zeros in the last.
+    w1_dynamic: Vec<[Row; PASS]>,
+    w1_static: Vec<Row>,
     b1: Row,
     /// Tiles of columns, each with one stretch of `tile_width` weights an input: `[tile][input][column]`.
     w2: Vec<Row>,
     b2: Row,
-    w3: [Row; OUTPUTS],
-    b3: [f32; OUTPUTS],
+    w3: Vec<Row>,
+    b3: Vec<f32>,
 }
 
 impl Kernel {
-    /// Packs a network whose tensors have the shapes that [`Network::tensors`] states.
-    pub fn new(network: &Network, isa: Isa) -> Self {
-        let inputs = STATIC + DYNAMIC + GLOBAL;
-        let column = |input: usize| Row(std::array::from_fn(|unit| network.w1[unit * inputs + input]));
+    /// Packs a network whose tensors have the shapes that [`Network::tensors`] states. A row of its inputs is a
+    /// surface's `fixed` features, then the `dynamic` ones, then the global ones.
+    ///
+    /// # Panics
+    /// When the network has no dynamic features, or more of them or of outputs than there is room for.
+    pub fn new(network: &Network, (fixed, dynamic): (usize, usize), isa: Isa) -> Self {
+        assert!((1..=MAX_DYNAMIC).contains(&dynamic) && network.outputs <= MAX_OUTPUTS, "the buffers have room for it");
+        let column = |input: usize| Row(std::array::from_fn(|unit| network.w1[unit * network.inputs + input]));
         let row = |values: &[f32]| Row(std::array::from_fn(|i| values[i]));
+        let pass = |first: usize| {
+            let column = |i| if first + i < dynamic { column(fixed + first + i) } else { Row::ZERO };
+            std::array::from_fn(column)
+        };
         Self {
             isa,
-            w1_static: std::array::from_fn(column),
-            w1_dynamic: std::array::from_fn(|i| column(STATIC + i)),
-            w1_global: std::array::from_fn(|i| column(STATIC + DYNAMIC + i)),
+            w1_static: (0..fixed).map(column).collect(),
+            w1_dynamic: (0..dynamic).step_by(PASS).map(pass).collect(),
+            w1_global: (fixed + dynamic..network.inputs).map(column).collect(),
             b1: row(&network.b1),
             w2: pack(&network.w2, isa.tile_width()),
             b2: row(&network.b2),
-            w3: std::array::from_fn(|c| row(&network.w3[c * WIDTH..])),
-            b3: std::array::from_fn(|c| network.b3[c]),
+            w3: network.w3.chunks_exact(WIDTH).map(row).collect(),
+            b3: network.b3.clone(),
         }
     }
 
@@ -216,25 +231,26 @@ impl Kernel {
     }
 
     /// What the static features of a vehicle's surfaces contribute to layer 1.
-    pub fn static_rows(&self, features: &[[f32; STATIC]]) -> StaticRows {
+    pub fn static_rows<const STATIC: usize>(&self, features: &[[f32; STATIC]]) -> StaticRows {
         let row = |features: &[f32; STATIC]| {
             Row(std::array::from_fn(|unit| {
-                (0..STATIC).fold(0.0, |sum, i| sum + features[i] * self.w1_static[i].0[unit])
+                features.iter().zip(&self.w1_static).fold(0.0, |sum, (x, weights)| sum + x * weights.0[unit])
             }))
         };
         StaticRows(features.iter().map(row).collect())
     }
 
-    /// Standardised forces over density of the wet surfaces, in their order.
+    /// What the network answers for the wet surfaces, in their order; only as many of the numbers as it has outputs
+    /// mean anything.
     ///
     /// `global` is standardised; `buffers` must be sized for at least as many surfaces as are wet.
     pub fn forward<'b>(
         &self,
-        global: &[f32; GLOBAL],
+        global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &'b mut Buffers,
-    ) -> &'b [[f32; OUTPUTS]] {
+    ) -> &'b [[f32; MAX_OUTPUTS]] {
         match self.isa.0 {
             // SAFETY: `Isa` exists only where `Isa::available` found the CPU features.
             #[cfg(target_arch = "x86_64")]
@@ -253,7 +269,7 @@ impl Kernel {
     #[target_feature(enable = "avx512f")]
     fn forward_avx512(
         &self,
-        global: &[f32; GLOBAL],
+        global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &mut Buffers,
@@ -274,7 +290,7 @@ impl Kernel {
     #[target_feature(enable = "avx2,fma")]
     fn forward_avx2(
         &self,
-        global: &[f32; GLOBAL],
+        global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &mut Buffers,
@@ -293,7 +309,7 @@ impl Kernel {
 
     fn forward_plain<const FUSED: bool>(
         &self,
-        global: &[f32; GLOBAL],
+        global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &mut Buffers,
@@ -313,7 +329,7 @@ impl Kernel {
     #[inline(always)]
     fn layer1<const FUSED: bool>(
         &self,
-        global: &[f32; GLOBAL],
+        global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &mut Buffers,
@@ -325,16 +341,23 @@ impl Kernel {
                 sum[unit] = multiply_add::<FUSED>(*value, weights.0[unit], sum[unit]);
             }
         }
-        let [w0, w1, w2] = &self.w1_dynamic;
         for (row, surface) in buffers.h1.iter_mut().zip(wet) {
             let fixed = &statics.0[surface.surface].0;
-            let [d0, d1, d2] = surface.dynamic;
-            for unit in 0..WIDTH {
-                let mut value = sum[unit] + fixed[unit];
-                value = multiply_add::<FUSED>(d0, w0.0[unit], value);
-                value = multiply_add::<FUSED>(d1, w1.0[unit], value);
-                value = multiply_add::<FUSED>(d2, w2.0[unit], value);
-                row.0[unit] = value.max(0.0);
+            let mut passes = self.w1_dynamic.iter().zip(surface.dynamic.as_chunks().0);
+            let last = self.w1_dynamic.len() - 1;
+            if let Some((weights, features)) = passes.next() {
+                let floor = if last == 0 { 0.0 } else { f32::NEG_INFINITY };
+                for unit in 0..WIDTH {
+                    let value = sum[unit] + fixed[unit];
+                    row.0[unit] = add_pass::<FUSED>(value, features, weights, unit).max(floor);
+                }
+            }
+            for (index, (weights, features)) in passes.enumerate() {
+                let floor = if index + 1 == last { 0.0 } else { f32::NEG_INFINITY };
+                for unit in 0..WIDTH {
+                    let value = row.0[unit];
+                    row.0[unit] = add_pass::<FUSED>(value, features, weights, unit).max(floor);
+                }
             }
         }
     }
@@ -342,8 +365,8 @@ impl Kernel {
     #[inline(always)]
     fn layer3<const FUSED: bool>(&self, rows: usize, buffers: &mut Buffers) {
         for (row, out) in buffers.h2[..rows].iter().zip(&mut buffers.outputs) {
-            for c in 0..OUTPUTS {
-                out[c] = self.b3[c] + dot::<FUSED>(&row.0, &self.w3[c].0);
+            for ((out, weights), bias) in out.iter_mut().zip(&self.w3).zip(&self.b3) {
+                *out = bias + dot::<FUSED>(&row.0, &weights.0);
             }
         }
     }
@@ -386,6 +409,13 @@ fn pack(weights: &[f32], tile_width: usize) -> Vec<Row> {
 #[inline(always)]
 fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// What the features of a pass add to a unit.
+#[inline(always)]
+fn add_pass<const FUSED: bool>(value: f32, features: &[f32; PASS], weights: &[Row; PASS], unit: usize) -> f32 {
+    let [(d0, w0), (d1, w1), (d2, w2)] = [0, 1, 2].map(|i| (features[i], weights[i].0[unit]));
+    multiply_add::<FUSED>(d2, w2, multiply_add::<FUSED>(d1, w1, multiply_add::<FUSED>(d0, w0, value)))
 }
 
 /// Dot product in sixteen interleaved sums, so that it vectorises, added up in a fixed order.

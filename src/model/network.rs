@@ -1,7 +1,7 @@
-//! The paper's network, 27-256-256-3 with ReLU, as plain loops: the reference that the kernel is tested against, and
-//! the form in which weights are stored and trained.
+//! Three dense layers with ReLU and hidden layers of 256, 27-256-256-3 in the paper, as plain loops: the reference that
+//! the kernel is tested against, and the form in which weights are stored and trained.
 
-use crate::features::{GLOBAL, INPUTS};
+use crate::features::GLOBAL;
 
 /// Width of both hidden layers.
 pub const WIDTH: usize = 256;
@@ -36,7 +36,11 @@ impl Scaling {
 /// Weights and biases, each matrix row-major `[outputs, inputs]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
-    /// `[WIDTH, INPUTS]`
+    /// Numbers in a row of inputs.
+    pub inputs: usize,
+    /// Numbers out.
+    pub outputs: usize,
+    /// `[WIDTH, inputs]`
     pub w1: Vec<f32>,
     /// `[WIDTH]`
     pub b1: Vec<f32>,
@@ -44,9 +48,9 @@ pub struct Network {
     pub w2: Vec<f32>,
     /// `[WIDTH]`
     pub b2: Vec<f32>,
-    /// `[OUTPUTS, WIDTH]`
+    /// `[outputs, WIDTH]`
     pub w3: Vec<f32>,
-    /// `[OUTPUTS]`
+    /// `[outputs]`
     pub b3: Vec<f32>,
 }
 
@@ -54,21 +58,20 @@ impl Network {
     /// Name, shape and values of each tensor, in the order in which they are stored.
     pub fn tensors(&self) -> [(&'static str, Vec<usize>, &Vec<f32>); 6] {
         [
-            ("w1", vec![WIDTH, INPUTS], &self.w1),
+            ("w1", vec![WIDTH, self.inputs], &self.w1),
             ("b1", vec![WIDTH], &self.b1),
             ("w2", vec![WIDTH, WIDTH], &self.w2),
             ("b2", vec![WIDTH], &self.b2),
-            ("w3", vec![OUTPUTS, WIDTH], &self.w3),
-            ("b3", vec![OUTPUTS], &self.b3),
+            ("w3", vec![self.outputs, WIDTH], &self.w3),
+            ("b3", vec![self.outputs], &self.b3),
         ]
     }
 
-    /// Standardised force over density for one row of inputs.
-    pub fn forward(&self, row: &[f32; INPUTS]) -> [f32; OUTPUTS] {
+    /// What it answers to one row of inputs.
+    pub fn forward(&self, row: &[f32]) -> Vec<f32> {
         let h1 = relu(dense(&self.w1, &self.b1, row));
         let h2 = relu(dense(&self.w2, &self.b2, &h1));
-        let out = dense(&self.w3, &self.b3, &h2);
-        std::array::from_fn(|c| out[c])
+        dense(&self.w3, &self.b3, &h2)
     }
 }
 

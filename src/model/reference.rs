@@ -1,15 +1,23 @@
 //! The answer by plain loops over whole rows of features: slow, obvious, and what the fast path is tested against.
 
-use super::Model;
+use super::{Anchored, Form, Model, Paper};
+use crate::anchor::{self, Anchor, Reading};
 use crate::condition::Condition;
-use crate::features::{self, INPUTS, STATIC};
+use crate::features::{self, STATIC};
 use crate::frame::Vec3;
 use crate::geometry::submergence::Submergence;
 use crate::vehicle::Surface;
 
 impl Model {
-    /// Force on each surface, body frame [N], in the ground-contact convention of the weights.
+    /// Force on each surface, body frame [N]; by weights that have a ground-contact convention baked in, in that one.
     pub fn reference(&self, condition: &Condition) -> Vec<Vec3> {
+        match &self.weights.form {
+            Form::Paper(form) => self.reference_paper(form, condition),
+            Form::Anchored(form) => self.reference_anchored(form, condition),
+        }
+    }
+
+    fn reference_paper(&self, form: &Paper, condition: &Condition) -> Vec<Vec3> {
         let plane = condition.water_plane(self.vehicle.z0);
         let surfaces = self.vehicle.surfaces.iter().zip(&self.vehicle.samples.surfaces);
         let force = surfaces.map(|(surface, samples)| {
@@ -17,24 +25,38 @@ impl Model {
             if wet.fraction == 0.0 {
                 return Vec3::zeros();
             }
-            let output = self.weights.network.forward(&self.row(condition, surface, &wet));
-            Vec3::from(self.weights.scaling.target(output)) * condition.density
+            let output = self.weights.network.forward(&self.row(form, condition, surface, &wet));
+            Vec3::from(form.scaling.target(std::array::from_fn(|c| output[c]))) * condition.density
         });
         force.collect()
     }
 
     /// A surface's row of inputs: its 15 features, then the 12 global ones, standardised.
-    fn row(&self, condition: &Condition, surface: &Surface, wet: &Submergence) -> [f32; INPUTS] {
+    fn row(&self, form: &Paper, condition: &Condition, surface: &Surface, wet: &Submergence) -> Vec<f32> {
         let dimensions = &self.vehicle.dimensions;
         let direction = features::direction(&condition.velocity);
-        let fixed = features::surface_static(surface, dimensions).map(|x| x as f32);
-        let dynamic = features::surface_dynamic(surface, wet, &direction, dimensions).map(|x| x as f32);
-        let global = self.weights.scaling.standardize(&features::global(condition, dimensions));
-        let mut row = [0.0; INPUTS];
-        let (of_surface, of_all) = row.split_at_mut(STATIC + dynamic.len());
-        of_surface[..STATIC].copy_from_slice(&fixed);
-        of_surface[STATIC..].copy_from_slice(&dynamic);
-        of_all.copy_from_slice(&global);
-        row
+        let fixed: [f64; STATIC] = features::surface_static(surface, dimensions);
+        let dynamic = features::surface_dynamic(surface, wet, &direction, dimensions);
+        let of_surface = fixed.into_iter().chain(dynamic).map(|x| x as f32);
+        of_surface.chain(form.scaling.standardize(&features::global(condition, dimensions))).collect()
+    }
+
+    fn reference_anchored(&self, form: &Anchored, condition: &Condition) -> Vec<Vec3> {
+        let anchor = Anchor::new(&self.vehicle);
+        let mut reading = Reading::default();
+        anchor.read(&self.vehicle, condition, &mut reading);
+        let trust = Anchored::trust(form.distance(&reading.coordinates));
+        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle));
+        let force = surfaces.map(|(known, fixed)| {
+            if known.wet_fraction == 0.0 {
+                return Vec3::zeros();
+            }
+            let of_surface = fixed.into_iter().chain(known.dynamic);
+            let row: Vec<f32> = of_surface.chain(form.standardize(&reading.global)).collect();
+            let output = self.weights.network.forward(&row);
+            let answer: [f32; anchor::OUTPUTS] = std::array::from_fn(|i| output[i] * trust as f32);
+            known.hydrostatic.force + known.force(&answer)
+        });
+        force.collect()
     }
 }

@@ -129,6 +129,6 @@ fn announce(served: &ServedVehicle, metrics: &Metrics) {
     let effects = served.effects().map_or(0, |file| file.effects.len());
     let vehicle = &model.vehicle().name;
     metrics.set_bundle_version(vehicle, model.version());
-    let (version, provenance) = (model.version(), &model.weights().provenance);
+    let (version, provenance) = (model.version(), model.provenance());
     tracing::info!(vehicle, version, provenance, kernel = model.isa().name(), effects, "bundle loaded");
 }

@@ -169,7 +169,7 @@ pub struct Answer {
     /// One standard deviation of the net force [N].
     pub uncertainty_n: [f32; 3],
     /// Distance from the training domain by [`Quantity`]; 0 within.
-    pub outside: [f32; 7],
+    pub outside: [f32; 8],
     /// Source of the training data, UTF-8 padded with zeros.
     pub provenance: [u8; PROVENANCE_LEN],
     /// Force on each surface, body frame [N].
@@ -188,8 +188,6 @@ pub struct Answer {
     pub effects_outside: [f32; 5],
     /// Added mass and inertia about `about_m` by rows, forces first [kg, kg m, kg m2].
     pub added_mass: [f32; 36],
-    /// Zero.
-    pub reserved: u32,
 }
 
 /// What comes before the states of a batch.
@@ -315,7 +313,7 @@ impl Answer {
         moment_nm: [0.0; 3],
         about_m: [0.0; 3],
         uncertainty_n: [0.0; 3],
-        outside: [0.0; 7],
+        outside: [0.0; 8],
         provenance: [0; PROVENANCE_LEN],
         surface_force_n: [[0.0; 3]; MAX_SURFACES],
         surface_point_m: [[0.0; 3]; MAX_SURFACES],
@@ -325,7 +323,6 @@ impl Answer {
         effect_surface_force_n: [[0.0; 3]; MAX_SURFACES],
         effects_outside: [0.0; 5],
         added_mass: [0.0; 36],
-        reserved: 0,
     };
 
     /// The forces of a vehicle.
@@ -347,7 +344,7 @@ impl Answer {
             outside: forces.outside.excess.map(|excess| excess as f32),
             ..Self::EMPTY
         };
-        let provenance = model.weights().provenance.as_bytes();
+        let provenance = model.provenance().as_bytes();
         let len = provenance.len().min(PROVENANCE_LEN);
         answer.provenance[..len].copy_from_slice(&provenance[..len]);
         for (i, load) in forces.surfaces.iter().enumerate() {
@@ -417,4 +414,4 @@ const _: () = assert!(size_of::<EffectAnswer>() == 32);
 const _: () = assert!(size_of::<Answer>() == 3328 && align_of::<Answer>() == 8);
 const _: () = assert!(size_of::<BatchQuery>() == 24 + 136 * MAX_BATCH);
 const _: () = assert!(size_of::<BatchAnswer>() == 32 + 3328 * MAX_BATCH);
-const _: () = assert!(Quantity::ALL.len() == 7 && BoxQuantity::ALL.len() == 5 && PHYSICS == 14);
+const _: () = assert!(Quantity::ALL.len() == 8 && BoxQuantity::ALL.len() == 5 && PHYSICS == 14);

@@ -25,8 +25,11 @@ impl Adam {
     }
 
     /// One step down the gradient.
-    pub fn step(&mut self, rate: f64, parameters: &mut [f32], gradient: &[f32]) {
+    ///
+    /// `decay`, a share of the rate, pulls the parameters towards zero beside the gradient (Loshchilov, Hutter, ICLR 2019).
+    pub fn step(&mut self, rate: f64, decay: f64, parameters: &mut [f32], gradient: &[f32]) {
         self.steps = self.steps.saturating_add(1);
+        let keep = (1.0 - rate * decay) as f32;
         let unbias = |beta: f32| 1.0 - f64::from(beta).powi(self.steps);
         let rate = (rate / unbias(BETA1)) as f32;
         let square_scale = unbias(BETA2).sqrt().recip() as f32;
@@ -34,7 +37,7 @@ impl Adam {
         for ((p, g), (m, v)) in parameters.iter_mut().zip(gradient).zip(state) {
             *m += (1.0 - BETA1) * (g - *m);
             *v += (1.0 - BETA2) * (g * g - *v);
-            *p -= rate * *m / (v.sqrt() * square_scale + EPSILON);
+            *p = *p * keep - rate * *m / (v.sqrt() * square_scale + EPSILON);
         }
     }
 }
@@ -78,7 +81,7 @@ mod tests {
     #[test]
     fn the_first_step_has_the_length_of_the_rate() {
         let (mut adam, mut parameters) = (Adam::new(2), [1.0, 1.0]);
-        adam.step(0.01, &mut parameters, &[5.0, -1e-3]);
+        adam.step(0.01, 0.0, &mut parameters, &[5.0, -1e-3]);
         assert!((parameters[0] - 0.99).abs() < 1e-6 && (parameters[1] - 1.01).abs() < 1e-6);
     }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::TrainError;
+use super::anchored::loss::AnchoredLoss;
 use super::loss::LossConfig;
 use super::plan::Table;
 
@@ -36,10 +37,30 @@ pub struct Config {
     pub parts: usize,
     /// Threads at most, 1 or 2: a batch is worked on in two halves either way, so the bits are the same.
     pub threads: usize,
+    /// Share of the learning rate by which Adam pulls each weight towards zero (Loshchilov, Hutter 2019); the paper has none.
+    pub weight_decay: f64,
     /// Weights of the loss.
     pub loss: LossConfig,
+    /// What the anchored network needs besides.
+    pub anchored: AnchoredConfig,
     /// The loads by formula, where these are learnt from.
     pub analytic: Analytic,
+}
+
+/// Settings that only the anchored network has.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AnchoredConfig {
+    /// Networks that are trained besides, each without a part of the cases, to learn how far the answer may be off.
+    pub folds: usize,
+    /// Weights of the loss.
+    pub loss: AnchoredLoss,
+}
+
+impl Default for AnchoredConfig {
+    fn default() -> Self {
+        Self { folds: 5, loss: AnchoredLoss::default() }
+    }
 }
 
 /// Which weights a training keeps.
@@ -84,7 +105,9 @@ impl Default for Config {
             held_out_share: 0.2,
             parts: 5,
             threads: 2,
+            weight_decay: 0.0,
             loss: LossConfig::default(),
+            anchored: AnchoredConfig::default(),
             analytic: Analytic::default(),
         }
     }
@@ -100,6 +123,11 @@ impl Config {
         Self { epochs: 2000, patience: 60, least_learning_rate: 1e-6, ..Self::default() }
     }
 
+    /// For the anchored network, which learns from one state a case.
+    pub fn anchored() -> Self {
+        Self { epochs: 1500, patience: 60, least_learning_rate: 1e-6, weight_decay: 0.01, ..Self::default() }
+    }
+
     /// Refuses numbers that make no sense.
     pub fn validate(&self) -> Result<(), TrainError> {
         let least = [
@@ -113,6 +141,12 @@ impl Config {
             ("learning_rate", self.learning_rate, f64::MIN_POSITIVE, "positive"),
             ("loss.epsilon", self.loss.epsilon, f64::MIN_POSITIVE, "positive"),
             ("least_learning_rate", self.least_learning_rate, 0.0, "0 or more"),
+            ("weight_decay", self.weight_decay, 0.0, "0 or more"),
+            ("anchored.folds", self.anchored.folds as f64, 2.0, "at least 2"),
+            ("anchored.loss.delta", self.anchored.loss.delta, f64::MIN_POSITIVE, "positive"),
+            ("anchored.loss.floor", self.anchored.loss.floor, f64::MIN_POSITIVE, "positive"),
+            ("anchored.loss.net_weight", self.anchored.loss.net_weight, 0.0, "0 or more"),
+            ("anchored.loss.moment_weight", self.anchored.loss.moment_weight, 0.0, "0 or more"),
         ];
         // NaN is neither below nor above
         let refused = least.into_iter().find(|(_, value, least, _)| !(value >= least && value.is_finite()));
@@ -124,7 +158,11 @@ impl Config {
             let (key, value) = ("least_learning_rate", self.least_learning_rate);
             return Err(TrainError::Config { key, value, expected: "below learning_rate" });
         }
-        let shares = [("held_out_share", self.held_out_share), ("loss.alpha", self.loss.alpha)];
+        let shares = [
+            ("held_out_share", self.held_out_share),
+            ("loss.alpha", self.loss.alpha),
+            ("anchored.loss.exponent", self.anchored.loss.exponent),
+        ];
         match shares.into_iter().find(|(_, share)| !(0.0..=1.0).contains(share)) {
             Some((key, value)) => Err(TrainError::Config { key, value, expected: "between 0 and 1" }),
             None => Ok(()),

@@ -1,5 +1,6 @@
 //! The training domain of weights that were learnt from samples.
 
+use super::{Sides, Source, TrainError};
 use crate::condition::Condition;
 use crate::dataset::Sample;
 use crate::domain::{Domain, Range};
@@ -8,6 +9,13 @@ use crate::domain::{Domain, Range};
 pub(super) const TILT: f64 = 0.01;
 pub(super) const HEAVE: f64 = 0.05;
 pub(super) const TURN: f64 = 0.05;
+
+/// The ranges of the states of a vehicle that were learnt from; those of all vehicles where none was of this one.
+pub(super) fn learnt(name: &str, source: &Source, sides: Sides<'_>) -> Result<Domain, TrainError> {
+    let samples = || sides.split.training.iter().map(|&number| &source.data.samples[number]);
+    let of_vehicle = of(samples().filter(|sample| sample.vehicle == name));
+    of_vehicle.or_else(|| of(samples())).ok_or(TrainError::EmptySide { side: "training" })
+}
 
 /// The ranges of some states; `None` where there is none, or none that moves.
 pub fn of<'a>(samples: impl Iterator<Item = &'a Sample> + Clone) -> Option<Domain> {

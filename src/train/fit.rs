@@ -125,7 +125,7 @@ impl<'a> Fit<'a> {
         };
         of_first.iter_mut().zip(of_second.iter()).for_each(|(a, b)| *a += b);
         let State { layers, adam, plateau, .. } = &mut self.state;
-        adam.step(plateau.rate, &mut layers.parameters, &self.gradients[0]);
+        adam.step(plateau.rate, self.config.weight_decay, &mut layers.parameters, &self.gradients[0]);
         Ok(losses.iter().sum())
     }
 

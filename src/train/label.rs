@@ -38,15 +38,25 @@ pub fn at_rest(vehicle: &Vehicle, condition: &Condition) -> Vec<Wrench> {
 /// part at rest it is taken as it is. `order` says where each of the vehicle's surfaces stands in the data set.
 pub fn labels(vehicle: &Vehicle, order: &[usize], sample: &Sample) -> Vec<Label> {
     let exact = at_rest(vehicle, &sample.condition);
-    let label = |(&index, exact): (&usize, &Wrench)| {
-        let load = &sample.surfaces[index];
-        let Some(rest) = load.rest else { return Label { force: load.force, moment: load.moment } };
-        Label {
-            force: load.force - rest.force + exact.force,
-            moment: load.moment.map(|moment| moment - rest.moment + exact.moment),
-        }
+    let add = |(label, exact): (Label, &Wrench)| Label {
+        force: label.force + exact.force,
+        moment: label.moment.map(|moment| moment + exact.moment),
     };
-    order.iter().zip(&exact).map(label).collect()
+    beyond(order, sample, &exact).zip(&exact).map(add).collect()
+}
+
+/// What the motion adds to the load of still water, in the order of the vehicle's surfaces.
+pub fn dynamic(vehicle: &Vehicle, order: &[usize], sample: &Sample) -> Vec<Label> {
+    beyond(order, sample, &at_rest(vehicle, &sample.condition)).collect()
+}
+
+/// Each load less its part at rest, or less the hull's own where the data set states none.
+fn beyond<'a>(order: &'a [usize], sample: &'a Sample, exact: &'a [Wrench]) -> impl Iterator<Item = Label> + 'a {
+    order.iter().zip(exact).map(|(&index, exact)| {
+        let load = &sample.surfaces[index];
+        let (force, moment) = load.rest.map_or((exact.force, exact.moment), |rest| (rest.force, rest.moment));
+        Label { force: load.force - force, moment: load.moment.map(|found| found - moment) }
+    })
 }
 
 /// Where each of the vehicle's surfaces stands among those of a data set.

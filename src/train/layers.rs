@@ -25,8 +25,8 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// The network that is served.
-    pub const SERVED: Self = Self { inputs: INPUTS, width: WIDTH, outputs: OUTPUTS };
+    /// The paper's network.
+    pub const PAPER: Self = Self { inputs: INPUTS, width: WIDTH, outputs: OUTPUTS };
 
     /// Rows and columns of the six tensors in storage (a bias has one column).
     fn shapes(self) -> [(usize, usize); 6] {
@@ -66,8 +66,9 @@ pub struct Layers<T> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Activations<T> {
     hidden1: DMatrix<T>,
-    hidden2: DMatrix<T>,
-    /// Standardised force over density, `[outputs, columns]`.
+    /// After the second hidden layer, `[width, columns]`.
+    pub hidden2: DMatrix<T>,
+    /// `[outputs, columns]`
     pub output: DMatrix<T>,
 }
 
@@ -151,11 +152,20 @@ impl Layers<f32> {
     /// The network as it is served.
     ///
     /// # Panics
-    /// When the layers are not of the sizes of a `Network`.
+    /// When the hidden layers are not as wide as those of a `Network`.
     pub fn network(&self) -> Network {
-        assert_eq!(self.sizes, Sizes::SERVED, "only layers of the served sizes make a network");
+        let Sizes { inputs, width, outputs } = self.sizes;
+        assert_eq!(width, WIDTH, "only layers of the served width make a network");
         let [w1, b1, w2, b2, w3, b3] = self.sizes.ranges().map(|range| self.parameters[range].to_vec());
-        Network { w1, b1, w2, b2, w3, b3 }
+        Network { inputs, outputs, w1, b1, w2, b2, w3, b3 }
+    }
+
+    /// Replaces the weights and the bias of one output.
+    pub fn set_output(&mut self, output: usize, weights: &[f64], bias: f64) {
+        let [.., last, biases] = self.sizes.ranges();
+        let row = &mut self.parameters[last][output * self.sizes.width..];
+        row.iter_mut().zip(weights).for_each(|(to, from)| *to = *from as f32);
+        self.parameters[biases.start + output] = bias as f32;
     }
 }
 
@@ -176,18 +186,18 @@ mod tests {
     #[test]
     fn forward_agrees_with_the_served_network() {
         let mut random = Random::new(5);
-        let layers = Layers::<f32>::random(Sizes::SERVED, &mut random);
+        let layers = Layers::<f32>::random(Sizes::PAPER, &mut random);
         let inputs = DMatrix::from_fn(INPUTS, 9, |_, _| random.unit() as f32 - 0.5);
         let output = layers.forward(&inputs).output;
         for (column, input) in output.column_iter().zip(inputs.column_iter()) {
-            let expected = layers.network().forward(&std::array::from_fn(|i| input[i]));
+            let expected = layers.network().forward(input.as_slice());
             assert!(column.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5));
         }
     }
 
     #[test]
     fn a_silenced_input_has_no_say() {
-        let mut layers = Layers::<f32>::random(Sizes { width: 8, ..Sizes::SERVED }, &mut Random::new(5));
+        let mut layers = Layers::<f32>::random(Sizes { width: 8, ..Sizes::PAPER }, &mut Random::new(5));
         layers.silence(20);
         let quiet = DMatrix::from_element(INPUTS, 1, 0.3);
         let mut loud = quiet.clone();

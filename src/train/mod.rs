@@ -8,6 +8,7 @@
 
 pub mod adam;
 pub mod analytic;
+pub mod anchored;
 pub mod checkpoint;
 mod config;
 pub mod domain;
@@ -36,13 +37,15 @@ use crate::dataset::mirror::{self, MirrorError};
 use crate::dataset::split::Split;
 use crate::dataset::{Image, split};
 use crate::domain::Domain;
+use crate::condition::GroundContact;
 use crate::model::network::{OUTPUTS, Scaling};
+use crate::model::{Form, Paper, Weights};
 use crate::vehicle::Vehicle;
 use checkpoint::{Checkpoint, CheckpointError};
 use fit::{Epoch, Fit};
 use layers::Layers;
 use samples::Sample;
-use score::Score;
+use score::{Judged, Score};
 use task::Task;
 
 /// A checkpoint is written after this many epochs.
@@ -178,13 +181,13 @@ impl Sides<'_> {
 
 /// What came out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trained {
-    /// What was learnt.
-    pub variant: Variant,
+pub struct Trained<L> {
+    /// Name of what was learnt.
+    pub name: &'static str,
     /// One network for all vehicles.
     pub layers: Layers<f32>,
-    /// Its standardisation.
-    pub scaling: Scaling,
+    /// What goes with it: [`Published`], or [`crate::model::Anchored`].
+    pub learnt: L,
     /// What holds for each vehicle of the data set, in the order of their names.
     pub vehicles: Vec<TrainedVehicle>,
     /// Every epoch.
@@ -193,6 +196,15 @@ pub struct Trained {
     pub kept_epoch: u32,
     /// Seconds an epoch took in this run [s]; `None` where there was none left to do.
     pub epoch_s: Option<f64>,
+}
+
+/// What goes with a network of the paper.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Published {
+    /// What was learnt.
+    pub variant: Variant,
+    /// Its standardisation.
+    pub scaling: Scaling,
 }
 
 /// The part of a training that belongs to one vehicle.
@@ -209,7 +221,7 @@ pub struct TrainedVehicle {
     pub score: Score,
 }
 
-/// Trains one network for all vehicles of a data set; `progress` hears of every epoch.
+/// Trains one network of the paper for all vehicles of a data set; `progress` hears of every epoch.
 pub fn train(
     source: &Source,
     sides: Sides<'_>,
@@ -217,7 +229,7 @@ pub fn train(
     config: &Config,
     checkpoint: Option<&Checkpoint>,
     progress: &dyn Fn(&Epoch),
-) -> Result<Trained, TrainError> {
+) -> Result<Trained<Published>, TrainError> {
     config.validate()?;
     sides.check(&source.data)?;
     let side = |numbers: &[usize]| samples::samples(&source.data, numbers, &source.vehicles);
@@ -227,9 +239,9 @@ pub fn train(
     let (fit, epochs) = run(&task, config, checkpoint, progress)?;
     let (layers, kept_epoch) = fit.kept();
     let mut trained = Trained {
-        variant,
+        name: variant.name(),
         layers,
-        scaling,
+        learnt: Published { variant, scaling },
         vehicles: Vec::new(),
         history: fit.state.history,
         kept_epoch,
@@ -269,15 +281,28 @@ fn run<'a>(
     Ok((fit, epochs))
 }
 
-impl Trained {
+impl Trained<Published> {
+    /// The weights as they are served, of a vehicle and a data set's convention for the contact patches.
+    pub fn weights(
+        &self,
+        of_vehicle: &TrainedVehicle,
+        ground_contact: GroundContact,
+        provenance: String,
+    ) -> Weights {
+        let (scaling, held_out_rms) = (self.learnt.scaling.clone(), of_vehicle.held_out_rms);
+        let form = Form::Paper(Paper { scaling, ground_contact, held_out_rms });
+        Weights { network: self.layers.network(), form, provenance }
+    }
+
     /// Force over density on each surface as this variant sees them [m4/s2]: nothing from one without a wet sample.
     pub fn force_over_density(&self, sample: &Sample) -> Vec<[f64; OUTPUTS]> {
-        let view = self.variant.view(sample);
-        let rows = self.variant.rows(&view, &self.scaling, 0.0);
+        let Published { variant, scaling } = &self.learnt;
+        let view = variant.view(sample);
+        let rows = variant.rows(&view, scaling, 0.0);
         let inputs = nalgebra::DMatrix::from_vec(self.layers.sizes.inputs, view.surfaces.len(), rows.inputs);
         let output = self.layers.forward(&inputs).output;
         let surface = |(column, fraction): (usize, &f32)| match *fraction > 0.0 {
-            true => self.scaling.target(std::array::from_fn(|c| output[(c, column)])),
+            true => scaling.target(std::array::from_fn(|c| output[(c, column)])),
             false => [0.0; OUTPUTS],
         };
         view.fractions.iter().enumerate().map(surface).collect()
@@ -293,16 +318,17 @@ impl Trained {
     ) -> Result<TrainedVehicle, TrainError> {
         let score = |samples: &[Sample]| {
             let of_vehicle = samples.iter().filter(|sample| sample.vehicle == index);
-            Score::of(of_vehicle, |sample| samples::sum(&self.force_over_density(sample)))
+            Score::of(of_vehicle.map(|sample| Judged {
+                density: sample.density,
+                truth: sample.net_force_over_density(),
+                guess: samples::sum(&self.force_over_density(sample)),
+            }))
         };
-        let learnt = || sides.split.training.iter().map(|&number| &source.data.samples[number]);
-        let of_vehicle = domain::of(learnt().filter(|sample| sample.vehicle == name));
-        let domain = of_vehicle.or_else(|| domain::of(learnt()));
         let held_out = score(held_out);
         let judged = if held_out.samples > 0 { held_out } else { score(training) };
         Ok(TrainedVehicle {
             name: name.to_owned(),
-            domain: domain.ok_or(TrainError::EmptySide { side: "training" })?,
+            domain: domain::learnt(name, source, sides)?,
             held_out_rms: judged.rms_over_density,
             score: held_out,
         })

@@ -22,7 +22,7 @@ pub(crate) fn style() -> &'static str {
 
 /// The page.
 pub(super) fn page(record: &Record) -> Result<String, PlotError> {
-    let title = format!("wade train: {} on {}", record.variant.name(), record.data.name);
+    let title = format!("wade train: {} on {}", record.variant, record.data.name);
     let title = escape(&title);
     let curve = |name: &str, of: fn(&super::fit::Epoch) -> f64| Series {
         name: name.to_owned(),

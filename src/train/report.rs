@@ -12,7 +12,7 @@ use super::fit::Epoch;
 use super::plot::PlotError;
 use super::score::Score;
 use super::task::hexadecimal;
-use super::{Config, Sides, Source, Trained, Variant, page};
+use super::{Config, Sides, Source, Trained, page};
 use crate::dataset::split::By;
 use crate::model::network::Network;
 
@@ -77,8 +77,8 @@ pub struct VehicleRecord {
 pub struct Record {
     /// Version and commit of this program.
     pub program: String,
-    /// What was learnt.
-    pub variant: Variant,
+    /// What was learnt: "paper", or "anchored".
+    pub variant: String,
     /// What it was learnt from.
     pub data: DataFile,
     /// How the samples were dealt out.
@@ -139,8 +139,8 @@ pub fn sha256_of(path: &Path) -> std::io::Result<String> {
 
 impl Record {
     /// The record of a training.
-    pub fn new(
-        trained: &Trained,
+    pub fn new<L>(
+        trained: &Trained<L>,
         source: &Source,
         sides: Sides<'_>,
         part: usize,
@@ -154,7 +154,7 @@ impl Record {
         let score = |v: &super::TrainedVehicle| VehicleRecord { name: v.name.clone(), score: v.score };
         Self {
             program: program.to_owned(),
-            variant: trained.variant,
+            variant: trained.name.to_owned(),
             data,
             split: SplitRecord {
                 name: split.name.clone(),

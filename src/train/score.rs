@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::samples::Sample;
 use crate::model::network::OUTPUTS;
 
 /// Errors of the net force, component by component, body frame.
@@ -20,22 +19,29 @@ pub struct Score {
     pub spread: [f64; OUTPUTS],
 }
 
+/// The net force over density in a state [m4/s2].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// Fluid density [kg/m3].
+    pub density: f64,
+    /// As it is.
+    pub truth: [f64; OUTPUTS],
+    /// As it was predicted.
+    pub guess: [f64; OUTPUTS],
+}
+
 impl Score {
-    /// Compares predictions of the net force over density [m4/s2] with the truth. All zero without samples.
-    pub fn of<'a>(
-        samples: impl Iterator<Item = &'a Sample>,
-        predict: impl Fn(&Sample) -> [f64; OUTPUTS],
-    ) -> Self {
+    /// Compares predictions with the truth. All zero without any.
+    pub fn of(states: impl Iterator<Item = Judged>) -> Self {
         let mut score = Self::default();
         let mut mean = [0.0; OUTPUTS];
-        for sample in samples {
+        for Judged { density, truth, guess } in states {
             score.samples += 1;
-            let (truth, guess) = (sample.net_force_over_density(), predict(sample));
             for c in 0..OUTPUTS {
                 let error = guess[c] - truth[c];
-                let force = truth[c] * sample.density;
-                score.mae[c] += (error * sample.density).abs();
-                score.rms[c] += (error * sample.density).powi(2);
+                let force = truth[c] * density;
+                score.mae[c] += (error * density).abs();
+                score.rms[c] += (error * density).powi(2);
                 score.rms_over_density[c] += error.powi(2);
                 mean[c] += force;
                 score.spread[c] += force.powi(2);

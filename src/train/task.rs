@@ -72,7 +72,7 @@ impl Task {
         Ok(Batch {
             surfaces,
             inputs: matrix(self.sizes.inputs, |rows| &rows.inputs),
-            targets: matrix(self.sizes.outputs, |rows| &rows.targets),
+            targets: matrix(self.objective.targets(), |rows| &rows.targets),
             dry: samples.iter().flat_map(|rows| rows.dry.iter().copied()).collect(),
         })
     }
@@ -109,7 +109,7 @@ fn scaling(training: &[Sample]) -> Scaling {
 }
 
 /// Mean and standard deviation of each component; 1 for the deviation of a constant, which then becomes zero.
-fn moments<const N: usize>(rows: impl Iterator<Item = [f64; N]> + Clone) -> ([f64; N], [f64; N]) {
+pub(super) fn moments<const N: usize>(rows: impl Iterator<Item = [f64; N]> + Clone) -> ([f64; N], [f64; N]) {
     let count = rows.clone().count() as f64;
     let mean: [f64; N] = std::array::from_fn(|i| rows.clone().map(|row| row[i]).sum::<f64>() / count);
     let deviation = std::array::from_fn(|i| {

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use super::anchored::loss::{AnchoredLoss, TARGETS, loss as anchored_loss};
 use super::layers::Sizes;
 use super::loss::{Batch, Counts, LossConfig, TargetScale, loss};
 use super::samples::{Sample, SurfaceRow, sum};
@@ -19,7 +20,7 @@ const FRACTION: usize = 12;
 const DEPTH: usize = 13;
 const PROJECTED: usize = 14;
 
-/// What a network is given and asked for. Only `Paper` can be served; the others are the source paper's ablations.
+/// What a network of the paper is given and asked for. Only `Paper` can be served; the others are its ablations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variant {
@@ -56,9 +57,19 @@ pub enum Objective {
         /// Scale of the targets.
         scale: TargetScale<f32>,
     },
+    /// That of the anchored network.
+    Anchored(AnchoredLoss),
 }
 
 impl Objective {
+    /// Numbers that a row's target has.
+    pub fn targets(&self) -> usize {
+        match self {
+            Self::Paper { .. } => OUTPUTS,
+            Self::Anchored(_) => TARGETS,
+        }
+    }
+
     /// The share of a part of a batch in the loss of the whole batch, which has `counts`; and its gradient by the outputs.
     pub fn loss(&self, batch: &Batch<f32>, counts: &Counts, output: &DMatrix<f32>) -> (f64, DMatrix<f32>) {
         match self {
@@ -66,6 +77,7 @@ impl Objective {
                 let (terms, gradient) = loss(config, scale, batch, counts, output);
                 (terms.total(config), gradient)
             }
+            Self::Anchored(config) => anchored_loss(config, batch, counts, output),
         }
     }
 }

@@ -61,7 +61,7 @@ impl Subject {
         Self {
             vehicle: model.vehicle().name.clone(),
             version: model.version(),
-            weights: model.weights().provenance.clone(),
+            weights: model.provenance().to_owned(),
         }
     }
 }

@@ -174,7 +174,7 @@ pub fn response(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> proto::Ev
         in_domain: forces.outside.is_inside(),
         outside: outside(&forces.outside, 0).collect(),
         bundle_version: model.version(),
-        provenance: model.weights().provenance.clone(),
+        provenance: model.provenance().to_owned(),
         compute_ns: *compute_ns,
         effects: effects.loads.iter().map(effect_load).collect(),
         effect_surface_force_n: effects.surface_forces.iter().flat_map(single).collect(),
@@ -244,7 +244,7 @@ pub fn batch_response(vehicle: &ServedVehicle, len: usize, with_surfaces: bool) 
         about_m: Some(vector3(&model.vehicle().center_of_mass)),
         uncertainty_n: Vec::with_capacity(3 * len),
         bundle_version: model.version(),
-        provenance: model.weights().provenance.clone(),
+        provenance: model.provenance().to_owned(),
         effect_force_n: Vec::with_capacity(3 * len * codes.len()),
         effect_moment_nm: Vec::with_capacity(3 * len * codes.len()),
         effect_left_out: Vec::with_capacity(len * codes.len()),
@@ -295,7 +295,7 @@ pub fn summary(vehicle: &ServedVehicle) -> proto::VehicleSummary {
         name: model.vehicle().name.clone(),
         bundle_version: model.version(),
         surface_count: model.vehicle().surfaces.len() as u32,
-        provenance: model.weights().provenance.clone(),
+        provenance: model.provenance().to_owned(),
     }
 }
 
@@ -368,10 +368,10 @@ fn surface(surface: &Surface) -> proto::Surface {
 
 fn ranges(domain: &Domain) -> Vec<proto::Range> {
     let range = |quantity: Quantity| {
-        let range = domain.range(quantity);
-        proto::Range { quantity: quantity as i32, minimum: range.min, maximum: range.max }
+        let range = domain.range(quantity)?;
+        Some(proto::Range { quantity: quantity as i32, minimum: range.min, maximum: range.max })
     };
-    Quantity::ALL.into_iter().map(range).collect()
+    Quantity::ALL.into_iter().filter_map(range).collect()
 }
 
 /// A row of the latency table.

@@ -1,0 +1,114 @@
+//! What is learnt, and how a network's answers become forces.
+
+use crate::anchor::{COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS};
+use crate::condition::GroundContact;
+use crate::model::network::{Network, OUTPUTS, Scaling};
+
+/// What the weights are and where they come from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weights {
+    /// Layers.
+    pub network: Network,
+    /// What the network is told and what its answers mean.
+    pub form: Form,
+    /// Source of the training data, such as `analytic`.
+    pub provenance: String,
+}
+
+/// What a network is told and what its answers mean.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Form {
+    /// The paper's: the force on a surface over the density, as a whole.
+    Paper(Paper),
+    /// See [`crate::anchor`]: what is left of the force besides hydrostatics and a simple drag.
+    Anchored(Box<Anchored>),
+}
+
+/// The paper's standardisation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Paper {
+    /// Standardisation of inputs and targets.
+    pub scaling: Scaling,
+    /// Convention of the training data for the contact patches, which the weights have baked in.
+    pub ground_contact: GroundContact,
+    /// Root mean square of the error of the net force over density on held-out cases of this vehicle [m4/s2].
+    pub held_out_rms: [f64; OUTPUTS],
+}
+
+/// Index of the answer that says how far the others may be off.
+pub const SPREAD: usize = ANCHORED_OUTPUTS;
+
+/// Distances, in units of what is usual, from which the learnt part has faded to nothing.
+const FAR: f64 = 3.0;
+
+/// What goes with a network that learnt the remainder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Anchored {
+    /// Mean of each global feature over the training cases.
+    pub global_mean: [f32; GLOBAL],
+    /// Standard deviation of each global feature; 1 where it never varied.
+    pub global_std: [f32; GLOBAL],
+    /// One standard deviation of each component of the net force, over the network's own measure of it [-].
+    pub spread: [f32; OUTPUTS],
+    /// Where the training cases lie; in units of `coordinate_scale`.
+    pub cases: Vec<[f32; COORDINATES]>,
+    /// Unit of each coordinate.
+    pub coordinate_scale: [f32; COORDINATES],
+    /// Distance to their nearest neighbor that 95 % of the training cases keep.
+    pub near: f32,
+}
+
+impl Anchored {
+    /// Standardised global features.
+    pub fn standardize(&self, global: &[f64; GLOBAL]) -> [f32; GLOBAL] {
+        std::array::from_fn(|i| (global[i] as f32 - self.global_mean[i]) / self.global_std[i])
+    }
+
+    /// Distance to the nearest training case, over what is usual among these.
+    pub fn distance(&self, coordinates: &[f64; COORDINATES]) -> f64 {
+        let here = self.place(coordinates);
+        let squared = |case: &[f32; COORDINATES]| {
+            here.iter().zip(case).fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
+        };
+        let nearest = self.cases.iter().map(squared).fold(f32::INFINITY, f32::min);
+        f64::from(nearest.sqrt() / self.near)
+    }
+
+    /// Coordinates of a state in the units of the cases.
+    pub fn place(&self, coordinates: &[f64; COORDINATES]) -> [f32; COORDINATES] {
+        std::array::from_fn(|i| coordinates[i] as f32 / self.coordinate_scale[i])
+    }
+
+    /// How much of the learnt part counts at a distance: all of it up to 1, nothing from [`FAR`], smooth between.
+    pub fn trust(distance: f64) -> f64 {
+        let x = ((FAR - distance) / (FAR - 1.0)).clamp(0.0, 1.0);
+        x * x * (3.0 - 2.0 * x)
+    }
+
+    /// The measure that the network states of a surface's uncertainty, 0 or more: `ln(1 + e^x)`.
+    pub fn softplus(output: f32) -> f64 {
+        let x = f64::from(output);
+        x.max(0.0) + (-x.abs()).exp().ln_1p()
+    }
+}
+
+impl Form {
+    /// Name in files and reports.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Paper(_) => "paper",
+            Self::Anchored(_) => "anchored",
+        }
+    }
+}
+
+impl Weights {
+    /// Convention for the contact patches that the weights have baked in; `None` where they serve both.
+    pub fn ground_contact(&self) -> Option<GroundContact> {
+        match &self.form {
+            Form::Paper(paper) => Some(paper.ground_contact),
+            Form::Anchored(_) => None,
+        }
+    }
+}
+

@@ -1,0 +1,133 @@
+//! States to learn the remainder from: what is known of each beforehand, and the dynamic load that CFD found.
+
+use std::collections::BTreeMap;
+
+use super::super::TrainError;
+use super::super::label;
+use crate::anchor::{Anchor, Reading, STATIC};
+use crate::condition::Condition;
+use crate::dataset::{Dataset, Image};
+use crate::frame::{GRAVITY, Vec3};
+use crate::vehicle::Vehicle;
+use crate::wrench::Wrench;
+
+/// A vehicle as the anchored network sees it.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    /// Name.
+    pub name: String,
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// What is known of it.
+    pub anchor: Anchor,
+    /// Static features of its surfaces.
+    pub fixed: Vec<[f32; STATIC]>,
+    /// Where each of its surfaces stands in the data set.
+    order: Vec<usize>,
+}
+
+impl Prepared {
+    /// Every vehicle of a data set, in the order of their names.
+    pub fn all(data: &Dataset, vehicles: &BTreeMap<String, Vehicle>) -> Result<Vec<Self>, TrainError> {
+        let prepare = |(name, surfaces): (&String, &Vec<String>)| {
+            let unknown = || TrainError::UnknownVehicle { vehicle: name.clone() };
+            let vehicle = vehicles.get(name).ok_or_else(unknown)?;
+            let anchor = Anchor::new(vehicle);
+            Ok(Self {
+                name: name.clone(),
+                fixed: anchor.static_rows(vehicle),
+                anchor,
+                order: label::order(vehicle, surfaces)?,
+                vehicle: vehicle.clone(),
+            })
+        };
+        data.meta.vehicles.iter().map(prepare).collect()
+    }
+
+    /// Weight of the vehicle in the air [N], the unit in which its loads are judged.
+    pub fn weight(&self) -> f64 {
+        self.vehicle.mass * GRAVITY
+    }
+}
+
+/// One state, averaged over the sections of its case.
+#[derive(Debug, Clone)]
+pub struct Known {
+    /// Index of the vehicle.
+    pub vehicle: usize,
+    /// Name of the case.
+    pub case: String,
+    /// The state.
+    pub condition: Condition,
+    /// What is known of it.
+    pub reading: Reading,
+    /// Dynamic load on each surface: force, and moment about the body origin where the data set has it.
+    pub loads: Vec<(Vec3, Option<Vec3>)>,
+}
+
+impl Known {
+    /// The states of some samples of a data set: one a case, image and condition, averaged over sections.
+    ///
+    /// Images across the plane y = 0 are left out: the model answers them with the mirror image of the original's
+    /// answer whatever its weights, so they would count each case twice and teach nothing.
+    pub fn states(data: &Dataset, numbers: &[usize], vehicles: &[Prepared]) -> Vec<Self> {
+        let mut groups: Vec<(&crate::dataset::Sample, Vec<usize>)> = Vec::new();
+        let mut last: BTreeMap<(&str, Image), usize> = BTreeMap::new();
+        for &number in numbers {
+            let sample = &data.samples[number];
+            if !matches!(sample.image, Image::Original | Image::FrontRear) {
+                continue;
+            }
+            let key = (sample.case.as_str(), sample.image);
+            match last.get(&key).filter(|&&group| groups[group].0.condition == sample.condition) {
+                Some(&group) => groups[group].1.push(number),
+                None => {
+                    last.insert(key, groups.len());
+                    groups.push((sample, vec![number]));
+                }
+            }
+        }
+        let state = |(first, members): (&crate::dataset::Sample, Vec<usize>)| {
+            let index = vehicles.iter().position(|prepared| prepared.name == first.vehicle)?;
+            let prepared = &vehicles[index];
+            let mut reading = Reading::default();
+            prepared.anchor.read(&prepared.vehicle, &first.condition, &mut reading);
+            Some(Self {
+                vehicle: index,
+                case: first.case.clone(),
+                condition: first.condition,
+                loads: mean_loads(data, &members, prepared),
+                reading,
+            })
+        };
+        groups.into_iter().filter_map(state).collect()
+    }
+
+    /// Net hydrostatic force of the hull [N].
+    pub fn hydrostatic(&self) -> Vec3 {
+        self.reading.surfaces.iter().map(|surface| surface.hydrostatic.force).sum()
+    }
+
+    /// Net dynamic force that was found [N].
+    pub fn dynamic(&self) -> Vec3 {
+        self.loads.iter().map(|(force, _)| *force).sum()
+    }
+}
+
+fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> Vec<(Vec3, Option<Vec3>)> {
+    let mut sums = vec![(Vec3::zeros(), Some(Vec3::zeros())); prepared.order.len()];
+    for &member in members {
+        let found = label::dynamic(&prepared.vehicle, &prepared.order, &data.samples[member]);
+        for (sum, load) in sums.iter_mut().zip(found) {
+            sum.0 += load.force;
+            sum.1 = sum.1.zip(load.moment).map(|(sum, moment)| sum + moment);
+        }
+    }
+    let count = members.len() as f64;
+    sums.into_iter().map(|(force, moment)| (force / count, moment.map(|m| m / count))).collect()
+}
+
+/// Moment about `point` of a load with a moment about the origin [N m].
+pub fn about(load: &Wrench, point: &Vec3) -> Vec3 {
+    load.moment - point.cross(&load.force)
+}

@@ -1,0 +1,255 @@
+//! The anchored model learns, and is served as it was learnt: its gradient is right, the bundle answers as the trainer
+//! does, nothing is left of the network far from what it learnt from, and every instruction set agrees.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use tempfile::TempDir;
+use wade::anchor::{OUTPUTS, Reading};
+use wade::bundle::{self, Bundle};
+use wade::condition::{Condition, GroundContact};
+use wade::dataset::split::{By, Split, split};
+use wade::domain::Quantity;
+use wade::forces::Forces;
+use wade::frame::Vec3;
+use wade::geometry::hydrostatics::hydrostatics;
+use wade::model::kernel::Isa;
+use wade::model::{Anchored, Model, SPREAD, Workspace};
+use wade::random::Random;
+use wade::train::anchored::known::{Known, Prepared};
+use wade::train::anchored::loss::{AnchoredLoss, TARGETS, loss, targets};
+use wade::train::anchored;
+use wade::train::checkpoint::Checkpoint;
+use wade::train::layers::{Layers, Sizes};
+use wade::train::loss::Batch;
+use wade::train::{self, Analytic, Config, Sides, Source, Trained};
+use wade::vehicle::Vehicle;
+
+const BY: By = By::Case { share: 0.2 };
+
+struct Lesson {
+    source: Source,
+    split: Split,
+}
+
+impl Lesson {
+    /// Loads by formula, of which the hydrostatic part is exactly what the model knows beforehand.
+    fn new() -> Self {
+        let vehicle = |name: &str| common::model(name).vehicle().clone();
+        let vehicles: BTreeMap<String, Vehicle> =
+            common::VEHICLES.map(|name| (name.to_owned(), vehicle(name))).into();
+        let settings = Analytic { cases: 20, ..Analytic::default() };
+        let data = train::analytic::dataset(&vehicles, &settings, 1).unwrap();
+        let source = Source::new(data, &vehicles, false).unwrap();
+        let split = split(&source.data, BY, 1).unwrap().remove(0);
+        Self { source, split }
+    }
+
+    fn sides(&self) -> Sides<'_> {
+        Sides { split: &self.split, by: BY }
+    }
+
+    fn train(&self, config: &Config, checkpoint: Option<&Checkpoint>) -> Trained<Box<Anchored>> {
+        anchored::train(&self.source, self.sides(), config, checkpoint, &|_| ()).unwrap()
+    }
+
+    fn vehicles(&self) -> Vec<Prepared> {
+        Prepared::all(&self.source.data, &self.source.vehicles).unwrap()
+    }
+
+    fn states(&self, numbers: &[usize]) -> Vec<Known> {
+        Known::states(&self.source.data, numbers, &self.vehicles())
+    }
+}
+
+fn short() -> Config {
+    let mut config = Config { epochs: 12, ..Config::anchored() };
+    config.anchored.folds = 2;
+    config
+}
+
+fn bundles(trained: &Trained<Box<Anchored>>, isa: Isa) -> BTreeMap<String, Model> {
+    let folder = TempDir::new().unwrap();
+    let model = |of_vehicle: &train::TrainedVehicle| {
+        let path = folder.path().join(&of_vehicle.name);
+        let mut bundle: Bundle = bundle::read(&common::vehicles().join(&of_vehicle.name)).unwrap();
+        bundle.trained = Some((trained.weights("test".into()), of_vehicle.domain));
+        bundle::write(&path, &bundle).unwrap();
+        (of_vehicle.name.clone(), bundle::load(&path, isa).unwrap())
+    };
+    trained.vehicles.iter().map(model).collect()
+}
+
+fn evaluate(model: &Model, condition: &Condition) -> Forces {
+    let mut forces = Forces::default();
+    model.evaluate(condition, &mut Workspace::new(), &mut forces);
+    forces
+}
+
+#[test]
+fn the_gradient_agrees_with_finite_differences() {
+    const SMALL: Sizes = Sizes { inputs: 9, width: 12, outputs: SPREAD + 1 };
+    const SURFACES: usize = 5;
+    let mut random = Random::new(11);
+    let layers = Layers::<f64>::random(SMALL, &mut random);
+    let columns = 3 * SURFACES;
+    let mut draw = |rows| DMatrix::from_fn(rows, columns, |_, _| 2.0 * random.unit() - 1.0);
+    let (inputs, mut targets) = (draw(SMALL.inputs), draw(TARGETS));
+    // rooms to either side, and the switch of the moment
+    targets.rows_mut(6, 6).apply(|x| *x = x.abs() + 0.1);
+    targets.row_mut(18).apply(|x| *x = if *x > -0.5 { 0.7 } else { 0.0 });
+    let batch = Batch { surfaces: SURFACES, inputs, targets, dry: vec![false; columns] };
+    let only = |net_weight, moment_weight| AnchoredLoss {
+        net_weight,
+        moment_weight,
+        delta: 0.4,
+        ..AnchoredLoss::default()
+    };
+    for (term, config) in [("surfaces", only(0.0, 0.0)), ("net", only(5.0, 0.0)), ("all", only(1.0, 2.0))] {
+        let total = |layers: &Layers<f64>| {
+            loss(&config, &batch, &batch.counts(), &layers.forward(&batch.inputs).output).0
+        };
+        let activations = layers.forward(&batch.inputs);
+        let (_, by_output) = loss(&config, &batch, &batch.counts(), &activations.output);
+        let mut gradient = vec![f64::NAN; layers.parameters.len()];
+        layers.backward(&batch.inputs, &activations, &by_output, &mut gradient);
+        let size = gradient.iter().fold(0.0_f64, |size, g| size.max(g.abs()));
+        for (index, slope) in gradient.iter().enumerate() {
+            let moved = |by: f64| {
+                let mut layers = layers.clone();
+                layers.parameters[index] += by;
+                total(&layers)
+            };
+            let numeric = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+            assert!((slope - numeric).abs() < 1e-5 * size, "{term} [{index}]: {slope} against {numeric}");
+        }
+    }
+}
+
+#[test]
+fn the_loss_reads_an_answer_as_the_model_does() {
+    let lesson = Lesson::new();
+    let states = lesson.states(&lesson.split.training);
+    let mut random = Random::new(5);
+    let config = AnchoredLoss { net_weight: 0.0, moment_weight: 1.0, delta: 1e9, ..AnchoredLoss::default() };
+    let (scale, length) = (7.0, 0.8);
+    for state in &states {
+        for (surface, (force, _)) in state.reading.surfaces.iter().zip(&state.loads) {
+            if surface.wet_fraction == 0.0 {
+                continue;
+            }
+            let answer: [f32; OUTPUTS] = std::array::from_fn(|_| 4.0 * random.unit() as f32 - 2.0);
+            let found = Vec3::new(0.3, -0.2, 0.5);
+            let row = targets(surface, &(*force, Some(found)), (scale, length));
+            let batch = Batch {
+                surfaces: 1,
+                inputs: DMatrix::zeros(0, 1),
+                targets: DMatrix::from_column_slice(TARGETS, 1, &row.map(f64::from)),
+                dry: vec![false],
+            };
+            let mut output = DMatrix::zeros(SPREAD + 1, 1);
+            output.as_mut_slice()[..OUTPUTS].copy_from_slice(&answer.map(f64::from));
+            let (value, _) = loss(&config, &batch, &batch.counts(), &output);
+            let error = (surface.force(&answer) - force) / scale;
+            let turn = surface.center_of_pressure(&answer).cross(force) - found;
+            let expected = 0.5 * (error.norm_squared() + (turn / (scale * length)).norm_squared());
+            assert!((value - expected).abs() < 1e-4 * expected.max(1e-3), "{value} {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_bundle_answers_as_the_trainer_s_own_forward_pass() {
+    let lesson = Lesson::new();
+    let trained = lesson.train(&short(), None);
+    let (states, vehicles) = (lesson.states(&lesson.split.held_out), lesson.vehicles());
+    for isa in Isa::available() {
+        let models = bundles(&trained, isa);
+        let names: Vec<&String> = models.keys().collect();
+        let mut compared = 0;
+        for state in &states {
+            let model = &models[names[state.vehicle]];
+            let forces = evaluate(model, &state.condition);
+            let near = forces.outside.excess[Quantity::Distance as usize - 1] == 0.0;
+            let own = trained.net_force(state, &vehicles);
+            let scale: f64 = forces.surfaces.iter().map(|load| load.force.norm()).sum();
+            if near {
+                compared += 1;
+                assert!((forces.wrench.force - own).norm() < 1e-5 * scale, "{} {own}", forces.wrench.force);
+            }
+            for (load, expected) in forces.surfaces.iter().zip(model.reference(&state.condition)) {
+                assert!((load.force - expected).norm() < 1e-5 * scale, "{}", isa.name());
+            }
+        }
+        assert!(compared > 5, "{compared}");
+    }
+}
+
+#[test]
+fn training_lowers_the_loss_and_a_run_that_stopped_goes_on_with_the_same_bits() {
+    let lesson = Lesson::new();
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("state");
+    let checkpoint = |resume| Checkpoint { path: path.clone(), resume };
+    let whole = lesson.train(&Config { epochs: 24, ..short() }, None);
+    let (first, last) = (whole.history.first().unwrap(), whole.history.last().unwrap());
+    assert!(last.held_out_loss < 0.5 * first.held_out_loss, "{first:?} {last:?}");
+    lesson.train(&Config { epochs: 17, ..short() }, Some(&checkpoint(false)));
+    let resumed = lesson.train(&Config { epochs: 24, ..short() }, Some(&checkpoint(true)));
+    assert_eq!((&whole.layers, &whole.learnt), (&resumed.layers, &resumed.learnt));
+    checkpoint(true).remove().unwrap();
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn far_from_what_was_learnt_the_known_physics_is_left_and_marked() {
+    let lesson = Lesson::new();
+    let trained = lesson.train(&short(), None);
+    let models = bundles(&trained, Isa::available()[0]);
+    let model = &models["husky"];
+    // lying on its side, of which nothing was taught
+    let up = wade::frame::up_from_roll_pitch(1.2, 0.0);
+    let far = Condition { up, ..Condition::level(Vec3::new(0.3, 0.9, 0.0), 0.1) };
+    let forces = evaluate(model, &far);
+    assert!(forces.outside.excess[Quantity::Distance as usize - 1] > 2.0);
+    let mut reading = Reading::default();
+    wade::anchor::Anchor::new(model.vehicle()).read(model.vehicle(), &far, &mut reading);
+    let known: Vec3 = reading.surfaces.iter().map(|s| s.hydrostatic.force + s.drag).sum();
+    assert!((forces.wrench.force - known).norm() < 1e-9 * known.norm());
+    assert!(forces.uncertainty.iter().all(|x| x.is_finite() && *x > 0.0), "{}", forces.uncertainty);
+}
+
+#[test]
+fn at_rest_the_served_wrench_is_that_of_the_hull_by_archimedes() {
+    let lesson = Lesson::new();
+    let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
+    for model in models.values() {
+        for depth in [0.08, 0.13, 0.18] {
+            let state = Condition::level(Vec3::zeros(), depth);
+            let plane = state.water_plane(model.vehicle().z0);
+            let about = &model.vehicle().center_of_mass;
+            let exact = hydrostatics(&model.vehicle().hull.mesh, &plane, state.density, about).wrench;
+            let served = evaluate(model, &state).wrench;
+            assert!((served.force - exact.force).norm() < 1e-6 * exact.force.norm());
+            let arm = (served.moment - exact.moment).norm() / exact.force.norm();
+            assert!(arm < 2e-3, "the force of still water acts {arm} m beside its place");
+        }
+    }
+}
+
+#[test]
+fn weights_serve_both_conventions_of_ground_contact() {
+    let lesson = Lesson::new();
+    let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
+    let model = &models["warthog"];
+    let wetted = Condition::level(Vec3::new(1.0, 0.3, 0.0), 0.2);
+    let dry = Condition { ground_contact: GroundContact::Dry, ..wetted };
+    let lost = evaluate(model, &wetted).wrench.force - evaluate(model, &dry).wrench.force;
+    let area: f64 = model.vehicle().contacts.iter().map(|patch| patch.area).sum();
+    let pressure = wetted.density * wade::frame::GRAVITY * wetted.depth;
+    assert!((lost - Vec3::z() * (pressure * area)).norm() < 1e-6 * pressure * area, "{lost}");
+}
