@@ -15,8 +15,8 @@ use common::{Row, Subject, Table};
 use wade::bundle;
 use wade::condition::Condition;
 use wade::effects::{
-    ActiveEffect, ActiveEffects, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind, ParameterValue,
-    Session, Validity,
+    ActiveEffect, ActiveEffects, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind,
+    ParameterValue, Session, Validity,
 };
 use wade::forces::Forces;
 use wade::frame::{Vec3, WaterPlane, up_from_roll_pitch};

@@ -12,9 +12,8 @@ const STATE: [&str; 22] = [
     "alz", "rho", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr",
 ];
 /// Columns of a trial that say nothing about the state.
-const NOT_STATE: [&str; 12] = [
-    "fx", "fy", "fz", "mx", "my", "mz", "sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz",
-];
+const NOT_STATE: [&str; 12] =
+    ["fx", "fy", "fz", "mx", "my", "mz", "sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
 
 /// Columns that no trial has: to be reported, and ignored.
 pub fn unknown_columns(headers: &csv::StringRecord) -> Vec<String> {

@@ -36,8 +36,11 @@ fn every_version_can_be_taken_back_and_put_back_as_it_was() {
     let one = effects_file("husky", vec![effect(Effect::AddedMass, 0.4)]);
     assert_eq!(bundle::apply(&husky, one).expect("applied"), first + 1);
     assert_eq!(bundle::apply(&husky, every_effect("husky")).expect("applied"), first + 2);
-    let kept: Vec<(u32, usize)> =
-        bundle::kept(&husky).expect("readable").iter().map(|kept| (kept.version, kept.effects.len())).collect();
+    let kept: Vec<(u32, usize)> = bundle::kept(&husky)
+        .expect("readable")
+        .iter()
+        .map(|kept| (kept.version, kept.effects.len()))
+        .collect();
     assert_eq!(kept, [(first, 0), (first + 1, 1)]);
     let all = bytes(&husky);
     assert_eq!(bundle::roll_back(&husky, None).expect("kept"), first + 1);
@@ -53,7 +56,11 @@ fn every_version_can_be_taken_back_and_put_back_as_it_was() {
     // a number is never used for another content
     let other = effects_file("husky", vec![effect(Effect::Squat, 0.4)]);
     assert_eq!(bundle::apply(&husky, other).expect("applied"), first + 3);
-    assert_eq!(bundle::names_in(copy.path()).expect("listed"), ["husky", "warthog"], "versions are no vehicles");
+    assert_eq!(
+        bundle::names_in(copy.path()).expect("listed"),
+        ["husky", "warthog"],
+        "versions are no vehicles"
+    );
 }
 
 #[test]
@@ -105,7 +112,11 @@ fn a_damaged_file_refuses_the_bundle_and_names_the_field() {
         ("value = 0.15", "value = 99.0", "what is physically possible"),
         ("std = 0.015", "std = -1.0", "std must be 0 or greater"),
         ("unit = \"1\"", "unit = \"kg\"", "unit must be \"1\""),
-        ("coefficients = [\"surge\", \"sway\"", "coefficients = [\"surge\", \"surge\"", "different from each other"),
+        (
+            "coefficients = [\"surge\", \"sway\"",
+            "coefficients = [\"surge\", \"surge\"",
+            "different from each other",
+        ),
         ("coefficients = [\"surge\"", "coefficients = [\"thrust\"", "some of surge"),
         ("covariance = [[0.0001", "covariance = [[-0.0001", "covariance"),
         ("covariance = [[0.0001, 0.0", "covariance = [[0.0001, 0.5", "symmetric"),

@@ -157,7 +157,8 @@ fn what_is_served_along_a_run_is_what_was_fitted() {
             })
             .collect();
         let expected = as_fitted(&served, &motion, &told());
-        let (mut session, mut workspace, mut loads) = (Session::default(), Workspace::new(), Loads::default());
+        let (mut session, mut workspace, mut loads) =
+            (Session::default(), Workspace::new(), Loads::default());
         let mut remembered = 0.0;
         for ((condition, time_step), expected) in motion.iter().zip(expected) {
             let told = Circumstances { time_step: *time_step, ..told() };
@@ -209,7 +210,10 @@ fn the_matrix_times_the_acceleration_is_the_force_that_an_implicit_integration_i
         let (with, without) = (explicit.forces.wrench, implicit.forces.wrench);
         let (force, moment) = (with.force - without.force, with.moment - without.moment);
         assert!(close(&force, &Vec3::new(expected[0], expected[1], expected[2]), 1e-9), "{force} {expected}");
-        assert!(close(&moment, &Vec3::new(expected[3], expected[4], expected[5]), 1e-9), "{moment} {expected}");
+        assert!(
+            close(&moment, &Vec3::new(expected[3], expected[4], expected[5]), 1e-9),
+            "{moment} {expected}"
+        );
         // what turns with the hull stays: a steady turn needs a force
         assert!(load(&implicit, Effect::AddedMass).wrench.force.norm() > 0.1);
     }
@@ -218,7 +222,8 @@ fn the_matrix_times_the_acceleration_is_the_force_that_an_implicit_integration_i
 #[test]
 fn a_current_acts_as_the_velocity_that_it_takes_off() {
     let drag = |velocity: Vec3, current: f64| {
-        let loads = evaluate(&only("warthog", Effect::Current, current), &Condition::level(velocity, 0.25), &told());
+        let loads =
+            evaluate(&only("warthog", Effect::Current, current), &Condition::level(velocity, 0.25), &told());
         load(&loads, Effect::Current).wrench.force
     };
     // parked, heading along the current of 0.3 m/s east and 0.3 m/s north: pushed ahead
@@ -231,13 +236,18 @@ fn a_current_acts_as_the_velocity_that_it_takes_off() {
     let body = Body::of_vehicle(served.model().vehicle());
     let mut immersion = Immersion::default();
     body.immerse(&Condition::level(Vec3::zeros(), 0.25), &mut immersion);
-    let area: f64 = body.panels.iter().zip(&immersion.panels).map(|(p, w)| p.facing_minus.x * w.fraction).sum();
+    let area: f64 =
+        body.panels.iter().zip(&immersion.panels).map(|(p, w)| p.facing_minus.x * w.fraction).sum();
     let expected = 0.5 * 1000.0 * 1.1 * area * speed * speed;
-    assert!((pushed.x / expected - 1.0).abs() < 1e-9 && pushed.y.abs() < 1e-9 * expected, "{pushed} {expected}");
+    assert!(
+        (pushed.x / expected - 1.0).abs() < 1e-9 && pushed.y.abs() < 1e-9 * expected,
+        "{pushed} {expected}"
+    );
     // a vehicle that goes with the water at its speed has no drag left: the effect takes off all that the model has
     let with = Condition::level(Vec3::new(speed, 0.0, 0.0), 0.25);
     let loads = evaluate(&served, &with, &ahead);
-    let fore: f64 = body.panels.iter().zip(&immersion.panels).map(|(p, w)| p.facing_plus.x * w.fraction).sum();
+    let fore: f64 =
+        body.panels.iter().zip(&immersion.panels).map(|(p, w)| p.facing_plus.x * w.fraction).sum();
     let own = 0.5 * 1000.0 * 1.1 * fore * speed * speed;
     assert!((load(&loads, Effect::Current).wrench.force.x / own - 1.0).abs() < 0.2, "{own}");
     assert_eq!(drag(Vec3::new(1.0, 0.2, 0.0), 0.0), Vec3::zeros());

@@ -6,7 +6,9 @@ mod common;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use common::{Numbers, Served, VEHICLES, copy_with_every_effect, every_effect, served_with, copy_of_vehicles};
+use common::{
+    Numbers, Served, VEHICLES, copy_of_vehicles, copy_with_every_effect, every_effect, served_with,
+};
 use wade::bundle;
 use wade::client::{Client, InProcess, Method, Reply};
 use wade::effects::{Effect, LeftOut};
@@ -192,7 +194,10 @@ fn effects_come_with_a_reload_and_go_with_a_rollback_under_load() {
         stop.store(true, Ordering::Relaxed);
         for worker in workers {
             let version = bare.bundle_version;
-            assert_eq!(worker.join().expect("no panic"), [(version, false), (version + 1, true), (version, false)]);
+            assert_eq!(
+                worker.join().expect("no panic"),
+                [(version, false), (version + 1, true), (version, false)]
+            );
         }
     });
 }
@@ -209,4 +214,58 @@ fn a_vehicle_with_effects_answers_as_the_library_does() {
         assert_eq!(disk.effects, memory.effects);
         assert_eq!(disk.force, memory.force);
     }
+}
+
+#[test]
+fn a_session_over_shared_memory_says_when_it_begins() {
+    use wade::service::shm_layout::SESSION_BEGINS;
+    let served = Served::start();
+    let mut client = served.shm("husky", Wait::Block).in_session(3);
+    let state = run(0.0)[0];
+    let begins = |answer: wade::service::shm_layout::Answer| answer.flags & SESSION_BEGINS != 0;
+    client.evaluate(&State { depth: f32::NAN, ..state }).expect_err("refused");
+    assert!(begins(client.evaluate(&state).expect("answered")), "a query that was refused begins nothing");
+    assert!(!begins(client.evaluate(&state).expect("answered")));
+    let mut other = served.shm("husky", Wait::Block).in_session(3);
+    assert!(begins(other.evaluate(&state).expect("answered")), "another client's run is another run");
+    let mut single = served.shm("husky", Wait::Block);
+    assert!(!begins(single.evaluate(&state).expect("answered")), "a single state is no run");
+}
+
+#[test]
+fn a_table_in_time_is_a_session() {
+    use std::fmt::Write;
+    let folder = copy_with_every_effect();
+    let (states, out) = (folder.path().join("in.csv"), folder.path().join("out.csv"));
+    let step = 0.0625;
+    let mut text = String::from("t,vx,vy,vz,ax,depth,yaw\n");
+    for (i, state) in (0_u16..).zip(run(0.0)) {
+        let ([vx, vy, vz], ax) = (state.velocity, state.acceleration[0]);
+        writeln!(text, "{},{vx},{vy},{vz},{ax},{},0.5", f32::from(i) * step, state.depth).expect("a string");
+    }
+    std::fs::write(&states, text).expect("written");
+    let predict = |states: &std::path::Path| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_wade"));
+        command.args(["predict", "--vehicle", "husky", "--states"]).arg(states).arg("--out").arg(&out);
+        command.env("WADE_VEHICLES", folder.path()).output().expect("the program runs")
+    };
+    assert!(predict(&states).status.success());
+    let mut alone = from(folder.path(), "husky").in_session();
+    let mut reader = csv::Reader::from_path(&out).expect("a table");
+    let headers = reader.headers().expect("headers").clone();
+    let fz = headers.iter().position(|header| header == "fz").expect("a column");
+    for ((i, record), state) in reader.records().enumerate().zip(run(0.0)) {
+        let time_step = if i == 0 { 0.0 } else { step };
+        let state = State { time_step, heading: Some(0.5), ..state };
+        let expected = alone.evaluate(&state).expect("valid").force[2];
+        let found: f32 = record.expect("a row")[fz].parse().expect("a number");
+        assert!((found - expected).abs() <= 1e-5 * expected.abs(), "row {i}: {found} {expected}");
+    }
+    std::fs::write(&states, "t,vx,vy,vz,depth\n1,0.5,0,0,0.1\n0.5,0.5,0,0,0.1\n").expect("written");
+    let output = predict(&states);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.code() == Some(1) && said.contains("row 3") && said.contains("order of time"),
+        "{said}"
+    );
 }

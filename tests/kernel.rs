@@ -52,7 +52,10 @@ fn a_row_has_the_same_bits_alone_and_in_any_company() {
         for _ in 0..20 {
             let global = [(); features::GLOBAL].map(|()| numbers.between(-2.0, 2.0));
             let wet: Vec<WetSurface> = (0..vehicle.surfaces.len())
-                .map(|surface| WetSurface { surface, dynamic: [(); MAX_DYNAMIC].map(|()| numbers.between(0.0, 1.0)) })
+                .map(|surface| WetSurface {
+                    surface,
+                    dynamic: [(); MAX_DYNAMIC].map(|()| numbers.between(0.0, 1.0)),
+                })
                 .collect();
             let together = kernel.forward(&global, &statics, &wet, &mut buffers).to_vec();
             for (alone, expected) in wet.iter().zip(&together) {

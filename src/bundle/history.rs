@@ -7,8 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Bundle, BundleError, FILES, Fault, VEHICLE_FILE, VehicleFile, at, checksums, exchange, read, read_bounded, stage,
-    staging_of, tensors,
+    Bundle, BundleError, FILES, Fault, VEHICLE_FILE, VehicleFile, at, checksums, exchange, read,
+    read_bounded, stage, staging_of, tensors,
 };
 use crate::effects::EffectsFile;
 

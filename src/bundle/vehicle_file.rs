@@ -183,7 +183,10 @@ impl VehicleFile {
             (None, None) => return Ok(None),
             _ => return Err(Fault::Untrained),
         };
-        match Quantity::ALL.into_iter().find(|&quantity| domain.range(quantity).is_some_and(|range| !range.is_valid())) {
+        match Quantity::ALL
+            .into_iter()
+            .find(|&quantity| domain.range(quantity).is_some_and(|range| !range.is_valid()))
+        {
             Some(quantity) => Err(Fault::Domain { quantity: quantity.name() }),
             None => Ok(Some((provenance, domain))),
         }

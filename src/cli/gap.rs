@@ -40,7 +40,7 @@ pub struct Gap {
     #[command(subcommand)]
     step: Option<Step>,
     #[command(flatten)]
-    source: Option<Source>,
+    source: Source,
     /// Folder for report.json and index.html; those of an earlier run are replaced
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
@@ -85,11 +85,12 @@ enum Step {
 #[derive(Debug, Args)]
 struct Source {
     /// Name of the vehicle
-    #[arg(long)]
-    vehicle: String,
+    // optional only beside a step, which has its own
+    #[arg(long, required = true)]
+    vehicle: Option<String>,
     /// Folder of trials
-    #[arg(long, value_name = "DIR")]
-    trials: PathBuf,
+    #[arg(long, value_name = "DIR", required = true)]
+    trials: Option<PathBuf>,
     /// Settings, TOML: seed, bin_s, block_s, folds, held_out, significance, ...
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -103,13 +104,13 @@ struct Source {
 impl Gap {
     /// Reads and checks everything before anything is written.
     pub fn run(self) -> Result<ExitCode> {
-        match (self.step, self.source, self.out) {
-            (Some(Step::Locate(source)), ..) => source.locate(),
-            (Some(Step::Name(source)), ..) => source.name(),
-            (Some(Step::Fit(source)), ..) => source.fit(),
-            (Some(Step::Report { source, out }), ..) => source.report(&out, None),
-            (None, Some(source), Some(out)) => source.report(&out, Some(&self.apply).filter(|a| a.apply)),
-            _ => usage_error("give --vehicle, --trials and --out, or a step"),
+        match (self.step, self.out) {
+            (Some(Step::Locate(source)), _) => source.locate(),
+            (Some(Step::Name(source)), _) => source.name(),
+            (Some(Step::Fit(source)), _) => source.fit(),
+            (Some(Step::Report { source, out }), _) => source.report(&out, None),
+            (None, Some(out)) => self.source.report(&out, Some(&self.apply).filter(|apply| apply.apply)),
+            (None, None) => usage_error("give --vehicle, --trials and --out, or a step"),
         }
     }
 }
@@ -124,28 +125,34 @@ impl Source {
     }
 
     fn run(&self) -> Result<(Report, Trials)> {
+        let (Some(vehicle), Some(folder)) = (&self.vehicle, &self.trials) else {
+            usage_error("give --vehicle and --trials")
+        };
         let config = self.settings()?;
-        let trials = Trials::read(&self.trials)?;
+        let trials = Trials::read(folder)?;
         trials.remarks().iter().for_each(|remark| eprintln!("{remark}"));
-        if trials.manifest.vehicle != self.vehicle {
-            let (trials, asked) = (trials.manifest.vehicle.clone(), self.vehicle.clone());
+        if trials.manifest.vehicle != *vehicle {
+            let (trials, asked) = (trials.manifest.vehicle.clone(), vehicle.clone());
             return Err(GapError::Vehicle { trials, asked }.into());
         }
-        let bundle = self.vehicles.bundle(&self.vehicle);
+        let bundle = self.vehicles.bundle(vehicle);
         let mut report = if bundle.is_dir() {
-            let model = self.vehicles.model(&self.vehicle)?;
+            let model = self.vehicles.model(vehicle)?;
             let body = Body::of_vehicle(model.vehicle());
             gap::run(&trials, &body, &mut predictor(&model), &config)?
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
             if let Some(trial) = alone {
-                let (trial, vehicle) = (trial.name.clone(), self.vehicle.clone());
+                let (trial, vehicle) = (trial.name.clone(), vehicle.clone());
                 return Err(GapError::NoPrediction { trial, vehicle }.into());
             }
             gap::run(&trials, &gap::body_of(&trials)?, &mut |_| Predicted::default(), &config)?
         };
-        report.sources.model =
-            if is_simulated(&trials) { "the sim_ columns of the trials".into() } else { bundle_hash(&bundle)? };
+        report.sources.model = if is_simulated(&trials) {
+            "the sim_ columns of the trials".into()
+        } else {
+            bundle_hash(&bundle)?
+        };
         report.sources.tool = format!("wade {} ({})", env!("CARGO_PKG_VERSION"), env!("WADE_COMMIT"));
         Ok((report, trials))
     }
@@ -193,7 +200,7 @@ impl Source {
         let json = serde_json::to_string_pretty(&report)? + "\n";
         let page = report.page()?;
         let effects = apply.map(|apply| effects_file(&report, &trials, apply.provisional));
-        let bundle = self.vehicles.bundle(&self.vehicle);
+        let bundle = self.vehicles.bundle(&report.vehicle);
         let bundle = Some(bundle).filter(|bundle| bundle.is_dir() && !is_simulated(&trials));
         if let (Some(Ok(effects)), Some(bundle), Some(apply)) = (&effects, &bundle, apply) {
             check_loss(effects, bundle, apply.replace)?;
@@ -218,9 +225,9 @@ impl Source {
                 eprintln!(
                     "{}: version {version}; wade vehicle rollback {} takes it back",
                     bundle.display(),
-                    self.vehicle
+                    report.vehicle
                 );
-                apply.running.reload(&self.vehicle);
+                apply.running.reload(&report.vehicle);
                 Ok(ExitCode::SUCCESS)
             }
             (Some(Ok(_)), None, _) => {

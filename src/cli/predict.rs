@@ -8,8 +8,8 @@ use clap::Args;
 use wade::effects::Session;
 use wade::frame::Vec3;
 use wade::model::Model;
-use wade::service::{Evaluated, Evaluator};
 use wade::service::wire::State;
+use wade::service::{Evaluated, Evaluator};
 use wade::states::{Row, unknown_columns};
 
 use super::Vehicles;
@@ -87,7 +87,8 @@ impl Predict {
         let wrench = forces.wrench.force.iter().chain(forces.wrench.moment.iter()).map(f64::to_string);
         let in_domain = u8::from(forces.outside.is_inside()).to_string();
         let surfaces = forces.surfaces.iter().zip(added).filter(|_| self.per_surface);
-        let forces = surfaces.flat_map(|(load, added)| <[f64; 3]>::from(load.force + added).map(|f| f.to_string()));
+        let forces =
+            surfaces.flat_map(|(load, added)| <[f64; 3]>::from(load.force + added).map(|f| f.to_string()));
         wrench.chain([in_domain]).chain(forces).collect()
     }
 }
@@ -98,7 +99,9 @@ fn time_step(t: Option<f64>, before: Option<f64>, is_run: bool) -> Result<f32> {
         _ if !is_run => Ok(0.0),
         (None, _) => bail!("column t is blank: in a run in time every row has one"),
         (Some(t), Some(before)) if t < before => {
-            bail!("t = {t} comes after {before}: the rows of a run must be in the order of time; leave t out for single states")
+            bail!(
+                "t = {t} comes after {before}: the rows of a run must be in the order of time; leave t out for single states"
+            )
         }
         (Some(t), before) => Ok(before.map_or(0.0, |before| (t - before) as f32)),
     }

@@ -8,8 +8,8 @@ use std::time::Duration;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use wade::effects::{BoxQuantity, LeftOut};
 use wade::client::{Client, GrpcClient, InProcess, Method, Reply, ShmClient};
+use wade::effects::{BoxQuantity, LeftOut};
 use wade::service::shm::Wait;
 use wade::service::{grpc, shm};
 

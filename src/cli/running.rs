@@ -24,11 +24,15 @@ impl Running {
                 for one in reloaded {
                     match one.refusal.as_str() {
                         "" => eprintln!("{} serves version {} now", self.server, one.bundle_version),
-                        refusal => eprintln!("{} keeps version {}: {refusal}", self.server, one.bundle_version),
+                        refusal => {
+                            eprintln!("{} keeps version {}: {refusal}", self.server, one.bundle_version)
+                        }
                     }
                 }
             }
-            Err(error) => eprintln!("no running server was told ({error}); one reads the bundle at its start"),
+            Err(error) => {
+                eprintln!("no running server was told ({error}); one reads the bundle at its start")
+            }
         }
     }
 }

@@ -298,12 +298,14 @@ impl Train {
         eprintln!("held out: {}; {} samples to learn from", split.name, split.training.len());
         let checkpoint =
             self.checkpoint.as_ref().map(|path| Checkpoint { path: path.clone(), resume: self.resume });
-        let learnt = self.variant.train(&loaded, &source, (sides, self.part), &config, checkpoint.as_ref())?;
+        let learnt =
+            self.variant.train(&loaded, &source, (sides, self.part), &config, checkpoint.as_ref())?;
         let record = &learnt.record;
         record.write(&self.out)?;
         for of_vehicle in &record.vehicles {
             let name = &of_vehicle.name;
-            let (Some(bundle), Some(weights)) = (loaded.bundles.get_mut(name), learnt.weights.get(name)) else {
+            let (Some(bundle), Some(weights)) = (loaded.bundles.get_mut(name), learnt.weights.get(name))
+            else {
                 bail!("{name}: there is no bundle of it");
             };
             // effects close the gap of the weights that they were fitted to

@@ -179,7 +179,8 @@ fn build(spec_text: &str, spec_path: &Path, stl: &[u8], out: &Path, seal: bool) 
     })?;
     bar.finish_and_clear();
     let vehicle_translation = vehicle.translation;
-    let bundle = Bundle { vehicle, version, trained: None, effects: None, distance, spec: Some(spec_text.to_owned()) };
+    let bundle =
+        Bundle { vehicle, version, trained: None, effects: None, distance, spec: Some(spec_text.to_owned()) };
     bundle::write(out, &bundle)?;
     let t = vehicle_translation;
     println!("{}: version {version}, no weights yet", out.display());
@@ -215,8 +216,7 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     });
     let domain = bundle.trained.as_ref().map(|&(_, domain)| domain);
     let provenance = bundle.trained.as_ref().map(|(weights, _)| weights.provenance.as_str());
-    let ranges =
-        || Quantity::ALL.into_iter().filter_map(|q| Some((q.name(), domain?.range(q)?)));
+    let ranges = || Quantity::ALL.into_iter().filter_map(|q| Some((q.name(), domain?.range(q)?)));
     let d = &vehicle.dimensions;
     let effects: Vec<&ActiveEffect> = bundle.effects.iter().flat_map(|file| &file.effects).collect();
     if as_json {

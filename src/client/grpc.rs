@@ -198,7 +198,8 @@ pub fn reload(url: &str, vehicle: &str, timeout: Duration) -> Result<Vec<proto::
         let endpoint = endpoint.connect_timeout(timeout).timeout(timeout);
         let mut client = AdminClient::new(endpoint.connect().await.map_err(|error| failed(&error))?);
         let request = proto::ReloadRequest { vehicle: vehicle.to_owned() };
-        let response = client.reload(request).await.map_err(|status| no_server(status.message().to_owned()))?;
+        let response =
+            client.reload(request).await.map_err(|status| no_server(status.message().to_owned()))?;
         Ok(response.into_inner().vehicles)
     })
 }

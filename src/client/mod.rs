@@ -13,8 +13,8 @@ use crate::domain::Outside;
 use crate::effects::{Effect, LeftOut, OutsideBox, Session};
 use crate::served::ServedVehicle;
 use crate::service::grpc::{added_mass, single};
-use crate::service::{Evaluated, Evaluator};
 use crate::service::wire::{InvalidState, State};
+use crate::service::{Evaluated, Evaluator};
 
 /// Why a call got no forces.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,7 +42,9 @@ pub enum ClientError {
     #[error(transparent)]
     Invalid(#[from] InvalidState),
     /// A batch of states that differ in what the message carries once.
-    #[error("the states of a batch must agree in ground contact, in implicit added mass, and in what is given of heading, depth rate and wheel speeds")]
+    #[error(
+        "the states of a batch must agree in ground contact, in implicit added mass, and in what is given of heading, depth rate and wheel speeds"
+    )]
     MixedBatch,
     /// A batch longer than the transport carries.
     #[error("a batch of {len}, the limit of this transport is {limit}")]
@@ -173,9 +175,9 @@ impl InProcess {
 
     fn compute(&mut self, states: &[State]) -> Result<u64, ClientError> {
         let Self { vehicle, evaluator, session } = self;
-        states
-            .iter()
-            .try_fold(0, |ns, state| Ok(ns + evaluator.evaluate(vehicle, state, session.as_mut())?.compute_ns))
+        states.iter().try_fold(0, |ns, state| {
+            Ok(ns + evaluator.evaluate(vehicle, state, session.as_mut())?.compute_ns)
+        })
     }
 }
 

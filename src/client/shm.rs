@@ -15,8 +15,8 @@ use super::{ClientError, EffectReply, Reply, SurfaceReply};
 use crate::effects::{Effect, LeftOut};
 use crate::service::shm::{self, ShmError, Wait};
 use crate::service::shm_layout::{
-    Answer, BatchAnswer, BatchHeader, BatchQuery, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query, SERVER_POLLS, Status,
-    wake_name,
+    Answer, BatchAnswer, BatchHeader, BatchQuery, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query,
+    SERVER_POLLS, Status, wake_name,
 };
 use crate::service::wire::State;
 use crate::vehicle::MAX_SURFACES;

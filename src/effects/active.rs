@@ -228,7 +228,9 @@ impl ActiveEffects {
                 Effect::HullFlooding | Effect::WaveMemory if session.is_none() => Some(LeftOut::NoSession),
                 Effect::Current if current_stated => Some(LeftOut::CurrentStated),
                 Effect::Current if circumstances.heading.is_none() => Some(LeftOut::NoHeading),
-                Effect::WheelPaddleThrust if circumstances.wheel_speeds.is_none() => Some(LeftOut::NoWheelSpeeds),
+                Effect::WheelPaddleThrust if circumstances.wheel_speeds.is_none() => {
+                    Some(LeftOut::NoWheelSpeeds)
+                }
                 Effect::WaterEntrySlamming if rate.is_none() => Some(LeftOut::NoDepthRate),
                 _ => None,
             };

@@ -160,7 +160,8 @@ impl Body {
         let Hull::Mesh { table, .. } = &self.hull else { return self.immerse(condition, out) };
         out.depth = condition.depth.max(0.0);
         out.panels.clear();
-        let wet = |surface: &SurfaceForce| WetPanel { fraction: surface.wetted_fraction, point: surface.point };
+        let wet =
+            |surface: &SurfaceForce| WetPanel { fraction: surface.wetted_fraction, point: surface.point };
         out.panels.extend(surfaces.iter().map(wet));
         table.immerse(&condition.water_plane(self.z0), out);
     }

@@ -114,7 +114,9 @@ pub enum EffectsFileError {
         expected: String,
     },
     /// Fitted to other weights.
-    #[error("evidence.weights_sha256 is not that of the bundle's weights: effects are fitted to a model and go with it")]
+    #[error(
+        "evidence.weights_sha256 is not that of the bundle's weights: effects are fitted to a model and go with it"
+    )]
     OtherWeights,
     /// No effect.
     #[error("no [[effect]]: without an effect there is no file")]
@@ -246,7 +248,11 @@ impl ActiveEffect {
         let specs = self.name.coefficients();
         let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
         let known = self.coefficients.iter().all(|name| names.contains(&name.as_str()));
-        must(known && !self.coefficients.is_empty(), "coefficients", &format!("some of {}", names.join(", ")))?;
+        must(
+            known && !self.coefficients.is_empty(),
+            "coefficients",
+            &format!("some of {}", names.join(", ")),
+        )?;
         let distinct: BTreeSet<&String> = self.coefficients.iter().collect();
         must(distinct.len() == self.coefficients.len(), "coefficients", "different from each other")?;
         let count = self.coefficients.len();
@@ -267,14 +273,19 @@ impl ActiveEffect {
         must: &impl Fn(bool, &str, &str) -> Result<(), EffectsFileError>,
     ) -> Result<(), EffectsFileError> {
         let shapes = self.name.shape_names();
-        let fitted = self.name.coefficients().iter().filter(|spec| self.coefficients.iter().any(|c| c == spec.name));
+        let fitted =
+            self.name.coefficients().iter().filter(|spec| self.coefficients.iter().any(|c| c == spec.name));
         let coefficients = fitted.map(|spec| (spec.name, spec.unit, spec.bounds));
         let limit = f64::MAX;
         let expected: Vec<(&str, &str, [f64; 2])> =
             coefficients.chain(shapes.iter().map(|&(name, unit)| (name, unit, [0.0, limit]))).collect();
         let names = expected.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ");
         let unknown = self.parameters.keys().find(|key| !expected.iter().any(|(name, ..)| name == key));
-        must(unknown.is_none(), &format!("parameters.{}", unknown.map_or("", String::as_str)), &format!("one of {names}"))?;
+        must(
+            unknown.is_none(),
+            &format!("parameters.{}", unknown.map_or("", String::as_str)),
+            &format!("one of {names}"),
+        )?;
         for (name, unit, [low, high]) in expected {
             let field = |part: &str| format!("parameters.{name}{part}");
             let Some(parameter) = self.parameters.get(name) else {
@@ -282,11 +293,16 @@ impl ActiveEffect {
             };
             must(parameter.unit == unit, &field(".unit"), &format!("\"{unit}\""))?;
             let physical = (low..=high).contains(&parameter.value);
-            must(physical, &field(".value"), &format!("between {low} and {high}, what is physically possible"))?;
+            must(
+                physical,
+                &field(".value"),
+                &format!("between {low} and {high}, what is physically possible"),
+            )?;
             must(parameter.std.is_finite() && parameter.std >= 0.0, &field(".std"), "0 or greater")?;
         }
         for (axis, (name, _)) in shapes.iter().enumerate() {
-            let same = self.parameters.get(*name).is_some_and(|parameter| parameter.value == self.shape[axis]);
+            let same =
+                self.parameters.get(*name).is_some_and(|parameter| parameter.value == self.shape[axis]);
             must(same, &format!("shape[{axis}]"), &format!("parameters.{name}.value"))?;
         }
         Ok(())

@@ -168,14 +168,20 @@ impl Effect {
     /// Equation of a physical effect in a line, without what is common to all: loads act on the wet hull.
     pub fn equation(self) -> &'static str {
         match self {
-            Self::AddedMass => "W = -(M_A nu_dot + C_A(nu) nu), M_A = rho V diag(surge, sway, heave, roll (b2+d2)/12, pitch (l2+d2)/12, yaw (l2+b2)/12)",
+            Self::AddedMass => {
+                "W = -(M_A nu_dot + C_A(nu) nu), M_A = rho V diag(surge, sway, heave, roll (b2+d2)/12, pitch (l2+d2)/12, yaw (l2+b2)/12)"
+            }
             Self::LinearDamping => "f_i = -c_i rho sqrt(g L) A_i u_i, u = v + omega x r",
             Self::DragCoefficientError => "f_i = -1/2 rho C_i A_i |v| v_i",
             Self::Rotation => "f = D(v + omega x r) - D(v), D_i(u) = -1/2 rho C A_i |u| u_i",
             Self::Current => "f = D(v - R^T u) - D(v) with the model's drag D",
-            Self::WaterLevelOffset => "W = offset dF/dd: rho g A_wp upwards, and the model's drag in proportion to the depth",
+            Self::WaterLevelOffset => {
+                "W = offset dF/dd: rho g A_wp upwards, and the model's drag in proportion to the depth"
+            }
             Self::DensityError => "W = e W_model",
-            Self::HullFlooding => "W = -phi rho g V h_in / h_out upwards, dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)",
+            Self::HullFlooding => {
+                "W = -phi rho g V h_in / h_out upwards, dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)"
+            }
             Self::WaterEntrySlamming => "F = -C rho (dV/dt)+ u, on entry only",
             Self::WaveMemory => "F = -k rho V Re z, z' = -(1/T - i W) z + motion",
             Self::ChannelBlockage => "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d)",

@@ -61,7 +61,8 @@ pub fn enter(
         let models = contestants.models.get(name).ok_or_else(no_model)?;
         let distance = contestants.distances.get(name).ok_or_else(no_model)?;
         let name_of = |model: &Model| model.weights().form.name().to_owned();
-        let mut entries: Vec<_> = models.iter().map(|model| (name_of(model), served(model, &held_out))).collect();
+        let mut entries: Vec<_> =
+            models.iter().map(|model| (name_of(model), served(model, &held_out))).collect();
         let learnt: Vec<&State> = training.iter().filter(|state| state.vehicle == *name).collect();
         // a vehicle that is held out as a whole leaves nothing to fit its simple models to
         if !learnt.is_empty() {

@@ -16,7 +16,9 @@ pub enum NotApplicable {
     #[error("no effect of the library explains the gap")]
     NoCandidateFits,
     /// More than one name.
-    #[error("other effects explain the gap as well; record the trial that tells them apart, and run again with it")]
+    #[error(
+        "other effects explain the gap as well; record the trial that tells them apart, and run again with it"
+    )]
     Ambiguous,
     /// Sensors and drive alone.
     #[error("no named effect is one of the water")]

@@ -205,8 +205,12 @@ impl Kernel {
     /// # Panics
     /// When the network has no dynamic features, or more of them or of outputs than there is room for.
     pub fn new(network: &Network, (fixed, dynamic): (usize, usize), isa: Isa) -> Self {
-        assert!((1..=MAX_DYNAMIC).contains(&dynamic) && network.outputs <= MAX_OUTPUTS, "the buffers have room for it");
-        let column = |input: usize| Row(std::array::from_fn(|unit| network.w1[unit * network.inputs + input]));
+        assert!(
+            (1..=MAX_DYNAMIC).contains(&dynamic) && network.outputs <= MAX_OUTPUTS,
+            "the buffers have room for it"
+        );
+        let column =
+            |input: usize| Row(std::array::from_fn(|unit| network.w1[unit * network.inputs + input]));
         let row = |values: &[f32]| Row(std::array::from_fn(|i| values[i]));
         let pass = |first: usize| {
             let column = |i| if first + i < dynamic { column(fixed + first + i) } else { Row::ZERO };
@@ -288,13 +292,7 @@ impl Kernel {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
-    fn forward_avx2(
-        &self,
-        global: &[f32],
-        statics: &StaticRows,
-        wet: &[WetSurface],
-        buffers: &mut Buffers,
-    ) {
+    fn forward_avx2(&self, global: &[f32], statics: &StaticRows, wet: &[WetSurface], buffers: &mut Buffers) {
         self.layer1::<true>(global, statics, wet, buffers);
         buffers.find_live(wet.len());
         let Buffers { h1, h2, live, .. } = buffers;
@@ -413,7 +411,12 @@ fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
 
 /// What the features of a pass add to a unit.
 #[inline(always)]
-fn add_pass<const FUSED: bool>(value: f32, features: &[f32; PASS], weights: &[Row; PASS], unit: usize) -> f32 {
+fn add_pass<const FUSED: bool>(
+    value: f32,
+    features: &[f32; PASS],
+    weights: &[Row; PASS],
+    unit: usize,
+) -> f32 {
     let [(d0, w0), (d1, w1), (d2, w2)] = [0, 1, 2].map(|i| (features[i], weights[i].0[unit]));
     multiply_add::<FUSED>(d2, w2, multiply_add::<FUSED>(d1, w1, multiply_add::<FUSED>(d0, w0, value)))
 }

@@ -61,7 +61,8 @@ impl Model {
         let (kernel, statics, anchor) = match &weights.form {
             Form::Paper(_) => {
                 let kernel = Kernel::new(network, (features::STATIC, features::DYNAMIC), isa);
-                let fixed = |surface| features::surface_static(surface, &vehicle.dimensions).map(|x| x as f32);
+                let fixed =
+                    |surface| features::surface_static(surface, &vehicle.dimensions).map(|x| x as f32);
                 let statics = kernel.static_rows(&vehicle.surfaces.iter().map(fixed).collect::<Vec<_>>());
                 (kernel, statics, None)
             }

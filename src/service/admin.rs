@@ -117,7 +117,8 @@ impl Reloader {
             }
             Err(refusal) => {
                 tracing::warn!(vehicle, %refusal, "bundle refused; the version before it stays");
-                let served_version = self.engine.vehicle(&vehicle).map_or(0, |served| served.model().version());
+                let served_version =
+                    self.engine.vehicle(&vehicle).map_or(0, |served| served.model().version());
                 Reload { vehicle, served_version, refusal: Some(refusal) }
             }
         }

@@ -359,18 +359,13 @@ impl Desk {
         Ok(answer)
     }
 
-    fn answer(
-        &mut self,
-        at: At,
-        arrived: Instant,
-        request: &Request<Query, Answer>,
-        recorder: &Recorder,
-    ) {
+    fn answer(&mut self, at: At, arrived: Instant, request: &Request<Query, Answer>, recorder: &Recorder) {
         let query = copy(request.payload());
         let (answer, refusal) = match self.evaluate(at, request.origin(), &query) {
             Ok(answer) => (answer, None),
             Err(invalid) => {
-                let answer = Answer { sequence: query.sequence, flags: self.flags, ..Answer::invalid(invalid) };
+                let answer =
+                    Answer { sequence: query.sequence, flags: self.flags, ..Answer::invalid(invalid) };
                 (answer, Some(Refusal::from(invalid)))
             }
         };

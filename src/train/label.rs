@@ -51,7 +51,11 @@ pub fn dynamic(vehicle: &Vehicle, order: &[usize], sample: &Sample) -> Vec<Label
 }
 
 /// Each load less its part at rest, or less the hull's own where the data set states none.
-fn beyond<'a>(order: &'a [usize], sample: &'a Sample, exact: &'a [Wrench]) -> impl Iterator<Item = Label> + 'a {
+fn beyond<'a>(
+    order: &'a [usize],
+    sample: &'a Sample,
+    exact: &'a [Wrench],
+) -> impl Iterator<Item = Label> + 'a {
     order.iter().zip(exact).map(|(&index, exact)| {
         let load = &sample.surfaces[index];
         let (force, moment) = load.rest.map_or((exact.force, exact.moment), |rest| (rest.force, rest.moment));

@@ -32,12 +32,12 @@ pub use config::{Analytic, Config, Keep};
 pub(crate) use page::style as page_style;
 pub use variant::Variant;
 
+use crate::condition::GroundContact;
 use crate::dataset::Dataset;
 use crate::dataset::mirror::{self, MirrorError};
 use crate::dataset::split::Split;
 use crate::dataset::{Image, split};
 use crate::domain::Domain;
-use crate::condition::GroundContact;
 use crate::model::network::{OUTPUTS, Scaling};
 use crate::model::{Form, Paper, Weights};
 use crate::vehicle::Vehicle;

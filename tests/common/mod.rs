@@ -31,13 +31,15 @@ pub fn model(vehicle: &str) -> Model {
 }
 
 pub fn served_vehicle(vehicle: &str) -> ServedVehicle {
-    bundle::load_served(&vehicles().join(vehicle), Isa::available()[0]).expect("the shipped bundles are sound")
+    bundle::load_served(&vehicles().join(vehicle), Isa::available()[0])
+        .expect("the shipped bundles are sound")
 }
 
 /// An effect with made-up numbers, one for every coefficient.
 pub fn effect(name: Effect, value: f64) -> ActiveEffect {
     let coefficients = name.coefficients();
-    let parameter = |value: f64, unit: &str| ParameterValue { value, std: 0.1 * value.abs(), unit: unit.into() };
+    let parameter =
+        |value: f64, unit: &str| ParameterValue { value, std: 0.1 * value.abs(), unit: unit.into() };
     let shape = match name {
         Effect::HullFlooding => [0.01, 0.0, 0.0],
         Effect::WaveMemory => [0.8, 2.0, 0.0],
@@ -59,7 +61,9 @@ pub fn effect(name: Effect, value: f64) -> ActiveEffect {
         base_drag: [1.1, 1.3, 0.9],
         channel_width: (name == Effect::ChannelBlockage).then_some(4.0),
         coefficients: coefficients.iter().map(|c| c.name.to_owned()).collect(),
-        covariance: (0..count).map(|i| (0..count).map(|j| if i == j { 1e-4 } else { 0.0 }).collect()).collect(),
+        covariance: (0..count)
+            .map(|i| (0..count).map(|j| if i == j { 1e-4 } else { 0.0 }).collect())
+            .collect(),
         parameters: fitted.chain(shapes).collect(),
     }
 }

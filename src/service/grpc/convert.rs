@@ -230,7 +230,11 @@ fn push_surfaces(forces: &Forces, force: &mut Vec<f32>, point: &mut Vec<f32>, we
 }
 
 /// An empty answer to a batch with room for its states.
-pub fn batch_response(vehicle: &ServedVehicle, len: usize, with_surfaces: bool) -> proto::EvaluateBatchResponse {
+pub fn batch_response(
+    vehicle: &ServedVehicle,
+    len: usize,
+    with_surfaces: bool,
+) -> proto::EvaluateBatchResponse {
     let model = vehicle.model();
     let rows = if with_surfaces { len * model.vehicle().surfaces.len() } else { 0 };
     let effects = vehicle.effects().map_or(&[][..], |file| &file.effects);
@@ -420,16 +424,19 @@ mod tests {
     #[test]
     fn the_numbers_of_the_wire_are_those_of_the_library() {
         for effect in Effect::ALL {
-            let name = proto::Effect::try_from(effect.code() as i32).map(|effect| effect.as_str_name().to_lowercase());
+            let name = proto::Effect::try_from(effect.code() as i32)
+                .map(|effect| effect.as_str_name().to_lowercase());
             let expected = (effect.kind() == Kind::Physics).then(|| format!("effect_{}", effect.name()));
             assert_eq!(name.ok(), expected);
         }
         for reason in LeftOut::ALL {
-            let name = proto::LeftOut::try_from(reason as i32).map(|reason| reason.as_str_name().to_lowercase());
+            let name =
+                proto::LeftOut::try_from(reason as i32).map(|reason| reason.as_str_name().to_lowercase());
             assert_eq!(name.ok(), Some(format!("left_out_{}", reason.name())));
         }
         for quantity in BoxQuantity::ALL {
-            let name = proto::BoxQuantity::try_from(quantity as i32).expect("known").as_str_name().to_lowercase();
+            let name =
+                proto::BoxQuantity::try_from(quantity as i32).expect("known").as_str_name().to_lowercase();
             let name = name.trim_start_matches("box_quantity_").to_owned();
             assert!(quantity.name().starts_with(&name), "{name}");
         }

@@ -109,7 +109,8 @@ impl Hydrodynamics for Handlers {
         &self,
         _: Request<proto::ListVehiclesRequest>,
     ) -> Result<Response<proto::ListVehiclesResponse>, Status> {
-        let vehicles = self.shared.engine.vehicles().values().map(|vehicle| convert::summary(vehicle)).collect();
+        let vehicles =
+            self.shared.engine.vehicles().values().map(|vehicle| convert::summary(vehicle)).collect();
         Ok(Response::new(proto::ListVehiclesResponse { vehicles }))
     }
 

@@ -63,8 +63,10 @@ pub fn targets(
 ) -> [f32; TARGETS] {
     let wet = surface.wet_fraction > 0.0;
     let [low, high] = surface.wet_box;
-    let (to_low, to_high) = if wet { (surface.center - low, high - surface.center) } else { Default::default() };
-    let found = moment.filter(|_| wet).map(|moment| about(&Wrench { force: *force, moment }, &surface.center));
+    let (to_low, to_high) =
+        if wet { (surface.center - low, high - surface.center) } else { Default::default() };
+    let found =
+        moment.filter(|_| wet).map(|moment| about(&Wrench { force: *force, moment }, &surface.center));
     let turn = found.unwrap_or_default() / scale;
     let (drag, force) = (surface.drag / scale, force / scale);
     let per_length = if found.is_some() { 1.0 / length } else { 0.0 };
@@ -171,7 +173,8 @@ impl<'a, T: Real> Answer<'a, T> {
 
     fn moment_error(&self) -> Vector3<T> {
         let (tangent, room) = self.place();
-        let arm = Vector3::new(tangent[0] * room[0], tangent[1] * self.target[4] * room[1], tangent[2] * room[2]);
+        let arm =
+            Vector3::new(tangent[0] * room[0], tangent[1] * self.target[4] * room[1], tangent[2] * room[2]);
         (arm.cross(&self.vector(12)) - self.vector(15)) * self.target[18]
     }
 
@@ -180,7 +183,8 @@ impl<'a, T: Real> Answer<'a, T> {
         let (tangent, room) = self.place();
         let by_arm = self.vector(12).cross(by_turn) * self.target[18];
         let lateral = [T::one(), l0, T::one()];
-        let place = [0, 1, 2].map(|i| by_arm[i] * room[i] * lateral[i] * (T::one() - tangent[i] * tangent[i]));
+        let place =
+            [0, 1, 2].map(|i| by_arm[i] * room[i] * lateral[i] * (T::one() - tangent[i] * tangent[i]));
         [
             by_force.x * unit,
             by_force.y * unit * l0,

@@ -60,15 +60,8 @@ pub fn train(
     let spread = Spread::fit(&missed(&layers, &training, &vehicles, &form, &errors));
     form.spread = spread.factors.map(|k| k as f32);
     layers.set_output(SPREAD, &spread.weights, spread.bias);
-    let mut trained = Trained {
-        name: NAME,
-        layers,
-        learnt: form,
-        vehicles: Vec::new(),
-        history,
-        kept_epoch,
-        epoch_s,
-    };
+    let mut trained =
+        Trained { name: NAME, layers, learnt: form, vehicles: Vec::new(), history, kept_epoch, epoch_s };
     trained.vehicles = (0..vehicles.len())
         .map(|index| trained.vehicle(index, &vehicles, source, sides, [&training, &held_out]))
         .collect::<Result<_, _>>()?;
@@ -124,7 +117,8 @@ fn task(
     };
     let (training, held_out) = (rows(training), rows(held_out));
     let same = |input: &usize| {
-        let mut values = training.iter().flat_map(|rows| rows.inputs.iter().skip(*input).step_by(SIZES.inputs));
+        let mut values =
+            training.iter().flat_map(|rows| rows.inputs.iter().skip(*input).step_by(SIZES.inputs));
         let first = values.next();
         values.all(|value| Some(value) == first)
     };
@@ -214,7 +208,8 @@ fn missed(
         let activations = layers.forward(&columns(state, &vehicles[state.vehicle], form));
         let hidden = &activations.hidden2;
         let wet = state.reading.surfaces.iter().enumerate().filter(|(_, surface)| surface.wet_fraction > 0.0);
-        let surfaces = wet.map(|(column, surface)| (hidden.column(column).iter().copied().collect(), surface.unit));
+        let surfaces =
+            wet.map(|(column, surface)| (hidden.column(column).iter().copied().collect(), surface.unit));
         Missed { surfaces: surfaces.collect(), error: (*error).into() }
     };
     training.iter().zip(errors).map(of).collect()
