@@ -28,9 +28,14 @@ impl Panel {
     /// Four points of equal weight with the first and second moments of the wet part of the panel, which is as wide as
     /// the panel and as high as its share.
     pub fn points(&self, wet: &WetPanel) -> [Vec3; 4] {
-        let s = Vec3::new(self.spread.x, self.spread.y, self.spread.z * wet.fraction);
+        let s = self.wet_spread(wet);
         [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]
             .map(|(x, y, z)| wet.point + Vec3::new(x * s.x, y * s.y, z * s.z))
+    }
+
+    /// Spread of the wet part about its centroid, one standard deviation [m].
+    pub fn wet_spread(&self, wet: &WetPanel) -> Vec3 {
+        Vec3::new(self.spread.x, self.spread.y, self.spread.z * wet.fraction)
     }
 
     /// Area that meets the flow along each axis [m2]: the side that looks ahead, and always the bottom, since the top of
