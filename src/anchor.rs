@@ -2,8 +2,12 @@
 //! drag (E2 on the box around the wet part), and what the network is told, all without a dimension.
 //!
 //! The model is `F_s = H_s + D_s + q A_s R_s`: the pressure load `H_s` of still water, the drag `D_s`, and a remainder
-//! `R_s` that the network answers, in units of the dynamic pressure `q = rho U^2 / 2` on the wet area `A_s`. A dry surface
-//! gets nothing, continuously; a vehicle at rest gets Archimedes.
+//! `R_s` that the network answers, in units of the dynamic pressure `q = rho U^2 / 2` on the area `A_s` that the water may
+//! reach. A surface above still water gets nothing, continuously; a vehicle at rest gets Archimedes.
+//!
+//! `A_s` is the share of the surface's area that its height has below the head of the stream, `U^2 / 2g` above still water:
+//! a fast bow wave climbs a front that stands in the water by a centimeter, and would be a remainder without bound on
+//! the wet area alone. It rises from zero over the first centimeters of still water on the surface.
 //!
 //! Left and right: what is told of a surface on one side is told in terms of that side (toward it is positive), and of a
 //! surface on the plane of symmetry only what does not change under reflection, with lateral answers multiplied by
@@ -72,6 +76,8 @@ pub const COORDINATES: usize = 8;
 const CD0: f64 = 1.9;
 /// Share of the drag that depends on how far upstream a surface is; see `effects::form_drag`.
 const SHELTERING: f64 = 0.5;
+/// Height of water on a surface over which its loads set in [m].
+const RAMP: f64 = 0.02;
 /// Depth below which Froude numbers no longer grow [m].
 const LEAST_DEPTH: f64 = 1e-3;
 /// Reynolds number below which its logarithm is held.
@@ -122,7 +128,7 @@ pub struct SurfaceReading {
     pub hydrostatic: Wrench,
     /// Simple drag [N].
     pub drag: Vec3,
-    /// `q A`: what a coefficient of one is worth [N].
+    /// `q A_s`: what a coefficient of one is worth [N].
     pub unit: f64,
     /// Factors of the two lateral coefficients.
     pub lateral: [f64; 2],
@@ -266,6 +272,8 @@ impl Anchor {
         let place = center.dot(ahead) / flow.half_length(&self.bounds);
         let shelter = 0.5 * (1.0 + SHELTERING * place.clamp(-1.0, 1.0));
         let pressure = 0.5 * condition.density * flow.speed * flow.speed;
+        let head = flow.speed * flow.speed / (2.0 * GRAVITY);
+        let reached = ((level + head - min.z) / (max.z - min.z).max(RAMP)).clamp(0.0, 1.0);
         let facing = surface.normal.dot(ahead);
         let off_track = (center.x * ahead.y - center.y * ahead.x).abs();
         let dynamic = [
@@ -287,7 +295,7 @@ impl Anchor {
             center,
             hydrostatic,
             drag: ahead * -(CD0 * shelter * front * pressure),
-            unit: pressure * wetting.area,
+            unit: pressure * surface.area * reached * ramp(level - min.z),
             lateral: if surface.side == 0.0 { [ahead.y, condition.up.y] } else { [surface.side, 0.0] },
             wet_box: [min.inf(&center), Vec3::new(max.x, max.y, top).sup(&center)],
             dynamic: dynamic.map(|x| x as f32),
@@ -306,6 +314,12 @@ impl Anchor {
             flow.bed,
         ]
     }
+}
+
+/// 0 to 1 over the first [`RAMP`] of a height, with no kink.
+fn ramp(height: f64) -> f64 {
+    let x = (height / RAMP).clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
 }
 
 /// `x / (1 + x)`: a Froude number of any size, in 0 to 1.

@@ -107,8 +107,11 @@ fn a_dry_surface_has_nothing_and_gets_wet_without_a_jump() {
             for surface in reading.surfaces.iter().filter(|s| s.wet_fraction == 0.0) {
                 assert_eq!((surface.unit, surface.drag, surface.hydrostatic.force), Default::default());
             }
-            let sizes: Vec<f64> =
-                reading.surfaces.iter().map(|s| s.drag.norm() + s.hydrostatic.force.norm()).collect();
+            let sizes: Vec<f64> = reading
+                .surfaces
+                .iter()
+                .map(|s| s.drag.norm() + s.hydrostatic.force.norm() + s.unit)
+                .collect();
             if let Some(before) = &before {
                 for (now, before) in sizes.iter().zip(before) {
                     assert!(

@@ -21,7 +21,7 @@ use wade::forces::Forces;
 use wade::frame::{GRAVITY, Vec3};
 use wade::model::{Model, Workspace, kernel::Isa};
 use wade::train::checkpoint::Checkpoint;
-use wade::train::label::{at_rest, labels, order};
+use wade::train::label::{labels, order};
 use wade::train::plan::Table;
 use wade::train::report::Record;
 use wade::train::samples::samples;
@@ -163,13 +163,13 @@ fn a_label_is_the_load_with_the_hull_s_own_hydrostatics() {
             viscous: None,
         };
     }
-    let exact = at_rest(vehicle, &state);
+    let exact = vehicle.at_rest(&state);
     for (label, exact) in labels(vehicle, &order, &sample).iter().zip(&exact) {
         assert!((label.force - exact.force - dynamic).norm() < 1e-9);
         assert!((label.moment.unwrap() - exact.moment - moment).norm() < 1e-9);
     }
     // the patches of dry ground contact carry no pressure: depth times their area is missing
-    let wetted = at_rest(vehicle, &Condition { ground_contact: GroundContact::Wetted, ..state });
+    let wetted = vehicle.at_rest(&Condition { ground_contact: GroundContact::Wetted, ..state });
     let lost: f64 = wetted.iter().zip(&exact).map(|(a, b)| a.force.z - b.force.z).sum();
     let area: f64 = vehicle.contacts.iter().map(|patch| patch.area).sum();
     assert!((lost - 1000.0 * GRAVITY * 0.25 * area).abs() < 1e-6 && lost > 100.0, "{lost}");

@@ -12,10 +12,11 @@ use super::plan::{Plan, Set};
 use crate::analytic;
 use crate::condition::{Condition, GroundContact};
 use crate::dataset;
-use crate::dataset::page::{self, PlotError};
+use crate::dataset::page;
 use crate::dataset::summary::Summary;
 use crate::domain::Range;
 use crate::frame::Vec3;
+use crate::page::{PlotError, preformatted};
 use crate::validate::paper::{self, PaperDepth};
 use crate::vehicle::Vehicle;
 
@@ -230,7 +231,7 @@ impl Report {
             .collect();
         let summary = Summary::of(&dataset, &|_, surface| kinds.get(surface).cloned());
         let title = format!("CFD campaign: {}", self.vehicle);
-        Ok(page::page_with(&title, &page::preformatted(&self.text()), &summary)?)
+        Ok(page::page_with(&title, &preformatted(&self.text()), &summary)?)
     }
 }
 

@@ -11,18 +11,16 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use wade::analytic::PROVENANCE;
 use wade::bundle;
-use wade::condition::GroundContact;
 use wade::dataset::import::{Format, Import};
 use wade::dataset::sections::Sections;
 use wade::dataset::split::{self, By};
 use wade::dataset::summary::Summary;
-use wade::dataset::{self, CutOff, Meta, analytic, mirror, page};
-use wade::random::Random;
-use wade::train::Config;
+use wade::dataset::{self, CutOff, mirror, page};
+use wade::train::{self, Config};
 use wade::vehicle::Vehicle;
 
+use super::train::Rule;
 use super::{Vehicles, emit, usage_error};
 
 /// Import CFD results, augment, split and describe data sets
@@ -204,22 +202,6 @@ struct SplitFile {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum Rule {
-    /// A share of the cases of each vehicle
-    Case,
-    /// A share of the samples: sections of one case are then on both sides
-    Sample,
-    /// Groups of cases, each in turn
-    Folds,
-    /// Parts of the range of depths, each in turn
-    Depth,
-    /// Parts of the range of flow angles, each in turn
-    Heading,
-    /// Each vehicle in turn
-    Vehicle,
-}
-
 impl Dataset {
     /// Runs the subcommand.
     pub fn run(self) -> Result<ExitCode> {
@@ -279,27 +261,13 @@ impl ImportCases {
 
 impl Analytic {
     fn run(self) -> Result<()> {
-        let mut random = Random::new(self.seed);
-        let tables = Config::default().analytic.tables;
-        let mut data = dataset::Dataset {
-            meta: Meta {
-                provenance: PROVENANCE.to_owned(),
-                ground_contact: GroundContact::Wetted,
-                vehicles: BTreeMap::new(),
-                notes: BTreeMap::from([("seed".to_owned(), self.seed.to_string())]),
-            },
-            samples: Vec::new(),
-        };
+        let config = Config::default().analytic;
         let vehicles = read_vehicles(&self.vehicles, self.vehicle.iter())?;
-        for (name, vehicle) in &vehicles {
-            let table = tables.get(name).with_context(|| {
-                format!("there is no parameter table for {name}; there are: {}", keys(&tables))
-            })?;
-            let states = table.latin_hypercube(self.cases, &mut random.fork());
-            data.samples.extend(analytic::samples(vehicle, "paper", &states));
-            let surfaces = vehicle.surfaces.iter().map(|surface| surface.name.clone()).collect();
-            data.meta.vehicles.insert(name.clone(), surfaces);
+        if let Some(name) = vehicles.keys().find(|name| !config.tables.contains_key(*name)) {
+            bail!("there is no parameter table for {name}; there are: {}", keys(&config.tables));
         }
+        let config = train::Analytic { cases: self.cases, ..config };
+        let data = train::analytic::dataset(&vehicles, &config, self.seed)?;
         write(&self.out, &data)
     }
 }
@@ -313,15 +281,9 @@ impl SplitFile {
         if self.parts.is_some() && (shared || self.by == Rule::Vehicle) {
             usage_error("--parts goes with --by folds, --by depth or --by heading");
         }
-        let (share, parts) = (self.share.unwrap_or(0.2), self.parts.unwrap_or(5));
-        match self.by {
-            Rule::Case => By::Case { share },
-            Rule::Sample => By::Sample { share },
-            Rule::Folds => By::Folds { count: parts },
-            Rule::Depth => By::Depth { bins: parts },
-            Rule::Heading => By::Heading { bins: parts },
-            Rule::Vehicle => By::Vehicle,
-        }
+        let defaults = Config::default();
+        let share = self.share.unwrap_or(defaults.held_out_share);
+        self.by.by(share, self.parts.unwrap_or(defaults.parts))
     }
 
     /// All sides appear together: one side beside an older other one would be a leak.

@@ -87,7 +87,8 @@ impl Eval {
                 Model::new(bundle.vehicle.clone(), bundle.version, domain, weights, Isa::available()[0]);
             models.insert(name.clone(), vec![model]);
         }
-        let by = if record.split.by_sample { Rule::Sample } else { Rule::Case }.by(&record.config);
+        let rule = if record.split.by_sample { Rule::Sample } else { Rule::Case };
+        let by = rule.by(record.config.held_out_share, record.config.parts);
         let sides = Sides { split: &split, by };
         let mut contest = Contest::new();
         self.enter(&mut contest, &source, sides, &record.config, (&loaded, &models))?;
@@ -101,7 +102,7 @@ impl Eval {
         let config = self.data.settings(first)?;
         let loaded = self.data.load(&config)?;
         let source = loaded.source(&config)?;
-        let by = rule.by(&config);
+        let by = rule.by(config.held_out_share, config.parts);
         let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;
         let mut contest = Contest::new();
         for split in &splits {

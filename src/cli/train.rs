@@ -45,7 +45,7 @@ Settings that a file (--config) leaves out are the paper's:
   keep = \"last\"                # or \"best\" by the held-out loss; the paper does not say
   front_rear = false           # mirror front to rear also a hull that is not symmetric, as the paper did
   held_out_share = 0.2         # by case and by sample
-  parts = 5                    # by depth and by heading
+  parts = 5                    # folds, depths, headings
   [loss]
   alpha = 0.5
   epsilon = 0.01
@@ -76,7 +76,7 @@ pub struct Train {
     /// What is held out
     #[arg(long, value_enum, default_value = "case")]
     split: Rule,
-    /// Which part is held out, from 1, where a split has several: by depth, heading and vehicle
+    /// Which part is held out, from 1, where a split has several: by folds, depth, heading and vehicle
     #[arg(long, value_name = "N", default_value_t = 1)]
     part: usize,
     /// Folder for report.json and index.html
@@ -164,22 +164,25 @@ pub enum Rule {
     Case,
     /// A share of the samples, as the paper seems to: sections and images of one case are then on both sides
     Sample,
-    /// Parts of the range of depths
+    /// Groups of cases, each in turn
+    Folds,
+    /// Parts of the range of depths, each in turn
     Depth,
-    /// Parts of the range of flow angles
+    /// Parts of the range of flow angles, each in turn
     Heading,
-    /// One vehicle
+    /// Each vehicle in turn
     Vehicle,
 }
 
 impl Rule {
-    /// With the shares and parts of the settings.
-    pub fn by(self, config: &Config) -> By {
+    /// With a share for those that have one, and a number of parts for the others.
+    pub fn by(self, share: f64, parts: usize) -> By {
         match self {
-            Self::Case => By::Case { share: config.held_out_share },
-            Self::Sample => By::Sample { share: config.held_out_share },
-            Self::Depth => By::Depth { bins: config.parts },
-            Self::Heading => By::Heading { bins: config.parts },
+            Self::Case => By::Case { share },
+            Self::Sample => By::Sample { share },
+            Self::Folds => By::Folds { count: parts },
+            Self::Depth => By::Depth { bins: parts },
+            Self::Heading => By::Heading { bins: parts },
             Self::Vehicle => By::Vehicle,
         }
     }
@@ -287,7 +290,7 @@ impl Train {
         config.seed = self.seed.unwrap_or(config.seed);
         let mut loaded = self.data.load(&config)?;
         let source = loaded.source(&config)?;
-        let by = self.split.by(&config);
+        let by = self.split.by(config.held_out_share, config.parts);
         let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;
         let Some(split) = self.part.checked_sub(1).and_then(|index| splits.get(index)) else {
             usage_error(&format!("--part must be 1 to {}: the split has no other part", splits.len()));

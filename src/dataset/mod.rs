@@ -19,7 +19,6 @@ mod merge;
 pub mod mirror;
 pub mod openfoam;
 pub mod page;
-mod plot;
 mod schema;
 pub mod sections;
 pub mod split;

@@ -2,35 +2,19 @@
 
 use std::fmt::Write;
 
-pub use super::plot::PlotError;
-
-use super::plot::{Group, escape, scatter};
 use super::summary::{CaseMean, Summary, VehicleSummary};
-
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:980px;margin:24px auto;padding:0 10px;color:#1f2328}\
-h1{font-size:22px;margin:0 0 4px}h2{font-size:18px;margin:32px 0 4px}h3{font-size:15px;margin:18px 0 2px}\
-table{border-collapse:collapse;margin:6px 0}th,td{padding:3px 11px;border-bottom:1px solid #e3e6ea;text-align:right}\
-th:first-child,td:first-child{text-align:left;padding-left:0}figure{display:inline-block;margin:0 6px 6px 0}\
-.legend span{margin-right:16px}.legend i{display:inline-block;width:9px;height:9px;border-radius:5px;margin-right:5px}\
-td.none{background:#fdf0f0}.small{color:#57606a;font-size:13px}svg{max-width:100%;height:auto;display:block}";
+use crate::page::plot::{Series, scatter};
+use crate::page::{PlotError, document, escape};
 
 /// The page.
 pub fn page(title: &str, summary: &Summary) -> Result<String, PlotError> {
     page_with(title, "", summary)
 }
 
-/// Text that keeps its lines, as HTML.
-pub fn preformatted(text: &str) -> String {
-    format!("<pre>{}</pre>\n", escape(text))
-}
-
 /// The page with `foreword`, which is HTML, under its title.
 pub fn page_with(title: &str, foreword: &str, summary: &Summary) -> Result<String, PlotError> {
-    let title = escape(title);
     let mut text = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\
-         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n{foreword}\
-         <p>{} cases, {} samples. Loads: {}. Ground contact: {}.</p>\n",
+        "{foreword}<p>{} cases, {} samples. Loads: {}. Ground contact: {}.</p>\n",
         summary.cases,
         summary.samples,
         escape(&summary.provenance),
@@ -42,7 +26,7 @@ pub fn page_with(title: &str, foreword: &str, summary: &Summary) -> Result<Strin
     for vehicle in &summary.vehicles {
         text.push_str(&section(vehicle)?);
     }
-    Ok(text + "</body></html>\n")
+    Ok(document(title, &text))
 }
 
 /// Writing to a String cannot fail.
@@ -128,7 +112,7 @@ fn by_set(
 ) -> Result<String, PlotError> {
     let group = |set: &String| {
         let cases = vehicle.case_means.iter().filter(|case| case.set == *set);
-        Group { name: set.clone(), points: cases.filter_map(&point).collect() }
+        Series { name: set.clone(), points: cases.filter_map(&point).collect() }
     };
     scatter(x_title, y_title, &vehicle.sets.keys().map(group).collect::<Vec<_>>())
 }
@@ -144,7 +128,7 @@ fn drag(vehicle: &VehicleSummary) -> Result<String, PlotError> {
         let moving = cases.filter(|case| case.heading_deg().is_some());
         let point = |case: &CaseMean| (speed(case), -case.net_force.dot(&case.velocity) / speed(case));
         let name = format!("depth {:.3} to {:.3} m", edge(number), edge(number + 1));
-        Group { name, points: moving.map(point).collect() }
+        Series { name, points: moving.map(point).collect() }
     };
     scatter("speed [m/s]", "force against the motion [N]", &[0, 1, 2].map(group))
 }
@@ -161,7 +145,7 @@ fn scatter_between_sections(vehicle: &VehicleSummary) -> Result<String, PlotErro
     }
     let group = |(axis, name): (usize, &str)| {
         let point = |case: &CaseMean| Some((speed(case), case.deviation?[axis]));
-        Group { name: name.to_owned(), points: vehicle.case_means.iter().filter_map(point).collect() }
+        Series { name: name.to_owned(), points: vehicle.case_means.iter().filter_map(point).collect() }
     };
     let groups: Vec<_> = ["Fx", "Fy", "Fz"].into_iter().enumerate().map(group).collect();
     Ok(text + "</table>\n" + &scatter("speed [m/s]", "deviation between sections [N]", &groups)?)

@@ -8,7 +8,6 @@ use crate::condition::Condition;
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::geometry::distance::SignedDistanceGrid;
 use crate::geometry::hydrostatics::hydrostatics;
-use crate::train::label::at_rest;
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
@@ -125,7 +124,7 @@ impl Baseline {
 }
 
 fn rest(vehicle: &Vehicle, condition: &Condition) -> Wrench {
-    let loads = at_rest(vehicle, condition).into_iter();
+    let loads = vehicle.at_rest(condition).into_iter();
     loads.fold(Wrench::default(), |sum, load| sum + load).moved(&Vec3::zeros(), &vehicle.center_of_mass)
 }
 

@@ -4,34 +4,30 @@ use std::fmt::Write;
 
 use super::paper::{LABEL, Paper, entry};
 use super::report::{ModelReport, Report, VehicleReport};
-use crate::train::page_style;
-use crate::train::plot::{PlotError, Series, escape, parity};
+use crate::page::plot::{Series, parity};
+use crate::page::{PlotError, document, escape, table};
 
 const AXES: [&str; 3] = ["F<sub>x</sub>", "F<sub>y</sub>", "F<sub>z</sub>"];
 
 /// The page.
 pub(super) fn page(report: &Report) -> Result<String, PlotError> {
-    let title = escape(&format!("wade eval: {}", report.data.name));
     let mut text = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\
-         <meta name=\"viewport\" content=\"width=device-width\"><style>{}</style></head><body>\n<h1>{title}</h1>\n\
-         <p>Loads: {}. Held out: {}.</p>\n<p class=\"small\">Shaded: {LABEL}. The source paper's CFD is not public, so its \
+        "<p>Loads: {}. Held out: {}.</p>\n<p class=\"small\">Shaded: {LABEL}. The source paper's CFD is not public, so its \
          figures are of other cases and another mesh; they say where it stands, not which network is better.</p>\n",
-        page_style(),
         escape(&report.data.label()),
         escape(&report.splits.join("; ")),
     );
     if report.by_sample {
         text.push_str(
-            "<div class=\"notice\">Sections and mirror images of one case are on both sides of this split: the figures \
+            "<div class=\"verdict notice\">Sections and mirror images of one case are on both sides of this split: the figures \
              test interpolation within known runs only.</div>\n",
         );
     }
     for vehicle in &report.vehicles {
         text.push_str(&section(vehicle)?);
     }
-    let _ = writeln!(text, "<p class=\"small\">{}</p></body></html>", escape(&report.program));
-    Ok(text)
+    let _ = writeln!(text, "<p class=\"small\">{}</p>", escape(&report.program));
+    Ok(document(&format!("wade eval: {}", report.data.name), &text))
 }
 
 fn section(vehicle: &VehicleReport) -> Result<String, PlotError> {
@@ -52,17 +48,6 @@ fn section(vehicle: &VehicleReport) -> Result<String, PlotError> {
         slice_table(vehicle, paper),
         calibration(vehicle),
     ))
-}
-
-/// A table whose columns from `paper` on are the paper's.
-fn table(heads: &[String], paper: usize, rows: &[Vec<String>]) -> String {
-    let class = |column: usize| if column >= paper { " class=\"paper\"" } else { "" };
-    let line = |tag: &str, cells: &[String]| {
-        let cell = |(column, cell): (usize, &String)| format!("<{tag}{}>{cell}</{tag}>", class(column));
-        format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>())
-    };
-    let body: String = rows.iter().map(|row| line("td", row)).collect();
-    format!("<div class=\"wide\"><table>{}{body}</table></div>\n", line("th", heads))
 }
 
 fn number(value: f64) -> String {
@@ -113,7 +98,7 @@ fn net_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
             of(paper.surface_mae.map(Some)),
         )
     });
-    table(&heads, 13, &rows) + &note
+    table(&heads, 13, rows) + &note
 }
 
 fn moment_table(vehicle: &VehicleReport) -> String {
@@ -127,7 +112,7 @@ fn moment_table(vehicle: &VehicleReport) -> String {
     };
     let models = vehicle.models.iter().filter_map(|model| Some((model.name.as_str(), model.moment_mae_nm?)));
     let rows: Vec<_> = models.chain([("mean magnitude", scale)]).map(row).collect();
-    table(&heads, usize::MAX, &rows)
+    table(&heads, usize::MAX, rows)
         + "<p class=\"small\">About the center of mass. The paper has no moments.</p>\n"
 }
 
@@ -160,7 +145,7 @@ fn kind_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
             .chain([share.map_or_else(|| "–".to_owned(), percent)])
             .collect()
     };
-    table(&heads, 5, &vehicle.kinds.iter().map(row).collect::<Vec<_>>())
+    table(&heads, 5, vehicle.kinds.iter().map(row))
 }
 
 fn percent(share: f64) -> String {
@@ -174,7 +159,7 @@ fn surface_table(vehicle: &VehicleReport) -> String {
         let cells = std::iter::once(escape(&surface.name)).chain(surface.mae_n.map(number));
         cells.chain([percent(surface.share)]).collect()
     };
-    table(&heads, usize::MAX, &vehicle.surfaces.iter().map(row).collect::<Vec<_>>())
+    table(&heads, usize::MAX, vehicle.surfaces.iter().map(row))
 }
 
 fn slice_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
@@ -189,7 +174,7 @@ fn slice_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
             .collect()
     };
     let rows: Vec<_> = vehicle.slices.iter().map(row).collect();
-    table(&heads, 6, &rows)
+    table(&heads, 6, rows)
         + "<p class=\"small\">Depth [m], speed [m/s], obliqueness |v<sub>y</sub>| / |v|; net force.</p>\n"
 }
 
@@ -205,5 +190,5 @@ fn calibration(vehicle: &VehicleReport) -> String {
         row("within two (95.4 %)", calibration.within_two.map(percent)),
         row("RMS of error over stated deviation (1)", calibration.error_over_stated.map(number)),
     ];
-    table(&heads, usize::MAX, &rows)
+    table(&heads, usize::MAX, rows)
 }

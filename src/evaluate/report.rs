@@ -10,7 +10,7 @@ use super::paper::{self, Paper};
 use super::states::State;
 use super::{EvaluateError, page};
 use crate::frame::Vec3;
-use crate::train::plot::PlotError;
+use crate::page::PlotError;
 use crate::train::report::DataFile;
 use crate::vehicle::Vehicle;
 

@@ -2,10 +2,10 @@
 //!
 //! | service | pattern | request | response |
 //! | --- | --- | --- | --- |
-//! | `<namespace>/v2/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
-//! | `<namespace>/v2/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
-//! | `<namespace>/v2/wake` | event | a client wakes the server | |
-//! | `<namespace>/v2/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
+//! | `<namespace>/v3/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
+//! | `<namespace>/v3/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
+//! | `<namespace>/v3/wake` | event | a client wakes the server | |
+//! | `<namespace>/v3/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
 //!
 //! The namespace is `wade` unless the server's configuration says otherwise.
 //!
@@ -41,22 +41,22 @@ impl Names {
 
     /// A vehicle's service for single queries.
     pub fn evaluate(&self, vehicle: &str) -> String {
-        format!("{}/v2/evaluate/{vehicle}", self.namespace)
+        format!("{}/v3/evaluate/{vehicle}", self.namespace)
     }
 
     /// A vehicle's service for batches.
     pub fn evaluate_batch(&self, vehicle: &str) -> String {
-        format!("{}/v2/evaluate_batch/{vehicle}", self.namespace)
+        format!("{}/v3/evaluate_batch/{vehicle}", self.namespace)
     }
 
     /// Event service on which clients wake the server.
     pub fn wake(&self) -> String {
-        format!("{}/v2/wake", self.namespace)
+        format!("{}/v3/wake", self.namespace)
     }
 
     /// Event service on which the server wakes clients.
     pub fn done(&self) -> String {
-        format!("{}/v2/done", self.namespace)
+        format!("{}/v3/done", self.namespace)
     }
 }
 
@@ -87,7 +87,7 @@ pub const HAS_ADDED_MASS: u32 = 4;
 /// A state and who asks. 136 bytes.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::Query")]
+#[type_name("wade::v3::Query")]
 pub struct Query {
     /// The client's own number, given back in the answer.
     pub sequence: u64,
@@ -127,7 +127,7 @@ pub struct Query {
 /// The load of one effect. 32 bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::EffectAnswer")]
+#[type_name("wade::v3::EffectAnswer")]
 pub struct EffectAnswer {
     /// Which: the number of `Effect` in proto/wade/v1/hydrodynamics.proto.
     pub effect: u32,
@@ -142,7 +142,7 @@ pub struct EffectAnswer {
 /// The answer to a [`Query`]. 3,328 bytes.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::Answer")]
+#[type_name("wade::v3::Answer")]
 pub struct Answer {
     /// The query's number.
     pub sequence: u64,
@@ -193,7 +193,7 @@ pub struct Answer {
 /// What comes before the states of a batch.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::BatchHeader")]
+#[type_name("wade::v3::BatchHeader")]
 pub struct BatchHeader {
     /// The client's own number, given back in the answer.
     pub sequence: u64,
@@ -208,7 +208,7 @@ pub struct BatchHeader {
 /// Up to [`MAX_BATCH`] states.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::BatchQuery")]
+#[type_name("wade::v3::BatchQuery")]
 pub struct BatchQuery {
     /// How many and who asks.
     pub header: BatchHeader,
@@ -219,7 +219,7 @@ pub struct BatchQuery {
 /// The answer to a [`BatchQuery`]: all of its states, or the first that is wrong.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::BatchAnswer")]
+#[type_name("wade::v3::BatchAnswer")]
 pub struct BatchAnswer {
     /// The query's number.
     pub sequence: u64,

@@ -4,37 +4,23 @@ use std::fmt::Write;
 
 use super::{
     hlog::control_by_interval,
-    plot::{
-        BLUE, Frame, GRAY, GREEN, Line, ORANGE, PURPLE, PlotError, RED, distribution, nines, percentile,
-        plot, time,
-    },
+    plot::{Frame, Line, distribution, nines, percentile, plot, time},
     record::{Interval, Percentiles},
     report::Report,
 };
-
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:960px;margin:24px auto;padding:0 10px;color:#1f2328}\
-h1{font-size:22px;margin:0 0 4px}h2{font-size:17px;margin:28px 0 4px}p{margin:4px 0 8px}\
-.verdict{padding:10px 14px;border-left:6px solid;margin:12px 0}.pass{border-color:#2a8c4a;background:#eef8f0}\
-.fail{border-color:#b91c1c;background:#fdf0f0}.verdict ul{margin:4px 0;padding-left:20px}\
-table{border-collapse:collapse;margin:8px 0}th,td{padding:4px 12px;border-bottom:1px solid #e3e6ea;text-align:right}\
-th:first-child,td:first-child{text-align:left;padding-left:0}td.note{text-align:left;color:#57606a}\
-.legend span{margin-right:22px}.legend i{display:inline-block;width:26px;margin-right:7px;vertical-align:middle}\
-svg{max-width:100%;height:auto;display:block}.small{color:#57606a;font-size:13px}";
+use crate::page::plot::{BLUE, GRAY, GREEN, ORANGE, PURPLE, RED};
+use crate::page::{PlotError, document, escape};
 
 /// The page.
 pub(super) fn page(report: &Report) -> Result<String, PlotError> {
-    let title = format!("wade soak: {} over {}", report.vehicle, report.transport);
-    let title = escape(&title);
-    Ok(format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\
-         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n\
-         <h1>{title}</h1>\n{}\n{}\n{}\n\
+    let body = format!(
+        "{}\n{}\n{}\n\
          <h2>How often is it how slow?</h2>\n<p>To the right the rare, slow requests: at 99.9 % one request in a \
          thousand took longer than the line shows. Where the control is as high as the response time, the machine \
          is the cause and not the server.</p>\n{}\n\
          <h2>When was it slow?</h2>\n<p>{}</p>\n{}\n\
          <p>The machine alone, over the same time. A peak above that has its twin here came from the machine.</p>\n\
-         {}\n{}</body></html>\n",
+         {}\n{}",
         summary(report),
         verdict(report),
         table(report),
@@ -46,11 +32,8 @@ pub(super) fn page(report: &Report) -> Result<String, PlotError> {
         timeline(report)?,
         control_timeline(report)?,
         footer(report),
-    ))
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    );
+    Ok(document(&format!("wade soak: {} over {}", report.vehicle, report.transport), &body))
 }
 
 fn summary(report: &Report) -> String {
@@ -113,7 +96,7 @@ fn table(report: &Report) -> String {
         for us in [p50, p95, p99, p99_9, max] {
             let _ = write!(text, "<td>{}</td>", time(*us));
         }
-        let _ = write!(text, "<td class=\"note\">{note}</td></tr>");
+        let _ = write!(text, "<td class=\"text\">{note}</td></tr>");
     }
     text + "</table>"
 }

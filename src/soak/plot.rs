@@ -1,12 +1,9 @@
 //! The plots, as SVG text.
 
-use std::io;
-
 use hdrhistogram::{Counter, Histogram};
-use plotters::{drawing::DrawingAreaErrorKind, prelude::*};
+use plotters::prelude::*;
 
-/// A plot could not be drawn.
-pub type PlotError = DrawingAreaErrorKind<io::Error>;
+use crate::page::PlotError;
 
 /// A named line through points of x and microseconds.
 pub(super) struct Line {
@@ -14,13 +11,6 @@ pub(super) struct Line {
     pub color: RGBColor,
     pub points: Vec<(f64, f64)>,
 }
-
-pub(super) const BLUE: RGBColor = RGBColor(0x1b, 0x5e, 0xa8);
-pub(super) const GREEN: RGBColor = RGBColor(0x2a, 0x8c, 0x4a);
-pub(super) const ORANGE: RGBColor = RGBColor(0xd9, 0x7a, 0x06);
-pub(super) const RED: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
-pub(super) const GRAY: RGBColor = RGBColor(0x77, 0x7d, 0x85);
-pub(super) const PURPLE: RGBColor = RGBColor(0x8a, 0x5a, 0xa8);
 
 const WIDTH: u32 = 940;
 const SHORTEST_US: f64 = 0.1;

@@ -17,11 +17,12 @@ use super::{
     lateness,
     machine::{Machine, rfc3339},
     page,
-    plot::{PlotError, time},
+    plot::time,
     record::{Counts, Recording, Totals, histogram},
     slo::judge,
 };
 pub use super::{hlog::HlogError, record::Percentiles, slo::Outcome};
+use crate::page::PlotError;
 
 /// What a soak found; serialises to `soak.json`.
 #[derive(Debug, Serialize)]

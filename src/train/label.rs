@@ -1,10 +1,8 @@
 //! What a network is to say of a sample: the load of the data set with the vehicle's own hydrostatics.
 
 use super::TrainError;
-use crate::condition::{Condition, GroundContact};
 use crate::dataset::Sample;
 use crate::frame::Vec3;
-use crate::geometry::hydrostatics::surface_hydrostatics;
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
@@ -17,27 +15,13 @@ pub struct Label {
     pub moment: Option<Vec3>,
 }
 
-/// Hydrostatic load on each surface of the vehicle's hull about the body origin, in the ground-contact convention of the
-/// state.
-pub fn at_rest(vehicle: &Vehicle, condition: &Condition) -> Vec<Wrench> {
-    let (plane, origin) = (condition.water_plane(vehicle.z0), Vec3::zeros());
-    let mut loads =
-        surface_hydrostatics(&vehicle.hull, vehicle.surfaces.len(), &plane, condition.density, &origin);
-    if condition.ground_contact == GroundContact::Dry {
-        for patch in &vehicle.contacts {
-            loads[patch.surface] += patch.lost_pressure(&plane, condition.density, &origin);
-        }
-    }
-    loads
-}
-
 /// The loads to learn and to be judged by, in the order of the vehicle's surfaces.
 ///
 /// `load - load at rest on the case's own mesh + exact hydrostatics of the hull`: a castellated CFD mesh displaces
 /// another volume than the hull, by several per cent, and that difference is no property of the flow. Where a load has no
 /// part at rest it is taken as it is. `order` says where each of the vehicle's surfaces stands in the data set.
 pub fn labels(vehicle: &Vehicle, order: &[usize], sample: &Sample) -> Vec<Label> {
-    let exact = at_rest(vehicle, &sample.condition);
+    let exact = vehicle.at_rest(&sample.condition);
     let add = |(label, exact): (Label, &Wrench)| Label {
         force: label.force + exact.force,
         moment: label.moment.map(|moment| moment + exact.moment),
@@ -47,7 +31,7 @@ pub fn labels(vehicle: &Vehicle, order: &[usize], sample: &Sample) -> Vec<Label>
 
 /// What the motion adds to the load of still water, in the order of the vehicle's surfaces.
 pub fn dynamic(vehicle: &Vehicle, order: &[usize], sample: &Sample) -> Vec<Label> {
-    beyond(order, sample, &at_rest(vehicle, &sample.condition)).collect()
+    beyond(order, sample, &vehicle.at_rest(&sample.condition)).collect()
 }
 
 /// Each load less its part at rest, or less the hull's own where the data set states none.

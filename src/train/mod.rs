@@ -18,7 +18,6 @@ pub mod layers;
 pub mod loss;
 mod page;
 pub mod plan;
-pub mod plot;
 pub mod report;
 pub mod samples;
 pub mod score;
@@ -29,7 +28,6 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 pub use config::{Analytic, Config, Keep};
-pub(crate) use page::style as page_style;
 pub use variant::Variant;
 
 use crate::condition::GroundContact;

@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::fit::Epoch;
-use super::plot::PlotError;
 use super::score::Score;
 use super::task::hexadecimal;
 use super::{Config, Sides, Source, Trained, page};
 use crate::dataset::split::By;
 use crate::model::network::Network;
+use crate::page::PlotError;
 
 /// The record for programs.
 const RECORD: &str = "report.json";

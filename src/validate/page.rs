@@ -6,33 +6,21 @@ use plotters::style::RGBColor;
 
 use super::drag::R2_DEFINITION;
 use super::paper::{self, LABEL, PaperDepth};
-use super::plot::{Mark, PlotError, Series, color, figure};
+use super::plot::{Mark, Series, color, figure};
 use super::report::{Report, Source};
 use super::section::Section;
-
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:960px;margin:24px auto;padding:0 10px;color:#1f2328}\
-h1{font-size:22px;margin:0 0 4px}h2{font-size:17px;margin:28px 0 4px}p{margin:4px 0 8px}\
-.verdict{padding:10px 14px;border-left:6px solid;margin:12px 0}.pass{border-color:#2a8c4a;background:#eef8f0}\
-.fail{border-color:#b91c1c;background:#fdf0f0}.generated{border-color:#d97a06;background:#fdf6ec}\
-.verdict ul{margin:4px 0;padding-left:20px}.wide{overflow-x:auto}\
-table{border-collapse:collapse;margin:8px 0}th,td{padding:4px 12px;border-bottom:1px solid #e3e6ea;text-align:right;white-space:nowrap}\
-th:first-child,td:first-child{text-align:left;padding-left:0}td.paper,th.paper{color:#8a5a00;background:#fdf9f1}\
-td.text{text-align:left;white-space:normal}\
-.legend span{margin-right:20px;white-space:nowrap}svg{max-width:100%;height:auto;display:block}.small{color:#57606a;font-size:13px}";
+use crate::page::{PlotError, document, escape, table};
 
 const BLACK: RGBColor = RGBColor(0, 0, 0);
 const BROWN: RGBColor = RGBColor(0xb0, 0x70, 0x00);
 
 /// The page.
 pub(super) fn page(report: &Report) -> Result<String, PlotError> {
-    let title = escape(&format!("wade validate: {}", report.subject.vehicle));
-    Ok(format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\
-         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n\
-         <h1>{title}</h1>\n{}\n{}\n{}\n\
+    let body = format!(
+        "{}\n{}\n{}\n\
          <h2>Test 1: drag against the square of the speed</h2>\n{}\n{}\n{}\n\
          <h2>Test 2: vertical force is buoyancy plus lift</h2>\n{}\n{}\n{}\n{}\n\
-         <h2>Sections and trials</h2>\n{}\n{}</body></html>\n",
+         <h2>Sections and trials</h2>\n{}\n{}",
         summary(report),
         generated(report),
         verdict(report),
@@ -45,11 +33,8 @@ pub(super) fn page(report: &Report) -> Result<String, PlotError> {
         bin_table(report),
         section_tables(report),
         footer(report),
-    ))
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    );
+    Ok(document(&format!("wade validate: {}", report.subject.vehicle), &body))
 }
 
 fn summary(report: &Report) -> String {
@@ -75,7 +60,7 @@ fn summary(report: &Report) -> String {
 fn generated(report: &Report) -> String {
     match &report.data.generated {
         Some(how) => format!(
-            "<div class=\"verdict generated\"><b>Generated motion, not measured.</b> {}</div>",
+            "<div class=\"verdict notice\"><b>Generated motion, not measured.</b> {}</div>",
             escape(how)
         ),
         None => String::new(),
@@ -94,24 +79,6 @@ fn verdict(report: &Report) -> String {
         let _ = write!(text, "<li><b>{mark}</b> · {}</li>", escape(&check.finding));
     }
     text + "</ul></div>"
-}
-
-/// A table whose last columns, from `paper` on, are the paper's.
-fn table(heads: &[&str], paper: usize, rows: impl Iterator<Item = Vec<String>>) -> String {
-    let class = |column: usize| if column >= paper { " class=\"paper\"" } else { "" };
-    let mut text = "<div class=\"wide\"><table><tr>".to_owned();
-    for (column, head) in heads.iter().enumerate() {
-        let _ = write!(text, "<th{}>{head}</th>", class(column));
-    }
-    text.push_str("</tr>");
-    for row in rows {
-        text.push_str("<tr>");
-        for (column, cell) in row.iter().enumerate() {
-            let _ = write!(text, "<td{}>{cell}</td>", class(column));
-        }
-        text.push_str("</tr>");
-    }
-    text + "</table></div>"
 }
 
 fn number(value: Option<f64>, digits: usize) -> String {

@@ -1,20 +1,12 @@
 //! The figures, as SVG text.
 
-use std::io;
+use plotters::prelude::*;
 
-use plotters::{drawing::DrawingAreaErrorKind, prelude::*};
-
-/// A figure could not be drawn.
-pub type PlotError = DrawingAreaErrorKind<io::Error>;
+use crate::page::PlotError;
+use crate::page::plot::{BLUE, GRAY, GREEN, ORANGE, PURPLE};
 
 /// A color for each depth; the last serves all further ones.
-pub(super) const DEPTH_COLORS: [RGBColor; 5] = [
-    RGBColor(0x1b, 0x5e, 0xa8),
-    RGBColor(0xd9, 0x7a, 0x06),
-    RGBColor(0x2a, 0x8c, 0x4a),
-    RGBColor(0x8a, 0x5a, 0xa8),
-    RGBColor(0x77, 0x7d, 0x85),
-];
+pub(super) const DEPTH_COLORS: [RGBColor; 5] = [BLUE, ORANGE, GREEN, PURPLE, GRAY];
 
 const WIDTH: u32 = 940;
 const HEIGHT: u32 = 420;

@@ -6,11 +6,11 @@ use super::check::Check;
 use super::drag::DragScaling;
 use super::page::page;
 use super::paper;
-use super::plot::PlotError;
 use super::section::{LeftOut, Section};
 use super::vertical::VerticalForce;
 use super::{Config, Tests};
 use crate::model::Model;
+use crate::page::PlotError;
 use crate::trials::Trials;
 
 /// What a validation found; serializes to `report.json`.

@@ -15,7 +15,9 @@ pub use crate::geometry::submergence::Samples;
 pub use crate::geometry::surfaces::Hull;
 pub use validate::VehicleError;
 
+use crate::condition::{Condition, GroundContact};
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
+use crate::geometry::hydrostatics::surface_hydrostatics;
 use crate::wrench::Wrench;
 use spec::BodyFromStl;
 
@@ -123,6 +125,21 @@ pub struct Vehicle {
     pub hull: Hull,
     /// Sampled points of each surface.
     pub samples: Samples,
+}
+
+impl Vehicle {
+    /// Hydrostatic load on each surface about the body origin [N, N m], in the ground-contact convention of the state.
+    pub fn at_rest(&self, condition: &Condition) -> Vec<Wrench> {
+        let (plane, origin) = (condition.water_plane(self.z0), Vec3::zeros());
+        let mut loads =
+            surface_hydrostatics(&self.hull, self.surfaces.len(), &plane, condition.density, &origin);
+        if condition.ground_contact == GroundContact::Dry {
+            for patch in &self.contacts {
+                loads[patch.surface] += patch.lost_pressure(&plane, condition.density, &origin);
+            }
+        }
+        loads
+    }
 }
 
 impl Vehicle {

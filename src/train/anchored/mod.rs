@@ -68,10 +68,14 @@ pub fn train(
     Ok(trained)
 }
 
+/// Least unit of each coordinate of a state ([`crate::anchor::Reading::coordinates`]): what matters physically also where
+/// the training cases hardly differ. A tenth of a tilt; but whether the bed moves shows in the near-bed layer alone.
+const LEAST_UNIT: [f64; COORDINATES] = [0.05, 0.05, 0.05, 0.2, 0.2, 0.1, 0.1, 1.0];
+
 /// Standardisation, and where the training cases lie.
 fn form(training: &[Known]) -> Box<Anchored> {
     let (mean, std) = super::task::moments(training.iter().map(|state| state.reading.global));
-    let (_, scale) = super::task::moments(training.iter().map(|state| state.reading.coordinates));
+    let scale = units(training.iter().map(|state| state.reading.coordinates));
     let mut form = Box::new(Anchored {
         global_mean: mean.map(|x| x as f32),
         global_std: std.map(|x| x as f32),
@@ -99,6 +103,16 @@ fn form(training: &[Known]) -> Box<Anchored> {
     form.near = nearest.get(usual).or(nearest.last()).copied().unwrap_or(1.0);
     form.cases = places;
     form
+}
+
+/// Standard deviation of each coordinate, or the least unit where that is larger.
+fn units(places: impl Iterator<Item = [f64; COORDINATES]> + Clone) -> [f64; COORDINATES] {
+    let (mean, _) = super::task::moments(places.clone());
+    let count = places.clone().count().max(1) as f64;
+    std::array::from_fn(|i| {
+        let variance = places.clone().map(|place| (place[i] - mean[i]).powi(2)).sum::<f64>() / count;
+        variance.sqrt().max(LEAST_UNIT[i])
+    })
 }
 
 fn task(

@@ -1,21 +1,30 @@
-//! Figures of training and evaluation, as SVG text.
+//! Plain figures, as SVG text under a legend.
 
 use std::io;
 use std::ops::Range;
 
 use plotters::{coord::Shift, drawing::DrawingAreaErrorKind, prelude::*};
 
+use super::escape;
+
 /// A figure could not be drawn.
 pub type PlotError = DrawingAreaErrorKind<io::Error>;
 
-const COLORS: [RGBColor; 6] = [
-    RGBColor(0x1b, 0x5e, 0xa8),
-    RGBColor(0xd9, 0x7a, 0x06),
-    RGBColor(0x2a, 0x8c, 0x4a),
-    RGBColor(0x8a, 0x5a, 0xa8),
-    RGBColor(0xb9, 0x1c, 0x1c),
-    RGBColor(0x77, 0x7d, 0x85),
-];
+/// Blue, the first color of a figure.
+pub const BLUE: RGBColor = RGBColor(0x1b, 0x5e, 0xa8);
+/// Orange, the second.
+pub const ORANGE: RGBColor = RGBColor(0xd9, 0x7a, 0x06);
+/// Green, the third.
+pub const GREEN: RGBColor = RGBColor(0x2a, 0x8c, 0x4a);
+/// Purple, the fourth.
+pub const PURPLE: RGBColor = RGBColor(0x8a, 0x5a, 0xa8);
+/// Red, the fifth.
+pub const RED: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
+/// Gray, the last.
+pub const GRAY: RGBColor = RGBColor(0x77, 0x7d, 0x85);
+
+/// In the order in which a figure takes them.
+const COLORS: [RGBColor; 6] = [BLUE, ORANGE, GREEN, PURPLE, RED, GRAY];
 const GRID: RGBColor = RGBColor(0xe3, 0xe6, 0xea);
 
 /// Points of one color, with the name in the legend.
@@ -25,6 +34,38 @@ pub struct Series {
     pub name: String,
     /// The points.
     pub points: Vec<(f64, f64)>,
+}
+
+/// Points over two linear axes.
+pub fn scatter(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotError> {
+    let mut svg = String::new();
+    {
+        let area = canvas(&mut svg, (470, 320))?;
+        let range =
+            |of: fn(&(f64, f64)) -> f64| padded(extent(series.iter().flat_map(|s| &s.points).map(of)));
+        let mut chart = ChartBuilder::on(&area)
+            .margin(8)
+            .margin_right(16)
+            .x_label_area_size(42)
+            .y_label_area_size(62)
+            .build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;
+        chart
+            .configure_mesh()
+            .light_line_style(WHITE)
+            .bold_line_style(GRID)
+            .x_labels(7)
+            .y_labels(7)
+            .x_desc(x_title)
+            .y_desc(y_title)
+            .label_style(("sans-serif", 13))
+            .axis_desc_style(("sans-serif", 13))
+            .draw()?;
+        for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
+            chart.draw_series(s.points.iter().map(|&p| Circle::new(p, 2, color.filled())))?;
+        }
+        area.present()?;
+    }
+    Ok(format!("<figure>{}{svg}</figure>", legend(series)))
 }
 
 /// Lines over a linear axis; the other is logarithmic and leaves out what is not positive.
@@ -94,11 +135,6 @@ pub fn parity(x_title: &str, y_title: &str, series: &[Series]) -> Result<String,
         area.present()?;
     }
     Ok(format!("<figure>{}{svg}</figure>", legend(series)))
-}
-
-/// Safe in HTML.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 fn canvas(svg: &mut String, size: (u32, u32)) -> Result<DrawingArea<SVGBackend<'_>, Shift>, PlotError> {

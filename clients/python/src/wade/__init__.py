@@ -1,0 +1,64 @@
+"""What the water does to a ground vehicle that drives into it, asked of a `wade` server.
+
+`GrpcClient` and `ShmClient` have the same methods and types; `wade.aio.GrpcClient` is for asyncio. A `State` goes in,
+`Forces` come out, each for one vehicle or as arrays for N. Body frame: x forward, y left, z up; SI units, radians; the
+fields are named as on the wire, with their unit. Errors are `WadeError`s.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from .attitude import gravity_from_quaternion, gravity_from_roll_pitch
+from .channel import Tls
+from .client import Client, Stream
+from .errors import (
+    DeadlineExceeded,
+    InvalidState,
+    LayoutMismatch,
+    Refused,
+    ResourceExhausted,
+    ServerUnavailable,
+    UnknownVehicle,
+    Violation,
+    WadeError,
+)
+from .forces import Forces, Quantity
+from .rpc import GrpcClient
+from .state import GroundContact, State
+from .vehicle import Surface, Vehicle
+
+if TYPE_CHECKING:
+    from .shm import ShmClient
+
+__all__ = [
+    "Client",
+    "DeadlineExceeded",
+    "Forces",
+    "GroundContact",
+    "GrpcClient",
+    "InvalidState",
+    "LayoutMismatch",
+    "Quantity",
+    "Refused",
+    "ResourceExhausted",
+    "ServerUnavailable",
+    "ShmClient",
+    "State",
+    "Stream",
+    "Surface",
+    "Tls",
+    "UnknownVehicle",
+    "Vehicle",
+    "Violation",
+    "WadeError",
+    "gravity_from_quaternion",
+    "gravity_from_roll_pitch",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """`ShmClient` is loaded when it is asked for: it needs iceoryx2, which gRPC alone does not."""
+    if name == "ShmClient":
+        from .shm import ShmClient
+
+        return ShmClient
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

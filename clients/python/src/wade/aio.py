@@ -1,0 +1,161 @@
+"""The client over gRPC for asyncio: the same methods, awaited. One event loop."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import grpc
+
+from . import messages
+from .channel import DEFAULT_ADDRESS, Tls, open_channel
+from .client import DEFAULT_TIMEOUT_S, checked_timeout
+from .errors import DeadlineExceeded, ServerUnavailable, WadeError
+from .forces import Forces
+from .state import State
+from .vehicle import Vehicle
+
+#: What grpc.aio puts in the place of a call's status where it could not write a message.
+_NOT_WRITTEN = "Internal error from Core"
+
+
+class GrpcClient:
+    """As `wade.GrpcClient`, with every call a coroutine and `async with` for `with`."""
+
+    def __init__(self, address: str = DEFAULT_ADDRESS, *, tls: Tls | None = None, timeout_s: float = DEFAULT_TIMEOUT_S):
+        self.address = address
+        self._tls = tls
+        self._timeout_s = checked_timeout(timeout_s)
+        self._channel: Any = None
+        self._calls: dict[str, Any] = {}
+
+    async def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces on one vehicle in one state."""
+        return messages.forces(await self._call("Evaluate", messages.evaluate_request(vehicle, state), timeout_s))
+
+    async def evaluate_batch(
+        self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
+    ) -> Forces:
+        """The forces in N states of one vehicle, as many as the server's `grpc.max_batch` allows."""
+        request, length = messages.evaluate_batch_request(vehicle, states, surfaces)
+        return messages.batch_forces(await self._call("EvaluateBatch", request, timeout_s), length)
+
+    def stream(self, vehicle: str) -> GrpcStream:
+        """A stream of states of one vehicle: a fraction of the time of single calls. One task at a time."""
+        return GrpcStream(self, vehicle)
+
+    async def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
+        """Names of the vehicles that are served."""
+        listed = await self._call("ListVehicles", messages.list_vehicles_request(), timeout_s)
+        return [summary.name for summary in listed.vehicles]
+
+    async def vehicle(self, name: str, *, mesh: bool = False, timeout_s: float | None = None) -> Vehicle:
+        """Surfaces, dimensions, mass and training domain of a vehicle; the hull's mesh on request."""
+        return messages.vehicle(await self._call("GetVehicle", messages.get_vehicle_request(name, mesh), timeout_s))
+
+    async def close(self) -> None:
+        """Closes the connection. A call after it connects anew."""
+        channel, self._channel, self._calls = self._channel, None, {}
+        if channel is not None:
+            await channel.close()
+
+    async def __aenter__(self) -> GrpcClient:
+        return self
+
+    async def __aexit__(self, *exception: object) -> None:
+        await self.close()
+
+    async def _call(self, method: str, request: Any, timeout_s: float | None) -> Any:
+        timeout_s = self._timeout(timeout_s)
+        calls = self._connected()
+        try:
+            return await calls[method](request, timeout=timeout_s)
+        except grpc.RpcError as failure:
+            raise self._failed(calls, failure, timeout_s) from None
+
+    def _timeout(self, timeout_s: float | None) -> float:
+        timeout_s = self._timeout_s if timeout_s is None else checked_timeout(timeout_s)
+        if timeout_s == 0.0:
+            # grpcio would take it for the next full millisecond
+            raise DeadlineExceeded(timeout_s)
+        return timeout_s
+
+    def _connected(self) -> dict[str, Any]:
+        if not self._calls:
+            self._channel = open_channel(grpc.aio, self.address, self._tls)
+            self._calls = messages.calls(self._channel)
+        return self._calls
+
+    def _failed(self, calls: dict[str, Any], failure: Any, timeout_s: float) -> WadeError:
+        error = messages.error(failure, self.address, timeout_s)
+        if isinstance(error, ServerUnavailable) and self._calls is calls:
+            # dropped rather than closed: closing would cancel what other tasks still wait for
+            self._channel, self._calls = None, {}
+        return error
+
+
+class GrpcStream:
+    """One answer a state, in order. A call that fails ends the stream, and the next opens it anew."""
+
+    def __init__(self, client: GrpcClient, vehicle: str):
+        self._client, self._vehicle = client, vehicle
+        self._calls: dict[str, Any] = {}
+        self._call: Any = None
+
+    async def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces in one state."""
+        timeout_s = self._client._timeout(timeout_s)
+        request = messages.evaluate_request(self._vehicle, state)
+        if self._call is None:
+            self._calls = self._client._connected()
+            self._call = self._calls["Stream"]()
+        call = self._call
+        expired = False
+
+        def expire() -> None:
+            nonlocal expired
+            expired = True
+            call.cancel()
+
+        timer = asyncio.get_running_loop().call_later(timeout_s, expire)
+        try:
+            await call.write(request)
+            answer = await call.read()
+        except (grpc.RpcError, asyncio.InvalidStateError):
+            # the latter where the call had ended before this state was written
+            answer = grpc.aio.EOF
+        except asyncio.CancelledError:
+            self.close()
+            if expired:
+                raise DeadlineExceeded(timeout_s) from None
+            raise
+        finally:
+            timer.cancel()
+        if answer is grpc.aio.EOF:
+            raise await self._ended(call, timeout_s)
+        return messages.forces(answer)
+
+    def close(self) -> None:
+        """Ends the stream."""
+        call, self._call = self._call, None
+        if call is not None:
+            call.cancel()
+
+    async def __aenter__(self) -> GrpcStream:
+        return self
+
+    async def __aexit__(self, *exception: object) -> None:
+        self.close()
+
+    async def _ended(self, call: Any, timeout_s: float) -> WadeError:
+        """What ended a call, by its status."""
+        self._call = None
+        status = (
+            await call.code(),
+            await call.initial_metadata(),
+            await call.trailing_metadata(),
+            await call.details(),
+        )
+        if status[-1] == _NOT_WRITTEN:
+            status = (grpc.StatusCode.UNAVAILABLE, *status[1:-1], "the connection broke")
+        return self._client._failed(self._calls, grpc.aio.AioRpcError(*status), timeout_s)

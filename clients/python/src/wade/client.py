@@ -1,0 +1,57 @@
+"""What the clients have in common, for code that takes any of them."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Protocol
+
+from .forces import Forces
+from .state import State
+
+#: Longest wait for an answer unless the caller says otherwise [s].
+DEFAULT_TIMEOUT_S = 1.0
+
+
+def checked_timeout(timeout_s: float) -> float:
+    """A time to wait: zero or more; zero never waits, so that the call ends in `DeadlineExceeded`."""
+    if not (isinstance(timeout_s, Real) and math.isfinite(timeout_s) and timeout_s >= 0):
+        raise ValueError(f"timeout_s must be a finite number of seconds, zero or more, got {timeout_s!r}")
+    return float(timeout_s)
+
+
+class Stream(Protocol):
+    """One answer a state, in order, for one vehicle. A call that fails ends the stream, and the next opens it anew."""
+
+    def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces in one state."""
+
+    def close(self) -> None:
+        """Ends the stream."""
+
+    def __enter__(self) -> Stream: ...
+    def __exit__(self, *exception: object) -> None: ...
+
+
+class Client(Protocol):
+    """`GrpcClient` or `ShmClient`. Every call ends within its timeout, with forces or a `WadeError`."""
+
+    def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces on one vehicle in one state."""
+
+    def evaluate_batch(
+        self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
+    ) -> Forces:
+        """The forces in N states of one vehicle; `surfaces=False` leaves out the arrays per surface."""
+
+    def stream(self, vehicle: str) -> Stream:
+        """A stream of states of one vehicle, for a loop that asks at every tick."""
+
+    def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
+        """Names of the vehicles that are served."""
+
+    def close(self) -> None:
+        """Lets go of the server. A call after it connects anew."""
+
+    def __enter__(self) -> Client: ...
+    def __exit__(self, *exception: object) -> None: ...

@@ -1,0 +1,166 @@
+"""The client over gRPC: TCP or a Unix socket."""
+
+from __future__ import annotations
+
+import threading
+import time
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import grpc
+
+from . import messages
+from .channel import DEFAULT_ADDRESS, Tls, open_channel
+from .client import DEFAULT_TIMEOUT_S, checked_timeout
+from .errors import DeadlineExceeded, ServerUnavailable, WadeError
+from .forces import Forces
+from .state import State
+from .vehicle import Vehicle
+
+
+class GrpcClient:
+    """Asks a server at `HOST:PORT` or `unix:PATH`; connects with the first call. Several threads may share it.
+
+    A call that finds no server fails at once, or as soon as the connection breaks, with `ServerUnavailable`; the next
+    one connects anew.
+    """
+
+    def __init__(self, address: str = DEFAULT_ADDRESS, *, tls: Tls | None = None, timeout_s: float = DEFAULT_TIMEOUT_S):
+        self.address = address
+        self._tls = tls
+        self._timeout_s = checked_timeout(timeout_s)
+        self._lock = threading.Lock()
+        self._channel: Any = None
+        self._calls: dict[str, Any] = {}
+
+    def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces on one vehicle in one state."""
+        return messages.forces(self._call("Evaluate", messages.evaluate_request(vehicle, state), timeout_s))
+
+    def evaluate_batch(
+        self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
+    ) -> Forces:
+        """The forces in N states of one vehicle, as many as the server's `grpc.max_batch` allows."""
+        request, length = messages.evaluate_batch_request(vehicle, states, surfaces)
+        return messages.batch_forces(self._call("EvaluateBatch", request, timeout_s), length)
+
+    def stream(self, vehicle: str) -> GrpcStream:
+        """A stream of states of one vehicle: less than half the time of single calls. One thread at a time."""
+        return GrpcStream(self, vehicle)
+
+    def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
+        """Names of the vehicles that are served."""
+        listed = self._call("ListVehicles", messages.list_vehicles_request(), timeout_s)
+        return [summary.name for summary in listed.vehicles]
+
+    def vehicle(self, name: str, *, mesh: bool = False, timeout_s: float | None = None) -> Vehicle:
+        """Surfaces, dimensions, mass and training domain of a vehicle; the hull's mesh on request."""
+        return messages.vehicle(self._call("GetVehicle", messages.get_vehicle_request(name, mesh), timeout_s))
+
+    def close(self) -> None:
+        """Closes the connection. A call after it connects anew."""
+        with self._lock:
+            channel, self._channel, self._calls = self._channel, None, {}
+        if channel is not None:
+            channel.close()
+
+    def __enter__(self) -> GrpcClient:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def _call(self, method: str, request: Any, timeout_s: float | None) -> Any:
+        timeout_s = self._timeout(timeout_s)
+        calls = self._connected()
+        try:
+            return calls[method](request, timeout=timeout_s)
+        except grpc.RpcError as failure:
+            raise self._failed(calls, failure, timeout_s) from None
+
+    def _timeout(self, timeout_s: float | None) -> float:
+        timeout_s = self._timeout_s if timeout_s is None else checked_timeout(timeout_s)
+        if timeout_s == 0.0:
+            # grpcio would take it for the next full millisecond
+            raise DeadlineExceeded(timeout_s)
+        return timeout_s
+
+    def _connected(self) -> dict[str, Any]:
+        with self._lock:
+            if not self._calls:
+                self._channel = open_channel(grpc, self.address, self._tls)
+                self._calls = messages.calls(self._channel)
+            return self._calls
+
+    def _failed(self, calls: dict[str, Any], failure: Any, timeout_s: float) -> WadeError:
+        error = messages.error(failure, self.address, timeout_s)
+        if isinstance(error, ServerUnavailable):
+            # dropped rather than closed: closing would cancel what other threads still wait for
+            with self._lock:
+                if self._calls is calls:
+                    self._channel, self._calls = None, {}
+        return error
+
+
+class GrpcStream:
+    """One answer a state, in order. A call that fails ends the stream, and the next opens it anew."""
+
+    def __init__(self, client: GrpcClient, vehicle: str):
+        self._client, self._vehicle = client, vehicle
+        self._calls: dict[str, Any] = {}
+        self._call: Any = None
+        self._requests: SimpleQueue[Any] = SimpleQueue()
+        self._answers: SimpleQueue[Any] = SimpleQueue()
+
+    def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces in one state."""
+        timeout_s = self._client._timeout(timeout_s)
+        request = messages.evaluate_request(self._vehicle, state)
+        end = time.monotonic() + timeout_s
+        if self._call is None:
+            self._open()
+        self._requests.put(request)
+        try:
+            answer = self._answers.get(timeout=max(end - time.monotonic(), 0.0))
+        except Empty:
+            self.close()
+            raise DeadlineExceeded(timeout_s) from None
+        except BaseException:
+            # interrupted: the answer that is still to come belongs to no later call
+            self.close()
+            raise
+        if isinstance(answer, grpc.RpcError):
+            self.close()
+            raise self._client._failed(self._calls, answer, timeout_s)
+        return messages.forces(answer)
+
+    def close(self) -> None:
+        """Ends the stream."""
+        call, self._call = self._call, None
+        if call is not None:
+            self._requests.put(None)
+            call.cancel()
+
+    def __enter__(self) -> GrpcStream:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def _open(self) -> None:
+        self._calls = self._client._connected()
+        self._requests, self._answers = SimpleQueue(), SimpleQueue()
+        self._call = self._calls["Stream"](iter(self._requests.get, None))
+        # grpcio can wait for an answer without end only; a queue can be waited for in time
+        reader = threading.Thread(target=_read, args=(self._call, self._answers), daemon=True)
+        reader.start()
+
+
+def _read(call: Any, answers: SimpleQueue[Any]) -> None:
+    try:
+        for answer in call:
+            answers.put(answer)
+    except grpc.RpcError:
+        pass
+    # the call itself is the error, also where the server ended it without one
+    answers.put(call)

@@ -1,0 +1,269 @@
+"""The client over shared memory, for programs of the server's user on the server's machine. Linux.
+
+iceoryx2 does not tell a client that its server was killed, so that every wait here has its own end, and a wait that
+ends without an answer gives up the ports: the next call opens new ones and finds a server that was restarted.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import threading
+import time
+from collections.abc import Callable
+from typing import Literal, TypeVar
+
+import numpy as np
+
+from . import shm_layout as layout
+from .client import DEFAULT_TIMEOUT_S, checked_timeout
+from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
+from .forces import Array, Forces
+from .shm_link import Link, Lost, memory
+from .state import GroundContact, State
+
+_T = TypeVar("_T")
+
+
+class ShmClient:
+    """Asks the server of a namespace (`shm.namespace` in its settings); connects with the first call.
+
+    `wait` is "block", which sleeps until the server wakes it, or "spin", which polls without pause: faster by the time
+    it takes to wake up, for the price of a core. Several threads may share a client, one call at a time. It must not be
+    used in a child that was forked after its first call.
+    """
+
+    def __init__(
+        self,
+        namespace: str = "wade",
+        *,
+        wait: Literal["block", "spin"] = "block",
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+    ):
+        if wait not in ("block", "spin"):
+            raise ValueError(f'wait must be "block" or "spin", got {wait!r}')
+        self.namespace = namespace
+        self._blocks = wait == "block"
+        self._timeout_s = checked_timeout(timeout_s)
+        self._lock = threading.Lock()
+        self._link: Link | None = None
+        self._sequence = 0
+
+    def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces on one vehicle in one state."""
+        timeout_s, end = self._end(timeout_s)
+        floats, flags = state.floats(), _flags(state)
+
+        def write(address: int, wake_key: int) -> None:
+            ctypes.memmove(address, _query(self._sequence, wake_key, flags, floats), layout.QUERY.itemsize)
+
+        with self._lock:
+            answer = self._exchange(vehicle, False, write, _read, end, timeout_s)
+        _check(answer["status"], answer, None)
+        return _forces(answer)
+
+    def evaluate_batch(
+        self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
+    ) -> Forces:
+        """The forces in N states of one vehicle, which travel 256 at a time."""
+        timeout_s, end = self._end(timeout_s)
+        rows, flags = states.rows(), _flags(states)
+        length = len(rows["depth_m"])
+        with self._lock:
+            forces: Forces | None = None
+            start = 0
+            while start < length:
+                chunk = slice(start, min(start + layout.MAX_BATCH, length))
+
+                def write(address: int, wake_key: int, chunk: slice = chunk) -> None:
+                    _write_batch(address, self._sequence, wake_key, flags, rows, chunk)
+
+                def read(address: int, forces: Forces | None = forces, chunk: slice = chunk) -> Forces:
+                    return _read_batch(address, forces, length, chunk, surfaces)
+
+                answered = self._exchange(vehicle, True, write, read, end, timeout_s)
+                # a bundle that was exchanged on the way would mix two versions in one answer: from the start again
+                changed = forces is not None and answered is not forces
+                forces, start = (None, 0) if changed else (answered, chunk.stop)
+        assert forces is not None, "rows() refuses an empty batch"
+        return forces
+
+    def stream(self, vehicle: str) -> ShmStream:
+        """A stream of states of one vehicle. Nothing is set up for it: over shared memory a single call is as fast."""
+        return ShmStream(self, vehicle)
+
+    def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
+        """Names of the vehicles that are served. This asks the system, not the server, and does not wait."""
+        self._end(timeout_s)
+        link = Link(self.namespace, blocks=False)
+        served = link.served()
+        if not served:
+            raise link.why_not("any vehicle")
+        return served
+
+    def close(self) -> None:
+        """Gives up the ports. A call after it opens new ones."""
+        with self._lock:
+            self._link = None
+
+    def __enter__(self) -> ShmClient:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def _end(self, timeout_s: float | None) -> tuple[float, float]:
+        timeout_s = self._timeout_s if timeout_s is None else checked_timeout(timeout_s)
+        return timeout_s, time.monotonic() + timeout_s
+
+    def _exchange(
+        self,
+        vehicle: str,
+        batch: bool,
+        write: Callable[[int, int], None],
+        read: Callable[[int], _T],
+        end: float,
+        timeout_s: float,
+    ) -> _T:
+        """One request, written by `write` (address, wake key), and what `read` (address) makes of the response."""
+        if time.monotonic() >= end:
+            raise DeadlineExceeded(timeout_s)
+        self._sequence += 1
+        try:
+            try:
+                response = self._connected().exchange(vehicle, batch, write, end, timeout_s)
+            except Lost:
+                # a server that was restarted is found by new ports
+                self._link = None
+                response = self._connected().exchange(vehicle, batch, write, end, timeout_s)
+        except Lost:
+            link, self._link = self._connected(), None
+            raise link.why_not(vehicle) from None
+        except (DeadlineExceeded, ServerUnavailable):
+            self._link = None
+            raise
+        return read(response.payload_ptr)
+
+    def _connected(self) -> Link:
+        if self._link is None:
+            self._link = Link(self.namespace, self._blocks)
+        return self._link
+
+
+class ShmStream:
+    """One answer a state, in order."""
+
+    def __init__(self, client: ShmClient, vehicle: str):
+        self._client, self._vehicle = client, vehicle
+
+    def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces in one state."""
+        return self._client.evaluate(self._vehicle, state, timeout_s=timeout_s)
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+    def __enter__(self) -> ShmStream:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+def _flags(state: State) -> int:
+    return layout.DRY_CONTACT if state.ground_contact == GroundContact.DRY else 0
+
+
+def _query(sequence: int, wake_key: int, flags: int, floats: list[float]) -> bytes:
+    try:
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, layout.NO_SESSION, flags, *floats, *layout.UNTOLD)
+    except OverflowError:
+        # beyond single precision: infinite, which the server refuses and names
+        limit = float(np.finfo(np.float32).max)
+        floats = [x if abs(x) <= limit else math.copysign(math.inf, x) for x in floats]
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, layout.NO_SESSION, flags, *floats, *layout.UNTOLD)
+
+
+def _read(address: int) -> np.void:
+    answer: np.void = np.frombuffer(ctypes.string_at(address, layout.ANSWER.itemsize), layout.ANSWER)[0]
+    return answer
+
+
+def _write_batch(address: int, sequence: int, wake_key: int, flags: int, rows: dict[str, Array], chunk: slice) -> None:
+    batch = np.frombuffer(memory(address, layout.BATCH_QUERY.itemsize), layout.BATCH_QUERY)[0]
+    count = chunk.stop - chunk.start
+    batch["header"] = (sequence, wake_key, count, 0)
+    queries = batch["queries"][:count]
+    queries["session"] = layout.NO_SESSION
+    queries["flags"] = flags
+    queries["time_step_s"] = 0.0
+    for name, array in rows.items():
+        queries[name] = array[chunk]
+
+
+def _forces(answer: np.void) -> Forces:
+    surfaces = _surface_count(answer)
+    return Forces(
+        force_n=answer["force_n"],
+        moment_nm=answer["moment_nm"],
+        about_m=answer["about_m"],
+        uncertainty_n=answer["uncertainty_n"],
+        surface_force_n=answer["surface_force_n"][:surfaces],
+        surface_point_m=answer["surface_point_m"][:surfaces],
+        wetted_fraction=answer["wetted_fraction"][:surfaces],
+        outside=answer["outside"],
+        bundle_version=int(answer["bundle_version"]),
+        provenance=answer["provenance"].decode(errors="ignore"),
+        compute_ns=int(answer["compute_ns"]),
+    )
+
+
+def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool) -> Forces:
+    """Adds the answers to a chunk to those before it, or to new forces where there are none of this bundle."""
+    batch = np.frombuffer(memory(address, layout.BATCH_ANSWER.itemsize), layout.BATCH_ANSWER)[0]
+    index = int(batch["index"]) % layout.MAX_BATCH
+    _check(batch["status"], batch["answers"][index], chunk.start + index)
+    answers = batch["answers"][: chunk.stop - chunk.start]
+    if forces is None or forces.bundle_version != answers[0]["bundle_version"]:
+        forces = _empty(answers[0], length, _surface_count(answers[0]) if with_surfaces else 0)
+    for name in ("force_n", "moment_nm", "uncertainty_n", "outside"):
+        getattr(forces, name)[chunk] = answers[name]
+    surfaces = forces.wetted_fraction.shape[1]
+    for name in ("surface_force_n", "surface_point_m", "wetted_fraction"):
+        getattr(forces, name)[chunk] = answers[name][:, :surfaces]
+    forces.compute_ns += int(batch["compute_ns"])
+    return forces
+
+
+def _empty(answer: np.void, length: int, surfaces: int) -> Forces:
+    def array(*shape: int) -> Array:
+        return np.empty((length, *shape), np.float32)
+
+    return Forces(
+        force_n=array(3),
+        moment_nm=array(3),
+        about_m=answer["about_m"].copy(),
+        uncertainty_n=array(3),
+        surface_force_n=array(surfaces, 3),
+        surface_point_m=array(surfaces, 3),
+        wetted_fraction=array(surfaces),
+        outside=array(len(answer["outside"])),
+        bundle_version=int(answer["bundle_version"]),
+        provenance=answer["provenance"].decode(errors="ignore"),
+        compute_ns=0,
+    )
+
+
+def _surface_count(answer: np.void) -> int:
+    return min(int(answer["surface_count"]), layout.MAX_SURFACES)
+
+
+def _check(status: int, answer: np.void, index: int | None) -> None:
+    if status == layout.STATUS_OK:
+        return
+    field = layout.FIELDS.get(int(answer["field"]))
+    problem = layout.PROBLEMS.get(int(answer["problem"]))
+    if status == layout.STATUS_INVALID_STATE and field and problem:
+        at = "" if index is None else f" (state {index} of the batch)"
+        raise InvalidState([Violation(field, f"{field} {problem}{at}", index)])
+    raise Refused(f"status {status}", "this client does not know it; is it of the server's version?")

@@ -1,0 +1,181 @@
+"""What lies in shared memory: the counterpart of the server's src/service/shm_layout.rs, to which the tests hold it.
+
+Little-endian as the machine is. The version is part of the services' names.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+from typing import Any
+
+import numpy as np
+
+VERSION = "v3"
+MAX_BATCH = 256
+MAX_SURFACES = 64
+#: Most effects that a vehicle can have.
+PHYSICS = 14
+
+#: Flag of a query: no water pressure under the contact patches.
+DRY_CONTACT = 1
+#: Flag of an answer: the server polls, so that waking it is of no use.
+SERVER_POLLS = 1
+
+STATUS_OK = 0
+STATUS_INVALID_STATE = 1
+
+QUERY = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("wake_key", "<u8"),
+        ("session", "<u8"),
+        ("flags", "<u4"),
+        ("depth_m", "<f4"),
+        ("density_kgpm3", "<f4"),
+        ("velocity_mps", "<f4", 3),
+        ("current_mps", "<f4", 3),
+        ("angular_velocity_radps", "<f4", 3),
+        ("acceleration_mps2", "<f4", 3),
+        ("angular_acceleration_radps2", "<f4", 3),
+        ("gravity_direction", "<f4", 3),
+        ("heading_rad", "<f4"),
+        ("depth_rate_mps", "<f4"),
+        ("wheel_speed_radps", "<f4", 4),
+        ("time_step_s", "<f4"),
+    ]
+)
+
+#: What a state has of these without a session and without a word about them.
+NO_SESSION = 0
+UNTOLD = (0.0,) * 7
+
+EFFECT_ANSWER = np.dtype([("effect", "<u4"), ("left_out", "<u4"), ("force_n", "<f4", 3), ("moment_nm", "<f4", 3)])
+
+ANSWER = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("compute_ns", "<u8"),
+        ("status", "<u4"),
+        ("field", "<u4"),
+        ("problem", "<u4"),
+        ("flags", "<u4"),
+        ("bundle_version", "<u4"),
+        ("surface_count", "<u4"),
+        ("force_n", "<f4", 3),
+        ("moment_nm", "<f4", 3),
+        ("about_m", "<f4", 3),
+        ("uncertainty_n", "<f4", 3),
+        ("outside", "<f4", 8),
+        ("provenance", "S32"),
+        ("surface_force_n", "<f4", (MAX_SURFACES, 3)),
+        ("surface_point_m", "<f4", (MAX_SURFACES, 3)),
+        ("wetted_fraction", "<f4", MAX_SURFACES),
+        ("effect_count", "<u4"),
+        ("effects", EFFECT_ANSWER, PHYSICS),
+        ("effect_surface_force_n", "<f4", (MAX_SURFACES, 3)),
+        ("effects_outside", "<f4", 5),
+        ("added_mass", "<f4", 36),
+    ]
+)
+
+BATCH_HEADER = np.dtype([("sequence", "<u8"), ("wake_key", "<u8"), ("count", "<u4"), ("reserved", "<u4")])
+
+BATCH_QUERY = np.dtype([("header", BATCH_HEADER), ("queries", QUERY, MAX_BATCH)])
+
+BATCH_ANSWER = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("compute_ns", "<u8"),
+        ("status", "<u4"),
+        ("index", "<u4"),
+        ("count", "<u4"),
+        ("flags", "<u4"),
+        ("answers", ANSWER, MAX_BATCH),
+    ]
+)
+
+#: Names of the fields that an answer may find wrong, by code.
+FIELDS = {
+    1: "velocity_mps",
+    2: "current_mps",
+    3: "angular_velocity_radps",
+    4: "acceleration_mps2",
+    5: "angular_acceleration_radps2",
+    6: "gravity_direction",
+    7: "depth_m",
+    8: "density_kgpm3",
+    9: "world_from_body",
+    10: "roll_pitch",
+    11: "ground_contact",
+    12: "heading_rad",
+    13: "depth_rate_mps",
+    14: "wheel_speed_radps",
+    15: "time_step_s",
+}
+
+#: What is wrong with them, by code.
+PROBLEMS = {
+    1: "must be finite",
+    2: "must not be that large",
+    3: "must not be negative",
+    4: "must be greater than zero",
+    5: "must have length 1",
+    6: "must be one of the values of its enumeration",
+    7: "must have four values, or none",
+}
+
+
+def fields(dtype: np.dtype[Any]) -> dict[str, tuple[np.dtype[Any], int]]:
+    """Type and offset of each field of a struct, in order."""
+    assert dtype.fields is not None, "a struct has fields"
+    return {name: (field[0], field[1]) for name, field in dtype.fields.items()}
+
+
+def _pack_format(dtype: np.dtype[Any]) -> str:
+    codes = {"<u8": "Q", "<u4": "I", "<f4": "f"}
+    types = (field for field, _ in fields(dtype).values())
+    return "<" + "".join(codes[field.base.str] * int(np.prod(field.shape)) for field in types)
+
+
+#: A query as bytes: several times faster than through a numpy record.
+QUERY_STRUCT = struct.Struct(_pack_format(QUERY))
+
+
+def _payload(name: str, dtype: np.dtype[Any]) -> type[ctypes.Structure]:
+    """What iceoryx2 needs to know of a type: its name, size and alignment, which must be those of the server's."""
+    words = [("words", ctypes.c_uint64 * (dtype.itemsize // 8))]
+    return type(
+        name, (ctypes.Structure,), {"_fields_": words, "type_name": staticmethod(lambda: f"wade::{VERSION}::{name}")}
+    )
+
+
+Query = _payload("Query", QUERY)
+Answer = _payload("Answer", ANSWER)
+BatchQuery = _payload("BatchQuery", BATCH_QUERY)
+BatchAnswer = _payload("BatchAnswer", BATCH_ANSWER)
+
+
+def evaluate_name(namespace: str, vehicle: str) -> str:
+    """Name of a vehicle's service for single states."""
+    return f"{namespace}/{VERSION}/evaluate/{vehicle}"
+
+
+def evaluate_batch_name(namespace: str, vehicle: str) -> str:
+    """Name of a vehicle's service for batches."""
+    return f"{namespace}/{VERSION}/evaluate_batch/{vehicle}"
+
+
+def wake_name(namespace: str) -> str:
+    """Name of the event service on which clients wake the server."""
+    return f"{namespace}/{VERSION}/wake"
+
+
+def done_name(namespace: str) -> str:
+    """Name of the event service on which the server wakes the client whose listener is called `listener_name`."""
+    return f"{namespace}/{VERSION}/done"
+
+
+def listener_name(wake_key: int) -> str:
+    """Name of the listener of a client with this wake key."""
+    return f"{wake_key:016x}"

@@ -1,0 +1,176 @@
+"""A client's node, events and ports in iceoryx2, which last until the server is lost."""
+
+from __future__ import annotations
+
+import ctypes
+import secrets
+import time
+from collections.abc import Callable
+from typing import Any
+
+import iceoryx2 as iox
+
+from . import shm_layout as layout
+from .errors import DeadlineExceeded, LayoutMismatch, ResourceExhausted, ServerUnavailable, UnknownVehicle
+
+#: What iceoryx2 raises where a port broke; it has no common base.
+_FAILURES = (
+    iox.EventOpenError,
+    iox.ListenerCreateError,
+    iox.LoanError,
+    iox.NodeCreationFailure,
+    iox.NotifierCreateError,
+    iox.ReceiveError,
+    iox.RequestSendError,
+    iox.RequestResponseOpenError,
+)
+
+# where the flags of an answer lie, by whether it is a batch's
+_FLAGS_AT = {False: layout.fields(layout.ANSWER)["flags"][1], True: layout.fields(layout.BATCH_ANSWER)["flags"][1]}
+
+# its log would go to standard output, and says of every server that is not there that it is not there
+iox.set_log_level_from_env_or(iox.LogLevel.Fatal)
+
+
+class Lost(Exception):
+    """No server is connected to the port any more."""
+
+
+class Link:
+    """What a client holds open in one namespace. Raises the errors of the package, and `Lost`."""
+
+    def __init__(self, namespace: str, blocks: bool):
+        self._namespace = namespace
+        # what the server's last answer said: waking it would be of no use
+        self._server_polls = False
+        # names this client's listener among all others'; 0 where the client polls
+        self._wake_key = secrets.randbits(63) + 1 if blocks else 0
+        self._ports: dict[tuple[str, bool], Any] = {}
+        try:
+            # the signals belong to the program
+            builder = iox.NodeBuilder.new().signal_handling_mode(iox.SignalHandlingMode.Disabled)
+            self._node = builder.create(iox.ServiceType.Ipc)
+        except _FAILURES as failure:
+            raise ServerUnavailable(
+                self._at(), f"no node: {failure}; /tmp/iceoryx2 serves the user who owns it"
+            ) from None
+        self._wake: Any = None
+        self._listener: Any = None
+
+    def exchange(
+        self, vehicle: str, batch: bool, write: Callable[[int, int], None], end: float, timeout_s: float
+    ) -> Any:
+        """Sends what `write` puts at the address of a request, and gives the response, which lies in shared memory."""
+        try:
+            port = self._ports.get((vehicle, batch)) or self._open(vehicle, batch)
+            request = port.loan_uninit()
+            write(request.payload_ptr, self._wake_key)
+            pending = request.assume_init().send()
+            if pending.number_of_server_connections == 0:
+                raise Lost
+            if not self._server_polls:
+                self._notify()
+            response = self._await(pending, end, timeout_s)
+            flags = ctypes.c_uint32.from_address(response.payload_ptr + _FLAGS_AT[batch]).value
+            self._server_polls = bool(flags & layout.SERVER_POLLS)
+            return response
+        except _FAILURES as failure:
+            raise ServerUnavailable(self._at(), str(failure)) from None
+
+    def served(self) -> list[str]:
+        """Names of the vehicles that a server serves here."""
+        prefix = layout.evaluate_name(self._namespace, "")
+        names = [name.removeprefix(prefix) for name in self._services() if name.startswith(prefix)]
+        return sorted(name for name in names if self._has_server(name))
+
+    def why_not(self, vehicle: str) -> Exception:
+        """The reason why there is no server for a vehicle."""
+        served = self.served()
+        if served and vehicle not in served:
+            return UnknownVehicle(vehicle, f"vehicle {vehicle!r} is not served; there are: {', '.join(served)}")
+        parts = (name.split("/") for name in self._services())
+        versions = {p[1] for p in parts if p[0] == self._namespace and p[2:3] == ["evaluate"]} - {layout.VERSION}
+        if versions and not served:
+            return LayoutMismatch(layout.VERSION, ", ".join(sorted(versions)))
+        return ServerUnavailable(
+            self._at(), f"no server has opened {vehicle}; is wade serve running with shared memory and this namespace?"
+        )
+
+    def _at(self) -> str:
+        return f"shared memory, namespace {self._namespace!r}"
+
+    def _services(self) -> list[str]:
+        return [s.name().to_string() for s in iox.Service.list(iox.config.global_config(), iox.ServiceType.Ipc)]
+
+    def _exchange_service(self, vehicle: str, batch: bool) -> Any:
+        types = (layout.BatchQuery, layout.BatchAnswer) if batch else (layout.Query, layout.Answer)
+        name = (layout.evaluate_batch_name if batch else layout.evaluate_name)(self._namespace, vehicle)
+        try:
+            service = iox.ServiceName.new(name)
+            return self._node.service_builder(service).request_response(*types).open()
+        except iox.SemanticStringError:
+            raise self.why_not(vehicle) from None
+        except iox.RequestResponseOpenError as failure:
+            if str(failure) == "DoesNotExist":
+                raise self.why_not(vehicle) from None
+            if str(failure) == "IncompatibleRequestOrResponseType":
+                raise LayoutMismatch(layout.VERSION, f"{name} with other types") from None
+            raise
+
+    def _has_server(self, vehicle: str) -> bool:
+        try:
+            return bool(self._exchange_service(vehicle, False).dynamic_config.number_of_servers)
+        except (LayoutMismatch, *_FAILURES):
+            return False
+
+    def _open(self, vehicle: str, batch: bool) -> Any:
+        service = self._exchange_service(vehicle, batch)
+        if self._wake is None:
+            self._open_events()
+        try:
+            port = service.client_builder().create()
+        except iox.ClientCreateError as failure:
+            message = f"no place for another client of {vehicle}: {failure}; the server's limit is shm.max_clients"
+            raise ResourceExhausted(message, None) from None
+        self._ports[vehicle, batch] = port
+        return port
+
+    def _open_events(self) -> None:
+        def event(name: str) -> Any:
+            return self._node.service_builder(iox.ServiceName.new(name)).event().open()
+
+        self._wake = event(layout.wake_name(self._namespace)).notifier_builder().create()
+        if self._wake_key:
+            name = iox.PortName.new(layout.listener_name(self._wake_key))
+            self._listener = event(layout.done_name(self._namespace)).listener_builder().name(name).create()
+
+    def _notify(self) -> None:
+        try:
+            self._wake.notify()
+        except iox.NotifierNotifyError:
+            # the server looks for requests now and then without being woken
+            pass
+
+    def _await(self, pending: Any, end: float, timeout_s: float) -> Any:
+        while True:
+            response = pending.receive()
+            if response is not None:
+                return response
+            left = end - time.monotonic()
+            if left <= 0.0:
+                raise DeadlineExceeded(timeout_s)
+            if self._listener is not None:
+                self._sleep(left)
+
+    def _sleep(self, left: float) -> None:
+        try:
+            # less than a microsecond would mean no limit to the system call
+            self._listener.timed_wait(iox.Duration.from_secs_f64(max(left, 1e-6)))
+        except iox.ListenerWaitError:
+            # a signal, most likely; whatever it was, the answer is looked for until the end
+            time.sleep(min(left, 1e-4))
+
+
+def memory(address: int, size: int) -> Any:
+    """The bytes at an address, without a copy, for as long as their owner lives."""
+    return (ctypes.c_char * size).from_address(address)

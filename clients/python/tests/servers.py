@@ -1,0 +1,107 @@
+"""A real `wade serve`, on ports, a socket and a namespace of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import time
+import uuid
+from pathlib import Path
+
+import grpc
+
+ROOT = Path(__file__).resolve().parents[3]
+VEHICLES = ROOT / "vehicles"
+
+
+def binary() -> Path:
+    """`$WADE_BIN`, or what cargo built last of release and debug, in this order."""
+    built = [ROOT / "target" / profile / "wade" for profile in ("release", "debug")]
+    for path in [Path(os.environ["WADE_BIN"])] if "WADE_BIN" in os.environ else built:
+        if path.is_file():
+            return path.resolve()
+    raise FileNotFoundError(f"no wade at {', '.join(map(str, built))}: run cargo build, or name one by WADE_BIN")
+
+
+def environment() -> dict[str, str]:
+    """Without settings that would win over a test's own."""
+    return {name: value for name, value in os.environ.items() if not name.startswith("WADE_")}
+
+
+def free_port() -> int:
+    """A port that nobody listens on at the moment."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Server:
+    """Runs until it is stopped; may be killed and started again at the same places."""
+
+    def __init__(self, folder: Path, settings: str = ""):
+        self.folder = folder
+        self.address = f"127.0.0.1:{free_port()}"
+        self.socket = folder / "wade.sock"
+        self.namespace = f"test_{uuid.uuid4().hex[:12]}"
+        self.vehicles = VEHICLES
+        self.process: subprocess.Popen[bytes] | None = None
+        (folder / "wade.toml").write_text(
+            f'[grpc]\nlisten = "{self.address}"\nunix_socket = "{self.socket}"\n{settings}'
+            f'[shm]\nnamespace = "{self.namespace}"\n[http]\nlisten = ""\n'
+        )
+
+    def start(self, vehicles: Path = VEHICLES) -> None:
+        """Returns when it answers."""
+        command: list[str | Path] = [binary(), "serve", "--config", self.folder / "wade.toml", "--vehicles", vehicles]
+        with (self.folder / "log").open("ab") as log:
+            self.process = subprocess.Popen(command, env=environment(), stderr=log)
+        end = time.monotonic() + 30
+        while not self._is_healthy():
+            log_text = (self.folder / "log").read_text()
+            assert self.process.poll() is None and time.monotonic() < end, log_text
+            time.sleep(0.05)
+
+    def _is_healthy(self) -> bool:
+        with grpc.insecure_channel(self.address) as channel:
+            check = channel.unary_unary("/grpc.health.v1.Health/Check")
+            try:
+                # an empty request means the server as a whole; the answer's one field is 1 where it serves
+                return bool(check(b"", timeout=1) == b"\x08\x01")
+            except grpc.RpcError:
+                return False
+
+    def send(self, number: signal.Signals) -> None:
+        """Sends a signal to the server."""
+        assert self.process is not None
+        self.process.send_signal(number)
+
+    def freeze(self) -> None:
+        """Stops it as a debugger would; returns when every thread stands still."""
+        assert self.process is not None
+        self.send(signal.SIGSTOP)
+        threads = Path(f"/proc/{self.process.pid}/task")
+        while any(") T " not in (thread / "stat").read_text() for thread in threads.iterdir()):
+            time.sleep(0.001)
+
+    def thaw(self) -> None:
+        """Lets it go on."""
+        self.send(signal.SIGCONT)
+
+    def kill(self) -> None:
+        """Ends it as a crash would."""
+        self.send(signal.SIGKILL)
+        self.wait()
+
+    def stop(self) -> None:
+        """Ends it if it runs."""
+        if self.process is not None and self.process.poll() is None:
+            self.thaw()
+            self.send(signal.SIGTERM)
+            self.wait()
+
+    def wait(self) -> None:
+        """Waits for the end of the process."""
+        assert self.process is not None
+        self.process.wait(timeout=20)
