@@ -5,7 +5,7 @@ import warnings
 
 from wade.v1 import hydrodynamics_pb2 as wade_dot_v1_dot_hydrodynamics__pb2
 
-GRPC_GENERATED_VERSION = '1.74.0'
+GRPC_GENERATED_VERSION = '1.85.1'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -18,14 +18,14 @@ except ImportError:
 if _version_not_supported:
     raise RuntimeError(
         f'The grpc package installed is at version {GRPC_VERSION},'
-        + f' but the generated code in wade/v1/hydrodynamics_pb2_grpc.py depends on'
+        + ' but the generated code in wade/v1/hydrodynamics_pb2_grpc.py depends on'
         + f' grpcio>={GRPC_GENERATED_VERSION}.'
         + f' Please upgrade your grpc module to grpcio>={GRPC_GENERATED_VERSION}'
         + f' or downgrade your generated code using grpcio-tools<={GRPC_VERSION}.'
     )
 
 
-class HydrodynamicsStub(object):
+class HydrodynamicsStub:
     """Missing associated documentation comment in .proto file."""
 
     def __init__(self, channel):
@@ -66,7 +66,7 @@ class HydrodynamicsStub(object):
                 _registered_method=True)
 
 
-class HydrodynamicsServicer(object):
+class HydrodynamicsServicer:
     """Missing associated documentation comment in .proto file."""
 
     def Evaluate(self, request, context):
@@ -85,7 +85,8 @@ class HydrodynamicsServicer(object):
 
     def Stream(self, request_iterator, context):
         """One answer a request, in order. The vehicle may be named in the first request alone. A request that is refused
-        ends the stream with its error.
+        ends the stream with its error. Effects that remember (wave memory, flooding) live as long as the stream and its
+        vehicle: they start at rest and dry, and move on by `time_step_s` with each request. The other calls know no before.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -151,7 +152,7 @@ def add_HydrodynamicsServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class Hydrodynamics(object):
+class Hydrodynamics:
     """Missing associated documentation comment in .proto file."""
 
     @staticmethod
