@@ -62,7 +62,8 @@ def rust_fields(struct: str) -> list[tuple[str, str]]:
 def rust_type(dtype: np.dtype[Any]) -> str:
     """How Rust writes a field of this type."""
     names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|S32": "[u8; PROVENANCE_LEN]"}
-    lengths = {shm_layout.MAX_SURFACES: "MAX_SURFACES", shm_layout.MAX_BATCH: "MAX_BATCH", shm_layout.PHYSICS: "PHYSICS"}
+    lengths = {shm_layout.MAX_SURFACES: "MAX_SURFACES", shm_layout.MAX_BATCH: "MAX_BATCH"}
+    lengths[shm_layout.PHYSICS] = "PHYSICS"
     structs = {shm_layout.QUERY: "Query", shm_layout.ANSWER: "Answer", shm_layout.BATCH_HEADER: "BatchHeader"}
     structs[shm_layout.EFFECT_ANSWER] = "EffectAnswer"
     base = structs.get(dtype.base) or names[dtype.base.str]

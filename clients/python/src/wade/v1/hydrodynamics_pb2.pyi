@@ -164,7 +164,7 @@ class State(_message.Message):
     wheel_speed_radps: _containers.RepeatedScalarFieldContainer[float]
     time_step_s: float
     implicit_added_mass: bool
-    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., heading_rad: _Optional[float] = ..., depth_rate_mps: _Optional[float] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., time_step_s: _Optional[float] = ..., implicit_added_mass: _Optional[bool] = ...) -> None: ...
+    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., heading_rad: _Optional[float] = ..., depth_rate_mps: _Optional[float] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., time_step_s: _Optional[float] = ..., implicit_added_mass: bool = ...) -> None: ...
 
 class EvaluateRequest(_message.Message):
     __slots__ = ("vehicle", "state")
@@ -204,7 +204,7 @@ class EvaluateResponse(_message.Message):
     effect_surface_force_n: _containers.RepeatedScalarFieldContainer[float]
     effects_outside: _containers.RepeatedCompositeFieldContainer[EffectOutside]
     added_mass: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., wrench: _Optional[_Union[Wrench, _Mapping]] = ..., uncertainty_n: _Optional[_Union[Vector3, _Mapping]] = ..., in_domain: _Optional[bool] = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[EffectLoad, _Mapping]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ...) -> None: ...
+    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., wrench: _Optional[_Union[Wrench, _Mapping]] = ..., uncertainty_n: _Optional[_Union[Vector3, _Mapping]] = ..., in_domain: bool = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[EffectLoad, _Mapping]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class EffectLoad(_message.Message):
     __slots__ = ("effect", "force_n", "moment_nm", "left_out")
@@ -280,7 +280,7 @@ class EvaluateBatchRequest(_message.Message):
     depth_rate_mps: _containers.RepeatedScalarFieldContainer[float]
     wheel_speed_radps: _containers.RepeatedScalarFieldContainer[float]
     implicit_added_mass: bool
-    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: _Optional[bool] = ..., heading_rad: _Optional[_Iterable[float]] = ..., depth_rate_mps: _Optional[_Iterable[float]] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., implicit_added_mass: _Optional[bool] = ...) -> None: ...
+    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: bool = ..., heading_rad: _Optional[_Iterable[float]] = ..., depth_rate_mps: _Optional[_Iterable[float]] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., implicit_added_mass: bool = ...) -> None: ...
 
 class EvaluateBatchResponse(_message.Message):
     __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "force_n", "moment_nm", "about_m", "uncertainty_n", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_force_n", "effect_moment_nm", "effect_left_out", "effect_surface_force_n", "effects_outside", "added_mass")
@@ -350,7 +350,7 @@ class GetVehicleRequest(_message.Message):
     INCLUDE_MESH_FIELD_NUMBER: _ClassVar[int]
     vehicle: str
     include_mesh: bool
-    def __init__(self, vehicle: _Optional[str] = ..., include_mesh: _Optional[bool] = ...) -> None: ...
+    def __init__(self, vehicle: _Optional[str] = ..., include_mesh: bool = ...) -> None: ...
 
 class GetVehicleResponse(_message.Message):
     __slots__ = ("summary", "length_m", "width_m", "height_m", "z0_m", "mass_kg", "center_of_mass_m", "inertia_kgm2", "surfaces", "domain", "mesh_stl", "face_surface", "effects", "effects_validity")
@@ -396,7 +396,7 @@ class ActiveEffect(_message.Message):
     equation: str
     parameters: _containers.RepeatedCompositeFieldContainer[EffectParameter]
     provisional: bool
-    def __init__(self, effect: _Optional[_Union[Effect, str]] = ..., name: _Optional[str] = ..., equation: _Optional[str] = ..., parameters: _Optional[_Iterable[_Union[EffectParameter, _Mapping]]] = ..., provisional: _Optional[bool] = ...) -> None: ...
+    def __init__(self, effect: _Optional[_Union[Effect, str]] = ..., name: _Optional[str] = ..., equation: _Optional[str] = ..., parameters: _Optional[_Iterable[_Union[EffectParameter, _Mapping]]] = ..., provisional: bool = ...) -> None: ...
 
 class EffectParameter(_message.Message):
     __slots__ = ("name", "value", "std", "unit")

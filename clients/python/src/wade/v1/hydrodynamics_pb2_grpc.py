@@ -5,7 +5,7 @@ import warnings
 
 from wade.v1 import hydrodynamics_pb2 as wade_dot_v1_dot_hydrodynamics__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.74.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -18,14 +18,14 @@ except ImportError:
 if _version_not_supported:
     raise RuntimeError(
         f'The grpc package installed is at version {GRPC_VERSION},'
-        + ' but the generated code in wade/v1/hydrodynamics_pb2_grpc.py depends on'
+        + f' but the generated code in wade/v1/hydrodynamics_pb2_grpc.py depends on'
         + f' grpcio>={GRPC_GENERATED_VERSION}.'
         + f' Please upgrade your grpc module to grpcio>={GRPC_GENERATED_VERSION}'
         + f' or downgrade your generated code using grpcio-tools<={GRPC_VERSION}.'
     )
 
 
-class HydrodynamicsStub:
+class HydrodynamicsStub(object):
     """Missing associated documentation comment in .proto file."""
 
     def __init__(self, channel):
@@ -66,7 +66,7 @@ class HydrodynamicsStub:
                 _registered_method=True)
 
 
-class HydrodynamicsServicer:
+class HydrodynamicsServicer(object):
     """Missing associated documentation comment in .proto file."""
 
     def Evaluate(self, request, context):
@@ -152,7 +152,7 @@ def add_HydrodynamicsServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class Hydrodynamics:
+class Hydrodynamics(object):
     """Missing associated documentation comment in .proto file."""
 
     @staticmethod
