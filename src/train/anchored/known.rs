@@ -61,7 +61,7 @@ pub struct Known {
     pub condition: Condition,
     /// What is known of it.
     pub reading: Reading,
-    /// Dynamic load that each surface is to answer, see [`carry`]: force, and moment about the body origin where the data
+    /// Dynamic load that each surface is to answer, see `carry`: force, and moment about the body origin where the data
     /// set has it.
     pub loads: Vec<(Vec3, Option<Vec3>)>,
 }
