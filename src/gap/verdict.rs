@@ -21,6 +21,9 @@ const ENERGY: [f64; 2] = [4.5, 0.8];
 /// normal numbers have heavier tails than they.
 const LASTS: f64 = 7.0;
 
+/// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
+const MUCH: f64 = 0.15;
+
 /// What the search found.
 pub(super) struct Found {
     pub verdict: Verdict,
@@ -58,7 +61,7 @@ impl Found {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
-        } else if coverage < config.coverage || found.leaves_most(design, config) {
+        } else if coverage < config.coverage || found.leaves_much(design) {
             Verdict::NoCandidateFits
         } else if found.alternatives.is_empty() {
             Verdict::Named
@@ -68,11 +71,10 @@ impl Found {
         found
     }
 
-    /// True where what lasts of the gap is still there after the named effects.
-    fn leaves_most(&self, design: &Design, config: &Config) -> bool {
+    /// True where much of what lasts of the gap is still there after the named effects.
+    fn leaves_much(&self, design: &Design) -> bool {
         let (before, after) = (lasting(design, &design.y), lasting(design, &self.residual));
-        f64::min(before.deviate, after.deviate) > LASTS
-            && after.energy > (1.0 - config.coverage) * before.energy
+        f64::min(before.deviate, after.deviate) > LASTS && after.energy > MUCH * before.energy
     }
 
     /// Predictable from the state, or lasting in a trial, and large enough to matter.
