@@ -97,6 +97,7 @@ fn a_hidden_added_mass_is_named_and_written() {
     let on_disk = std::fs::read_to_string(out.join("report.json")).expect("written");
     assert_eq!(serde_json::from_str::<Value>(&on_disk).expect("JSON"), report);
     let page = std::fs::read_to_string(out.join("index.html")).expect("written");
+    // the page is for people: plain names
     assert!(page.contains("added mass") && page.contains("<svg") && !page.contains("http-equiv"));
     let effects: toml::Value = std::fs::read_to_string(out.join("effects.toml"))
         .expect("written")

@@ -3,7 +3,8 @@
 //! `f = D(v + omega x r) - D(v)` on each wet panel with the quadratic drag `D_i(u) = -1/2 rho C A_i |u| u_i`, `r` over four
 //! points of the panel. `C` is that of a bluff body, 0.4 to 2.1 (as `drag_coefficient_error`). The shape is 0 for
 //! strips, which know the load across the hull alone, and 1 for the whole load; its second number is 0 for this law and 1
-//! for `|u_i| u_i`, the cross-flow principle (Fossen, Handbook of Marine Craft Hydrodynamics, section 6.4).
+//! for the cross-flow principle, `|u_y| u_y` across the hull and nothing else (Fossen, Handbook of Marine Craft
+//! Hydrodynamics, section 6.4).
 
 use super::input::{Input, Part};
 use super::library::Shape;
@@ -30,7 +31,8 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
             let local = input.local_velocity(&at);
             let force: Vec3 = (drag(&local) - drag(&velocity)) * scale;
             let along = if shape[0] > 0.5 { force.x } else { 0.0 };
-            emit(0, Part::Panel(index), input.at(Vec3::new(along, force.y, force.z), &point));
+            let up = if shape[1] > 0.5 { 0.0 } else { force.z };
+            emit(0, Part::Panel(index), input.at(Vec3::new(along, force.y, up), &point));
         }
     }
 }

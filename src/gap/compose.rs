@@ -204,7 +204,7 @@ fn rejected(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Rejected> {
     let free = library.iter().filter(|effect| !found.members.iter().any(|m| judge.effect(m) == **effect));
     let mut all: Vec<Rejected> = free
         .filter_map(|&effect| {
-            let beside = judge.judge(&found.members, effect)?;
+            let beside = judge.weighed(&found.members, effect)?;
             let alone = judge.judge(&[], effect)?;
             let (why, name) = (beside.refused, effect.name());
             Some(Rejected { name, why, share_of_gap: share(beside.gain), share_alone: share(alone.gain) })

@@ -5,7 +5,7 @@
 //!
 //! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
 //! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
-//! hold), `select` (which effects), `nonlinear`, `features` and `locate` (where; structure without a name), `verdict`, `fit`,
+//! hold), `select` (which effects), `shared` (noise of the motion in both), `nonlinear`, `features`, `lasting` and `locate` (where; structure without a name), `verdict`, `fit`,
 //! `holdout`, `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
 
 mod base_drag;
@@ -19,6 +19,7 @@ mod experiment;
 mod features;
 mod fit;
 mod holdout;
+mod lasting;
 mod locate;
 mod measurement;
 mod noise;
@@ -31,6 +32,7 @@ mod robust;
 mod run;
 mod select;
 mod series;
+mod shared;
 mod split;
 mod statistics;
 mod verdict;

@@ -296,6 +296,9 @@ fn rejected(report: &Report) -> String {
             Some(super::Refusal::SmallShare) => "explains too little of what is left",
             Some(super::Refusal::Unstable) => "not in most parts, or of changing sign",
             Some(super::Refusal::NotNew) => "says the same as the named",
+            Some(super::Refusal::SharedNoise) => {
+                "agrees from sample to sample alone, as noise of the motion does"
+            }
             Some(super::Refusal::Placebo) => "no better than its placebos",
             None => "passes, but another set explains more",
         };

@@ -68,15 +68,26 @@ pub(super) fn group(
     beta: &[f64],
     residual: &DVector<f64>,
 ) -> Option<Error> {
-    let mut sum = DVector::zeros(residual.len());
+    let sum = contribution(design, base, own, beta)?;
+    let weights = &sum / sum.norm_squared().max(f64::MIN_POSITIVE);
+    Some(Noise::of(residual).error(design, &weights, sum.as_slice()))
+}
+
+/// What columns add to the rows that a base cannot say.
+pub(super) fn contribution(
+    design: &Design,
+    base: &[usize],
+    own: &[usize],
+    beta: &[f64],
+) -> Option<DVector<f64>> {
+    let mut sum = DVector::zeros(design.y.len());
     own.iter().zip(beta).for_each(|(&column, &beta)| sum.axpy(beta, &design.x.column(column), 1.0));
     if !base.is_empty() {
         let cross = DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&sum)));
         let weights = design.inverse(base)? * cross;
         base.iter().enumerate().for_each(|(i, &c)| sum.axpy(-weights[i], &design.x.column(c), 1.0));
     }
-    let weights = &sum / sum.norm_squared().max(f64::MIN_POSITIVE);
-    Some(Noise::of(residual).error(design, &weights, sum.as_slice()))
+    Some(sum)
 }
 
 /// Variance of a weighted sum of rows under the autocovariance of a residual.

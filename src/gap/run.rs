@@ -59,12 +59,14 @@ pub fn run(
         first_stamp: all.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min),
     };
     setting.base_drag = base_drag(&all, &setting);
-    let library: Vec<Effect> = config
+    let mut library: Vec<Effect> = config
         .library
         .iter()
         .copied()
         .filter(|&effect| unavailable(effect, &setting, &trials.manifest, &all).is_none())
         .collect();
+    // the order in which they were asked for must not matter
+    library.sort();
     let forms: Vec<(Effect, Shape)> = library
         .iter()
         .flat_map(|&effect| shapes(effect, &all, &setting).into_iter().map(move |shape| (effect, shape)))

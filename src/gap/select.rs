@@ -13,7 +13,8 @@ use nalgebra::DVector;
 
 use super::design::{Design, Fitted};
 use super::noise::Floor;
-use super::robust::{Error, errors, group, noise_of};
+use super::robust::{Error, contribution, errors, group, noise_of};
+use super::shared::outlasts_noise;
 use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
@@ -27,7 +28,7 @@ const NOVEL: f64 = 0.03;
 const MOST_FOLDS: f64 = 0.75;
 /// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
 /// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
-const MOST_SCATTER: f64 = 0.6;
+const MOST_SCATTER: f64 = 0.75;
 /// A shifted column that still points the same way is no placebo.
 const SAME_DIRECTION: f64 = 0.9;
 
@@ -69,6 +70,8 @@ pub enum Refusal {
     Placebo,
     /// The others of the set say the same.
     NotNew,
+    /// Agrees with the gap from sample to sample alone, as the noise of the recorded motion does.
+    SharedNoise,
 }
 
 /// The regression with what the gates need.
@@ -414,11 +417,34 @@ impl<'a> Judge<'a> {
     }
 
     fn passes_anew(&self, set: &[Member], effect: Effect) -> Option<Judged> {
-        let judged = self.judge(set, effect).filter(|judged| judged.refused.is_none())?;
+        self.weighed(set, effect).filter(|judged| judged.refused.is_none())
+    }
+
+    /// The best form of an effect beside a set, by every gate.
+    pub fn weighed(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let mut judged = self.judge(set, effect)?;
+        if judged.refused.is_some() {
+            return Some(judged);
+        }
         let mut whole = set.to_vec();
         whole.push(judged.member.clone());
         let (real, placebo) = self.placebo_gains(&whole, &judged.member)?;
-        (real > 1.05 * placebo).then_some(judged)
+        if real <= 1.05 * placebo {
+            judged.refused = Some(Refusal::Placebo);
+        } else if !self.outlasts_noise(set, &judged.member)? {
+            judged.refused = Some(Refusal::SharedNoise);
+        }
+        Some(judged)
+    }
+
+    fn outlasts_noise(&self, set: &[Member], member: &Member) -> Option<bool> {
+        let (design, base) = (self.design, self.columns(set));
+        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
+        let all: Vec<usize> = base.iter().chain(&own).copied().collect();
+        let (beta, _) = design.solve(&all)?;
+        let sum = contribution(design, &base, &own, &beta.as_slice()[base.len()..])?;
+        let (beta, _) = design.solve(&base)?;
+        Some(outlasts_noise(design, &sum, &design.residual(&base, &beta)))
     }
 
     fn best_addition(&self, set: &[Member], library: &[Effect]) -> Option<Judged> {

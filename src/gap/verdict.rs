@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use super::Config;
 use super::design::Design;
 use super::features::{General, Structure, energy};
+use super::lasting::lasting;
 use super::report::Verdict;
 use super::select::{Judge, Member};
 use super::series::Series;
@@ -15,6 +16,13 @@ pub(super) const STRUCTURE: f64 = 5.0;
 /// Deviates that energy without a phase needs; with a score a trial it cannot exceed the root of their number, so that
 /// few trials need this share of the root.
 const ENERGY: [f64; 2] = [4.5, 0.8];
+
+/// Deviates in one trial that what lasts needs: one of a hundred trials with noise alone reaches 3.5, and products of
+/// normal numbers have heavier tails than they.
+const LASTS: f64 = 7.0;
+
+/// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
+const MUCH: f64 = 0.15;
 
 /// What the search found.
 pub(super) struct Found {
@@ -53,7 +61,7 @@ impl Found {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
-        } else if coverage < config.coverage {
+        } else if coverage < config.coverage || found.leaves_much(design) {
             Verdict::NoCandidateFits
         } else if found.alternatives.is_empty() {
             Verdict::Named
@@ -63,7 +71,13 @@ impl Found {
         found
     }
 
-    /// Predictable from the state, and large enough to matter.
+    /// True where much of what lasts of the gap is still there after the named effects.
+    fn leaves_much(&self, design: &Design) -> bool {
+        let (before, after) = (lasting(design, &design.y), lasting(design, &self.residual));
+        f64::min(before.deviate, after.deviate) > LASTS && after.energy > MUCH * before.energy
+    }
+
+    /// Predictable from the state, or lasting in a trial, and large enough to matter.
     fn is_structured(&self, judge: &Judge, structure: &Structure, config: &Config, all: &[Series]) -> bool {
         let design = judge.design;
         let rows = design.y.len().max(1) as f64;
@@ -79,7 +93,10 @@ impl Found {
         // a force that comes and goes with no phase of its own shows in its energy alone
         let (deviate, _, energy) = energy(all, design, &design.y);
         let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
-        structure.deviate > STRUCTURE && size > least || deviate > bar && energy > 2.0 * least.max(0.5)
+        let kept = lasting(design, &design.y);
+        structure.deviate > STRUCTURE && size > least
+            || deviate > bar && energy > 2.0 * least.max(0.5)
+            || kept.deviate > LASTS && kept.size > least
     }
 }
 

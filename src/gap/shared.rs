@@ -1,0 +1,39 @@
+//! Noise of the motion that stands in the gap as well as in a column.
+//!
+//! A prediction is made for the motion that was recorded, so the recording's noise stands in the gap, and in every column
+//! that is made of the same motion. The two then agree sample by sample though nothing is missing (errors in variables;
+//! Fuller, Measurement Error Models, section 1.1). What an effect explains hangs together in time for longer than such
+//! noise: the product of the two is judged by what is left of it beyond the noise's reach.
+
+use nalgebra::DVector;
+
+use super::design::Design;
+
+/// Share of the product of a column and the gap that must hang together.
+const LASTS: f64 = 0.5;
+
+/// True where what a sum of columns and a residual have in common outlasts the noise of a bin.
+pub(super) fn outlasts_noise(design: &Design, sum: &DVector<f64>, residual: &DVector<f64>) -> bool {
+    let reach = reach(design.noise.smoothing);
+    let at = |lag: usize| common(design, sum, residual, lag);
+    let (near, far) = (at(reach), at(2 * reach));
+    // a parabola back to no lag, as for a rate
+    near + (near - far) / 3.0 > LASTS * at(0)
+}
+
+/// Bins beyond which noise that was white, and smoothed, has forgotten itself: each pass adds one to the variance of its
+/// autocovariance.
+fn reach(smoothing: usize) -> usize {
+    1 + (1.5 * (smoothing as f64).sqrt()).ceil() as usize
+}
+
+/// Sum of the products of two rows of a component that are so many bins apart, either way.
+fn common(design: &Design, a: &DVector<f64>, b: &DVector<f64>, lag: usize) -> f64 {
+    let rows = &design.rows;
+    let of = |trial: &std::ops::Range<usize>| -> f64 {
+        let apart = (lag * rows.width).min(trial.len());
+        let pairs = (trial.start..trial.end - apart).map(|row| (row, row + apart));
+        pairs.map(|(first, second)| 0.5 * (a[first] * b[second] + a[second] * b[first])).sum()
+    };
+    rows.of_trial.iter().map(of).sum()
+}
