@@ -14,6 +14,10 @@ use std::time::Instant;
 use common::{Row, Subject, Table};
 use wade::bundle;
 use wade::condition::Condition;
+use wade::effects::{
+    ActiveEffect, ActiveEffects, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind,
+    ParameterValue, Session, Validity,
+};
 use wade::forces::Forces;
 use wade::frame::{Vec3, WaterPlane, up_from_roll_pitch};
 use wade::geometry::hydrostatics::hydrostatics;
@@ -120,6 +124,70 @@ fn queries(vehicle: &str) -> Vec<Subject> {
     subjects
 }
 
+/// Every physical effect of the library with made-up numbers.
+fn every_effect(vehicle: &str) -> EffectsFile {
+    let physics = Effect::ALL.into_iter().filter(|effect| effect.kind() == Kind::Physics);
+    let effect = |name: Effect| {
+        let parameter = |name: &str, value: f64, unit: &str| {
+            (name.to_owned(), ParameterValue { value, std: 0.0, unit: unit.to_owned() })
+        };
+        let shape = if name == Effect::WaveMemory { [0.8, 2.0, 0.0] } else { [1e-3, 0.0, 0.0] };
+        let coefficients = name.coefficients().iter();
+        ActiveEffect {
+            name,
+            equation: name.equation().to_owned(),
+            provisional: false,
+            share_of_gap: 0.1,
+            shape,
+            base_drag: [1.0; 3],
+            channel_width: Some(4.0),
+            coefficients: coefficients.clone().map(|c| c.name.to_owned()).collect(),
+            covariance: Vec::new(),
+            parameters: coefficients.map(|c| parameter(c.name, 0.1, c.unit)).collect(),
+        }
+    };
+    let wide = [0.0, 1e4];
+    let validity = Validity {
+        depth_m: wide,
+        speed_mps: wide,
+        acceleration_mps2: wide,
+        angular_speed_radps: wide,
+        density_kgpm3: wide,
+    };
+    EffectsFile::new(vehicle.to_owned(), Evidence::default(), validity, physics.map(effect).collect())
+}
+
+/// All effects of a vehicle together, beside the query that they are added to: half under water, level and tilted.
+fn effects(vehicle: &str) -> Vec<Subject> {
+    let model = model(vehicle, Isa::available()[0]);
+    let depth = 0.5 * model.vehicle().dimensions.height;
+    let level = Condition {
+        angular_velocity: Vec3::new(0.0, 0.1, 0.4),
+        acceleration: Vec3::new(0.5, 0.1, 0.0),
+        ..Condition::level(Vec3::new(0.6, 0.2, 0.0), depth)
+    };
+    let tilted = Condition { up: up_from_roll_pitch(0.02, 0.05), ..level };
+    let told = Circumstances {
+        heading: Some(0.4),
+        depth_rate: Some(0.1),
+        wheel_speeds: Some([3.0; 4]),
+        time_step: 0.001,
+        implicit_added_mass: false,
+    };
+    let mut subjects: Vec<Subject> = Vec::new();
+    for (name, condition) in [("level", level), ("tilted", tilted)] {
+        let active = ActiveEffects::new(every_effect(vehicle), model.vehicle());
+        let mut forces = Forces::default();
+        model.evaluate(&condition, &mut Workspace::new(), &mut forces);
+        let (mut session, mut loads) = (Session::default(), EffectLoads::default());
+        let work = move || {
+            active.evaluate(black_box(&condition), &told, (&forces, true), Some(&mut session), &mut loads);
+        };
+        subjects.push((Row::new(format!("{vehicle} all 14 effects {name}"), 0), Box::new(work)));
+    }
+    subjects
+}
+
 fn parts(vehicle: &str) -> Vec<Subject> {
     let model = model(vehicle, Isa::available()[0]);
     let level = WaterPlane::level(model.vehicle().z0, 0.5 * model.vehicle().dimensions.height);
@@ -147,6 +215,7 @@ fn main() {
     for vehicle in ["husky", "warthog"] {
         subjects.extend(queries(vehicle));
         subjects.extend(parts(vehicle));
+        subjects.extend(effects(vehicle));
     }
     common::measure(&mut subjects);
     let mut table = Table::new("query");

@@ -128,6 +128,8 @@ pub struct SurfaceReading {
     pub hydrostatic: Wrench,
     /// Simple drag [N].
     pub drag: Vec3,
+    /// How far loads have set in: 0 above still water, 1 where water stands a few centimeters high on the surface.
+    pub onset: f64,
     /// `q A_s`: what a coefficient of one is worth [N].
     pub unit: f64,
     /// Factors of the two lateral coefficients.
@@ -274,6 +276,7 @@ impl Anchor {
         let pressure = 0.5 * condition.density * flow.speed * flow.speed;
         let head = flow.speed * flow.speed / (2.0 * GRAVITY);
         let reached = ((level + head - min.z) / (max.z - min.z).max(RAMP)).clamp(0.0, 1.0);
+        let onset = ramp(level - min.z);
         let facing = surface.normal.dot(ahead);
         let off_track = (center.x * ahead.y - center.y * ahead.x).abs();
         let dynamic = [
@@ -295,7 +298,8 @@ impl Anchor {
             center,
             hydrostatic,
             drag: ahead * -(CD0 * shelter * front * pressure),
-            unit: pressure * surface.area * reached * ramp(level - min.z),
+            onset,
+            unit: pressure * surface.area * reached * onset,
             lateral: if surface.side == 0.0 { [ahead.y, condition.up.y] } else { [surface.side, 0.0] },
             wet_box: [min.inf(&center), Vec3::new(max.x, max.y, top).sup(&center)],
             dynamic: dynamic.map(|x| x as f32),

@@ -1,4 +1,4 @@
-//! The models that are being served, by vehicle: atomic swap and admission. No async, no IO, no clock.
+//! The vehicles that are being served: atomic swap and admission. No async, no IO, no clock.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -6,18 +6,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use arc_swap::ArcSwap;
 
-use crate::model::Model;
+use crate::served::ServedVehicle;
 
 /// Longest name that an error repeats; no bundle's name is longer.
 const MAX_NAME: usize = 64;
 
-/// The models by vehicle name.
-pub type Models = BTreeMap<String, Arc<Model>>;
+/// The vehicles by name.
+pub type Vehicles = BTreeMap<String, Arc<ServedVehicle>>;
 
 /// Shared by every transport. Serves nothing until something is swapped in.
 #[derive(Debug, Default)]
 pub struct Engine {
-    models: ArcSwap<Models>,
+    vehicles: ArcSwap<Vehicles>,
 }
 
 /// No vehicle of this name is served.
@@ -32,27 +32,27 @@ pub struct UnknownVehicle {
 
 impl Engine {
     /// The version of a vehicle that is served now. A request keeps the version it got, whatever is swapped meanwhile.
-    pub fn model(&self, vehicle: &str) -> Result<Arc<Model>, UnknownVehicle> {
-        let models = self.models.load();
-        models.get(vehicle).cloned().ok_or_else(|| UnknownVehicle {
+    pub fn vehicle(&self, name: &str) -> Result<Arc<ServedVehicle>, UnknownVehicle> {
+        let vehicles = self.vehicles.load();
+        vehicles.get(name).cloned().ok_or_else(|| UnknownVehicle {
             // a name of any length would not fit into the error's headers
-            name: vehicle.chars().take(MAX_NAME).collect(),
-            served: models.keys().map(String::as_str).collect::<Vec<_>>().join(", "),
+            name: name.chars().take(MAX_NAME).collect(),
+            served: vehicles.keys().map(String::as_str).collect::<Vec<_>>().join(", "),
         })
     }
 
     /// Everything that is served now.
-    pub fn models(&self) -> Arc<Models> {
-        self.models.load_full()
+    pub fn vehicles(&self) -> Arc<Vehicles> {
+        self.vehicles.load_full()
     }
 
-    /// Serves a model from now on in place of the version before it.
-    pub fn swap(&self, model: Model) {
-        let model = Arc::new(model);
-        self.models.rcu(|models| {
-            let mut models = Models::clone(models);
-            models.insert(model.vehicle().name.clone(), Arc::clone(&model));
-            models
+    /// Serves a vehicle from now on in place of the version before it.
+    pub fn swap(&self, vehicle: ServedVehicle) {
+        let vehicle = Arc::new(vehicle);
+        self.vehicles.rcu(|vehicles| {
+            let mut vehicles = Vehicles::clone(vehicles);
+            vehicles.insert(vehicle.model().vehicle().name.clone(), Arc::clone(&vehicle));
+            vehicles
         });
     }
 }

@@ -8,7 +8,7 @@
 //! Modules in reading order; each uses only those above it:
 //! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`page`], [`random`], [`signal`]), the body ([`geometry`],
 //! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]),
-//! the network ([`model`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and
+//! the network ([`model`]), with the effects added to it ([`served`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and
 //! held against ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from
 //! ([`cfd`]), what learns it ([`train`]), judges it by held-out cases ([`evaluate`]), holds it against measured motion
 //! ([`validate`]), names what it lacks ([`gap`]) and scores tools that name what is missing ([`gap_bench`]), the settings ([`config`]) and the server
@@ -33,6 +33,7 @@ pub mod features;
 
 pub mod bundle;
 pub mod model;
+pub mod served;
 
 pub mod dataset;
 pub mod engine;

@@ -7,15 +7,13 @@ use crate::service::grpc::single;
 use crate::service::wire::State;
 
 /// Columns that describe a state.
-const STATE: [&str; 17] = [
-    "t", "vx", "vy", "vz", "wx", "wy", "wz", "roll", "pitch", "depth", "ax", "ay", "az", "alx", "aly", "alz",
-    "rho",
+const STATE: [&str; 22] = [
+    "t", "vx", "vy", "vz", "wx", "wy", "wz", "roll", "pitch", "yaw", "depth", "ax", "ay", "az", "alx", "aly",
+    "alz", "rho", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr",
 ];
 /// Columns of a trial that say nothing about the state.
-const NOT_STATE: [&str; 17] = [
-    "yaw", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr", "fx", "fy", "fz", "mx", "my", "mz", "sim_fx",
-    "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz",
-];
+const NOT_STATE: [&str; 12] =
+    ["fx", "fy", "fz", "mx", "my", "mz", "sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
 
 /// Columns that no trial has: to be reported, and ignored.
 pub fn unknown_columns(headers: &csv::StringRecord) -> Vec<String> {
@@ -44,6 +42,11 @@ pub struct Row {
     aly: Option<f64>,
     alz: Option<f64>,
     rho: Option<f64>,
+    yaw: Option<f64>,
+    wheel_fl: Option<f64>,
+    wheel_fr: Option<f64>,
+    wheel_rl: Option<f64>,
+    wheel_rr: Option<f64>,
 }
 
 /// A row that holds no state.
@@ -70,6 +73,10 @@ impl Row {
         })
     }
 
+    fn wheel_speeds(&self) -> Option<[f32; 4]> {
+        Some([self.wheel_fl?, self.wheel_fr?, self.wheel_rl?, self.wheel_rr?].map(|speed| speed as f32))
+    }
+
     /// The state of the row.
     pub fn state(&self) -> State {
         let or_zero = |value: Option<f64>| value.unwrap_or(0.0) as f32;
@@ -83,6 +90,8 @@ impl Row {
             gravity: single(&-up.into_inner()),
             depth: self.depth as f32,
             density: self.rho.map_or(level.density, |rho| rho as f32),
+            heading: self.yaw.map(|yaw| yaw as f32),
+            wheel_speeds: self.wheel_speeds(),
             ..level
         }
     }

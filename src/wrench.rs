@@ -1,6 +1,6 @@
 //! Force and moment about a stated point.
 
-use std::ops::{Add, AddAssign};
+use std::ops::{Add, AddAssign, Mul};
 
 use crate::frame::Vec3;
 
@@ -29,6 +29,13 @@ impl Add for Wrench {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self { force: self.force + other.force, moment: self.moment + other.moment }
+    }
+}
+
+impl Mul<f64> for Wrench {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        Self { force: self.force * factor, moment: self.moment * factor }
     }
 }
 

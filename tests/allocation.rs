@@ -6,10 +6,12 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use common::{Numbers, VEHICLES, model_on};
+use common::{Numbers, VEHICLES, every_effect, model_on, served_with};
+use wade::effects::Session;
 use wade::forces::Forces;
 use wade::model::Workspace;
 use wade::model::kernel::Isa;
+use wade::service::Evaluator;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -50,6 +52,22 @@ fn a_query_allocates_nothing_after_load() {
             }
             assert_eq!(ALLOCATIONS.get() - before, 0, "{} {vehicle}", isa.name());
         }
+    }
+}
+
+#[test]
+fn a_query_with_every_effect_allocates_nothing_after_load() {
+    for vehicle in VEHICLES {
+        let served = served_with(vehicle, every_effect(vehicle));
+        let (mut evaluator, mut session) = (Evaluator::default(), Session::default());
+        let mut numbers = Numbers::new(1);
+        let states: Vec<_> = (0..50).map(|_| numbers.state()).collect();
+        evaluator.evaluate(&served, &states[0], Some(&mut session)).expect("valid");
+        let before = ALLOCATIONS.get();
+        for state in &states {
+            evaluator.evaluate(&served, state, Some(&mut session)).expect("valid");
+        }
+        assert_eq!(ALLOCATIONS.get() - before, 0, "{vehicle}");
     }
 }
 

@@ -253,3 +253,24 @@ fn weights_serve_both_conventions_of_ground_contact() {
     let pressure = wetted.density * wade::frame::GRAVITY * wetted.depth;
     assert!((lost - Vec3::z() * (pressure * area)).norm() < 1e-6 * pressure * area, "{lost}");
 }
+
+#[test]
+fn loads_above_still_water_are_carried_by_wet_surfaces() {
+    let lesson = Lesson::new();
+    let mut source = lesson.source.clone();
+    // a bow wave on every surface, wet or not
+    let push = Vec3::new(-5.0, 1.0, 2.0);
+    for load in source.data.samples.iter_mut().flat_map(|sample| &mut sample.surfaces) {
+        load.force += push;
+    }
+    let states = Known::states(&source.data, &lesson.split.training, &lesson.vehicles());
+    for (state, before) in states.iter().zip(lesson.states(&lesson.split.training)) {
+        let count = state.loads.len() as f64;
+        assert!((state.dynamic() - before.dynamic() - push * count).norm() < 1e-9 * count);
+        for ((force, _), surface) in state.loads.iter().zip(&state.reading.surfaces) {
+            assert!(surface.wet_fraction > 0.0 || *force == Vec3::zeros());
+        }
+    }
+    let dry = |state: &Known| state.reading.surfaces.iter().any(|surface| surface.wet_fraction == 0.0);
+    assert!(states.iter().filter(|state| dry(state)).count() > 10);
+}

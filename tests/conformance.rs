@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Numbers, Served, VEHICLES, model};
+use common::{Numbers, Served, VEHICLES, served_vehicle};
 use wade::client::{InProcess, Reply};
 use wade::service::wire::State;
 
@@ -22,7 +22,7 @@ fn states(count: usize) -> Vec<State> {
 fn every_transport_answers_the_same_bits() {
     let served = Served::start();
     for vehicle in VEHICLES {
-        let mut library = InProcess::new(Arc::new(model(vehicle)));
+        let mut library = InProcess::new(Arc::new(served_vehicle(vehicle)));
         let mut clients = served.clients(vehicle);
         for state in states(100) {
             let expected = timeless(library.evaluate(&state).expect("valid"));
@@ -38,7 +38,7 @@ fn every_transport_answers_the_same_bits() {
 fn a_batch_answers_the_bits_of_its_states_alone() {
     let served = Served::start();
     for vehicle in VEHICLES {
-        let mut library = InProcess::new(Arc::new(model(vehicle)));
+        let mut library = InProcess::new(Arc::new(served_vehicle(vehicle)));
         // a batch has one ground contact for all, so it is the same here for each
         let states: Vec<State> =
             states(150).into_iter().map(|state| State { dry_contact: false, ..state }).collect();

@@ -15,9 +15,10 @@ use wade::geometry::hydrostatics::hydrostatics;
 use wade::model::Workspace;
 use wade::random::Random;
 
-fn wade(arguments: &[&str]) -> Output {
+/// Runs the program on copies of the shipped bundles: what is applied is written into them.
+fn wade_on(vehicles: &TempDir, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
-    command.args(arguments).env("WADE_VEHICLES", common::vehicles()).output().expect("the program runs")
+    command.args(arguments).env("WADE_VEHICLES", vehicles.path()).output().expect("the program runs")
 }
 
 fn gaussian(random: &mut Random) -> f64 {
@@ -68,8 +69,21 @@ fn a_hidden_added_mass_is_named_and_written() {
     let (data, out) = (folder(14), TempDir::new().expect("a folder"));
     let (data, out) = (data.path().to_str().expect("a name"), out.path().join("gap"));
     let place = out.to_str().expect("a name");
-    let output =
-        wade(&["gap", "--vehicle", "warthog", "--trials", data, "--out", place, "--apply", "--json"]);
+    let vehicles = common::copy_of_vehicles();
+    let wade = |arguments: &[&str]| wade_on(&vehicles, arguments);
+    let output = wade(&[
+        "gap",
+        "--vehicle",
+        "warthog",
+        "--trials",
+        data,
+        "--out",
+        place,
+        "--apply",
+        "--server",
+        "unix:/nowhere",
+        "--json",
+    ]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(report["verdict"], "named", "{}", report["summary"]);
@@ -83,7 +97,6 @@ fn a_hidden_added_mass_is_named_and_written() {
     let on_disk = std::fs::read_to_string(out.join("report.json")).expect("written");
     assert_eq!(serde_json::from_str::<Value>(&on_disk).expect("JSON"), report);
     let page = std::fs::read_to_string(out.join("index.html")).expect("written");
-    // the page is for people: plain names
     assert!(page.contains("added mass") && page.contains("<svg") && !page.contains("http-equiv"));
     let effects: toml::Value = std::fs::read_to_string(out.join("effects.toml"))
         .expect("written")
@@ -91,7 +104,7 @@ fn a_hidden_added_mass_is_named_and_written() {
         .map(toml::Value::Table)
         .expect("TOML");
     assert_eq!(effects["effect"][0]["name"].as_str(), Some("added_mass"));
-    assert_eq!(effects["sources"]["trials_sha256"].as_str().map(str::len), Some(64));
+    assert_eq!(effects["evidence"]["trials_sha256"].as_str().map(str::len), Some(64));
     if let Ok(copy) = std::env::var("WADE_KEEP_PAGE") {
         std::fs::copy(out.join("index.html"), copy).expect("copied");
     }
@@ -110,17 +123,21 @@ fn a_hidden_added_mass_is_named_and_written() {
 fn bad_input_is_refused_with_file_row_and_column_and_nothing_is_written() {
     let (data, out) = (folder(5), TempDir::new().expect("a folder"));
     let place = out.path().join("gap");
+    let vehicles = common::copy_of_vehicles();
     let run = |vehicle: &str| {
-        let output = wade(&[
-            "gap",
-            "--vehicle",
-            vehicle,
-            "--trials",
-            data.path().to_str().expect("a name"),
-            "--out",
-            place.to_str().expect("a name"),
-            "--apply",
-        ]);
+        let output = wade_on(
+            &vehicles,
+            &[
+                "gap",
+                "--vehicle",
+                vehicle,
+                "--trials",
+                data.path().to_str().expect("a name"),
+                "--out",
+                place.to_str().expect("a name"),
+                "--apply",
+            ],
+        );
         assert_eq!(output.status.code(), Some(1));
         assert!(!place.exists());
         String::from_utf8_lossy(&output.stderr).into_owned()

@@ -85,9 +85,9 @@ fn faults_of_sensors_are_named_as_such_and_never_applied() {
         ("sensor_delay", "delay", 0.08),
     ] {
         recovered(name, parameter, value, 1.0);
-        let report = run(&with(&[name], 1.0, 11).0);
-        assert!(!report.is_applicable(), "{name}");
-        assert!(!gap::effects_toml(&report).contains(name));
+        let trials = with(&[name], 1.0, 11).0;
+        let applied = gap::effects_file(&run(&trials), &trials, true);
+        assert_eq!(applied, Err(gap::NotApplicable::NotPhysics), "{name}");
     }
 }
 

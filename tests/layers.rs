@@ -8,7 +8,7 @@ const LAYERS: [&[&str]; 8] = [
     &["frame", "wrench", "condition", "domain", "forces", "page", "random", "signal"],
     &["geometry", "vehicle"],
     &["features", "effects", "analytic", "anchor"],
-    &["model", "bundle"],
+    &["model", "served", "bundle"],
     &["engine", "metrics", "dataset", "trials"],
     &[
         "cores",

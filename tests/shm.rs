@@ -184,7 +184,7 @@ fn a_hostile_request_gets_an_error_code_and_the_next_is_served() {
         Query { depth_m: f32::NAN, ..good },
         Query { velocity_mps: [f32::INFINITY; 3], ..good },
         Query { gravity_direction: [0.0; 3], ..good },
-        Query { density_kgpm3: -1.0, flags: u32::MAX, reserved: u32::MAX, ..good },
+        Query { density_kgpm3: -1.0, flags: u32::MAX, session: u64::MAX, ..good },
     ];
     for (sequence, query) in (1..).zip(bad) {
         // a wake key that no listener has must not hold anybody up

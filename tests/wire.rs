@@ -2,14 +2,15 @@
 
 mod common;
 
-use common::model;
+use common::{every_effect, served_with};
 use proptest::prelude::*;
 use std::sync::LazyLock;
-use wade::model::Model;
+use wade::effects::Session;
+use wade::served::ServedVehicle;
 use wade::service::Evaluator;
 use wade::service::wire::State;
 
-static HUSKY: LazyLock<Model> = LazyLock::new(|| model("husky"));
+static HUSKY: LazyLock<ServedVehicle> = LazyLock::new(|| served_with("husky", every_effect("husky")));
 
 /// Any bit pattern at all, with the plausible ones common enough to get past the checks.
 fn number(scale: f32) -> impl Strategy<Value = f32> {
@@ -32,9 +33,12 @@ prop_compose! {
         velocity in vector(1e3), current in vector(1e3), angular_velocity in vector(1e3),
         acceleration in vector(1e5), angular_acceleration in vector(1e5), gravity in direction(),
         depth in number(1e3), density in number(1e5), dry_contact in any::<bool>(),
+        given in (number(1e6), number(1e3), number(1e3), number(1e3)), implicit_added_mass in any::<bool>(),
     ) -> State {
+        let (heading, depth_rate, wheel_speed, time_step) = given;
         State { velocity, current, angular_velocity, acceleration, angular_acceleration, gravity, depth: depth.abs(),
-                density: density.abs(), dry_contact }
+                density: density.abs(), dry_contact, heading: Some(heading), depth_rate: Some(depth_rate),
+                wheel_speeds: Some([wheel_speed; 4]), time_step: time_step.abs(), implicit_added_mass }
     }
 }
 
@@ -44,13 +48,19 @@ proptest! {
     #[test]
     fn an_answer_is_finite_or_an_error_that_names_a_field(state in state()) {
         let mut evaluator = Evaluator::default();
-        match evaluator.evaluate(&HUSKY, &state) {
+        let mut session = Session::default();
+        match evaluator.evaluate(&HUSKY, &state, Some(&mut session)) {
             Ok(evaluated) => {
                 let forces = evaluated.forces;
+                let effects = evaluated.effects;
                 let single = |v: &wade::frame::Vec3| wade::service::grpc::single(v).iter().all(|x| x.is_finite());
                 prop_assert!(single(&forces.wrench.force) && single(&forces.wrench.moment), "{forces:?}");
                 prop_assert!(forces.surfaces.iter().all(|load| single(&load.force) && single(&load.point)));
                 prop_assert!(single(&forces.uncertainty));
+                let finite = |w: &wade::wrench::Wrench| single(&w.force) && single(&w.moment);
+                prop_assert!(effects.loads.iter().all(|load| finite(&load.wrench)), "{effects:?}");
+                prop_assert!(effects.surface_forces.iter().all(single));
+                prop_assert!(effects.added_mass.is_some_and(|m| m.iter().all(|x| (*x as f32).is_finite())));
             }
             Err(invalid) => prop_assert!(invalid.to_string().starts_with(invalid.field.name())),
         }

@@ -28,7 +28,8 @@ pub fn render(files: &BTreeMap<&'static str, Vec<u8>>) -> String {
     files.iter().map(|(name, bytes)| format!("{}  {name}\n", hexadecimal(bytes))).collect()
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
+/// SHA-256 in hexadecimal.
+pub fn hexadecimal(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().fold(String::with_capacity(64), |mut hex, byte| {
         // writing to a String cannot fail
         let _ = write!(hex, "{byte:02x}");

@@ -8,10 +8,12 @@
 //! | `sdf.safetensors` | `distance` i16 `[nx, ny, nz]` in steps given, with origin and spacing, in the metadata |
 //! | `submergence.safetensors` | `points`, `normals` f32 `[n, 3]` by rising z within a surface, `offsets` u32 `[K + 1]` |
 //! | `network.safetensors` | weights and statistics; absent until the vehicle is trained |
+//! | `effects.toml` | the effects that are switched on, see `effects`; may be absent |
 //! | `spec.toml` | the vehicle file that the bundle was built from, for the record; may be absent |
 //! | `SHA256SUMS` | checksums of all of these, in the form of `sha256sum` |
 
 mod checksums;
+mod history;
 mod tensors;
 mod vehicle_file;
 
@@ -20,15 +22,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::domain::Domain;
+use crate::effects::{EffectsFile, EffectsFileError};
 use crate::geometry::distance::SignedDistanceGrid;
 use crate::geometry::stl::{StlError, read_stl, write_stl};
 use crate::geometry::submergence::{Samples, SamplesError};
 use crate::geometry::surfaces::Hull;
 use crate::model::kernel::Isa;
 use crate::model::{Model, Weights};
+use crate::served::ServedVehicle;
 use crate::vehicle::{Vehicle, VehicleError};
 use tensors::TensorError;
 use vehicle_file::VehicleFile;
+
+pub use history::{Kept, apply, kept, roll_back};
 
 /// The file that makes a folder a bundle.
 const VEHICLE_FILE: &str = "vehicle.toml";
@@ -37,10 +43,22 @@ const PATCHES_FILE: &str = "patches.safetensors";
 const SDF_FILE: &str = "sdf.safetensors";
 const SUBMERGENCE_FILE: &str = "submergence.safetensors";
 const NETWORK_FILE: &str = "network.safetensors";
+const EFFECTS_FILE: &str = "effects.toml";
 const SPEC_FILE: &str = "spec.toml";
 const SUMS_FILE: &str = "SHA256SUMS";
-const FILES: [&str; 8] =
-    [VEHICLE_FILE, HULL_FILE, PATCHES_FILE, SDF_FILE, SUBMERGENCE_FILE, NETWORK_FILE, SPEC_FILE, SUMS_FILE];
+const FILES: [&str; 9] = [
+    VEHICLE_FILE,
+    HULL_FILE,
+    PATCHES_FILE,
+    SDF_FILE,
+    SUBMERGENCE_FILE,
+    NETWORK_FILE,
+    EFFECTS_FILE,
+    SPEC_FILE,
+    SUMS_FILE,
+];
+/// Files that a bundle may do without.
+const OPTIONAL: [&str; 3] = [NETWORK_FILE, EFFECTS_FILE, SPEC_FILE];
 
 /// Format of the bundles that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;
@@ -59,6 +77,8 @@ pub struct Bundle {
     pub trained: Option<(Weights, Domain)>,
     /// Signed distance to the hull.
     pub distance: SignedDistanceGrid,
+    /// The effects that are switched on; only with the weights that they were fitted to.
+    pub effects: Option<EffectsFile>,
     /// The vehicle file that it was built from.
     pub spec: Option<String>,
 }
@@ -159,6 +179,21 @@ pub enum Fault {
     /// The vehicle file speaks of weights that are not there, or the other way round.
     #[error("provenance and domain are stated where there are weights, and only there")]
     Untrained,
+    /// The effects.
+    #[error("{0}; write it anew with wade gap --apply, or take it back with wade vehicle rollback")]
+    Effects(#[from] EffectsFileError),
+    /// A folder of kept versions that holds another.
+    #[error("holds version {found}")]
+    KeptVersion {
+        /// The version in it.
+        found: u32,
+    },
+    /// Nothing to go back to.
+    #[error("{}", .asked.map_or_else(|| "no version before this one was kept".to_owned(), |version| format!("version {version} was not kept")))]
+    NotKept {
+        /// The version asked for.
+        asked: Option<u32>,
+    },
     /// Serving needs weights.
     #[error("the bundle has no weights yet: train it first")]
     NoWeights,
@@ -184,9 +219,9 @@ impl Files {
         let sums_path = directory.join(SUMS_FILE);
         let sums = checksums::parse(&read_bounded(&sums_path)?).map_err(at(&sums_path))?;
         let mut files = BTreeMap::from([(VEHICLE_FILE, bytes)]);
-        for name in [HULL_FILE, PATCHES_FILE, SDF_FILE, SUBMERGENCE_FILE, NETWORK_FILE, SPEC_FILE] {
+        for name in FILES.into_iter().filter(|name| ![VEHICLE_FILE, SUMS_FILE].contains(name)) {
             let path = directory.join(name);
-            if [NETWORK_FILE, SPEC_FILE].contains(&name) && !path.exists() && !sums.contains_key(name) {
+            if OPTIONAL.contains(&name) && !path.exists() && !sums.contains_key(name) {
                 continue;
             }
             files.insert(name, read_bounded(&path)?);
@@ -237,6 +272,20 @@ impl Files {
             Ok(Some((weights, domain)))
         })
     }
+
+    fn effects(&self, vehicle: &str) -> Result<Option<EffectsFile>, BundleError> {
+        if !self.files.contains_key(EFFECTS_FILE) {
+            return Ok(None);
+        }
+        self.parse(EFFECTS_FILE, |bytes| {
+            let effects = EffectsFile::parse(bytes, vehicle)?;
+            let weights = self.files.get(NETWORK_FILE).map(|bytes| checksums::hexadecimal(bytes));
+            match weights.is_some_and(|sum| sum == effects.evidence.weights_sha256) {
+                true => Ok(Some(effects)),
+                false => Err(EffectsFileError::OtherWeights),
+            }
+        })
+    }
 }
 
 /// Names of the folders that hold a bundle, sorted.
@@ -254,20 +303,33 @@ pub fn names_in(directory: &Path) -> std::io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// Reads what serving needs; the signed distance grid is verified but not unpacked.
+/// Reads the model without its effects; the signed distance grid is verified but not unpacked.
 pub fn load(directory: &Path, isa: Isa) -> Result<Model, BundleError> {
+    Ok(load_parts(directory, isa)?.0)
+}
+
+/// Reads what serving needs: the model and the effects that were added to it.
+pub fn load_served(directory: &Path, isa: Isa) -> Result<ServedVehicle, BundleError> {
+    let (model, effects) = load_parts(directory, isa)?;
+    Ok(ServedVehicle::new(model, effects))
+}
+
+fn load_parts(directory: &Path, isa: Isa) -> Result<(Model, Option<EffectsFile>), BundleError> {
     let (files, vehicle_file) = Files::read(directory)?;
     let vehicle = files.vehicle(&vehicle_file)?;
     let (weights, domain) = files.trained(&vehicle_file)?.ok_or(Fault::NoWeights).map_err(at(directory))?;
-    Ok(Model::new(vehicle, vehicle_file.version, domain, weights, isa))
+    let effects = files.effects(&vehicle.name)?;
+    Ok((Model::new(vehicle, vehicle_file.version, domain, weights, isa), effects))
 }
 
 /// Reads everything.
 pub fn read(directory: &Path) -> Result<Bundle, BundleError> {
     let (files, vehicle_file) = Files::read(directory)?;
     let spec = files.files.get(SPEC_FILE).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    let vehicle = files.vehicle(&vehicle_file)?;
     Ok(Bundle {
-        vehicle: files.vehicle(&vehicle_file)?,
+        effects: files.effects(&vehicle.name)?,
+        vehicle,
         version: vehicle_file.version,
         trained: files.trained(&vehicle_file)?,
         distance: files.parse(SDF_FILE, tensors::read_distance)?,
@@ -294,8 +356,15 @@ pub fn check_place(directory: &Path, name: &str) -> Result<(), BundleError> {
     placed().map_err(at(directory))
 }
 
-/// Writes a bundle beside its place and then puts it there, so that a reader sees the one before or this one.
+/// Writes a bundle beside its place and then puts it there, so that a reader sees the one before or this one. The one
+/// before is deleted.
 pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
+    let staged = stage(directory, bundle)?;
+    place(&staged, directory).map_err(|error| at(directory)(error.into()))
+}
+
+/// Writes a bundle beside its place.
+fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
     check_place(directory, &bundle.vehicle.name)?;
     let mut files = BTreeMap::from([
         (VEHICLE_FILE, VehicleFile::new(bundle).to_toml().into_bytes()),
@@ -307,28 +376,41 @@ pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
     if let Some((weights, _)) = &bundle.trained {
         files.insert(NETWORK_FILE, tensors::write_weights(weights));
     }
+    if let Some(effects) = &bundle.effects {
+        files.insert(EFFECTS_FILE, effects.to_toml().into_bytes());
+        // nothing is written that would be refused when it is read
+        Files { directory: directory.to_owned(), files: files.clone() }.effects(&bundle.vehicle.name)?;
+    }
     if let Some(spec) = &bundle.spec {
         files.insert(SPEC_FILE, spec.clone().into_bytes());
     }
     files.insert(SUMS_FILE, checksums::render(&files).into_bytes());
-    let staged = directory.with_file_name(format!("{}.new", bundle.vehicle.name));
+    let staged = staging_of(directory, &bundle.vehicle.name);
     let stage = || {
         let _ = fs::remove_dir_all(&staged);
         fs::create_dir_all(&staged)?;
         files.iter().try_for_each(|(name, bytes)| fs::write(staged.join(name), bytes))
     };
     stage().map_err(|error| at(&staged)(error.into()))?;
-    place(&staged, directory).map_err(|error| at(directory)(error.into()))
+    Ok(staged)
 }
 
-/// Exchanges the staged folder with the one in place in a single step of the file system.
+fn staging_of(directory: &Path, name: &str) -> PathBuf {
+    directory.with_file_name(format!("{name}.new"))
+}
+
 fn place(staged: &Path, directory: &Path) -> std::io::Result<()> {
-    use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
     if !directory.exists() {
         return fs::rename(staged, directory);
     }
-    renameat2(AT_FDCWD, staged, AT_FDCWD, directory, RenameFlags::RENAME_EXCHANGE)?;
+    exchange(staged, directory)?;
     fs::remove_dir_all(staged)
+}
+
+/// Exchanges the staged folder with the one in place in a single step of the file system.
+fn exchange(staged: &Path, directory: &Path) -> std::io::Result<()> {
+    use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
+    Ok(renameat2(AT_FDCWD, staged, AT_FDCWD, directory, RenameFlags::RENAME_EXCHANGE)?)
 }
 
 fn read_bounded(path: &Path) -> Result<Vec<u8>, BundleError> {

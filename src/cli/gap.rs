@@ -3,24 +3,27 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use sha2::{Digest, Sha256};
-use wade::effects::Body;
+use wade::bundle;
+use wade::effects::{Body, EffectsFile};
 use wade::forces::Forces;
-use wade::gap::{self, Config, GapError, Predicted, Report, Verdict, effects_toml};
+use wade::gap::{self, Config, GapError, NotApplicable, Predicted, Report, effects_file};
 use wade::model::{Model, Workspace};
 use wade::trials::Trials;
 
 use super::gap_bench::GapBench;
+use super::running::Running;
 use super::{Vehicles, emit, usage_error};
 
 /// Find where a model and measured trials disagree, name the missing effect, and show the gap shrink
 ///
 /// Says `nothing_missing`, `named`, `ambiguous` (with the trial that would tell the candidates apart) or
 /// `no_candidate_fits`. Trials with sim_fx ... columns are held against that simulator, on any body that trials.toml
-/// describes; others against the vehicle's bundle. Exit status 1: --apply was asked for and there is nothing to trust.
+/// describes; others against the model of the vehicle's bundle, without the effects that were added to it before.
+/// Exit status 1: --apply was asked for and there is nothing to trust.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_help = "Examples:
@@ -29,8 +32,12 @@ use super::{Vehicles, emit, usage_error};
   wade gap locate --vehicle warthog --trials trials/ --json
   wade gap bench --cases 69 --out bench/
 
+  wade vehicle rollback warthog                     takes it back
+
 OUT holds report.json and index.html, with --apply effects.toml too: the physical effects with their standard errors and the
-ranges in which they were seen. Faults of sensors and drive are never in it.")]
+ranges in which they were seen. Faults of sensors and drive are never in it. --apply writes it into the bundle as the next
+version, in the place of effects from before, and keeps the version before it; only a verdict of `named` is applied. The gap of
+another simulator (sim_ columns) is not the bundle's, so effects.toml is all that is written of it.")]
 pub struct Gap {
     #[command(subcommand)]
     step: Option<Step>,
@@ -39,9 +46,23 @@ pub struct Gap {
     /// Folder for report.json and index.html; those of an earlier run are replaced
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
-    /// Write the physical effects to effects.toml
+    #[command(flatten)]
+    apply: Apply,
+}
+
+#[derive(Debug, Args)]
+struct Apply {
+    /// Add the physical effects to the bundle, as its next version
     #[arg(long)]
     apply: bool,
+    /// Add what was seen in one condition only as well
+    #[arg(long, requires = "apply")]
+    provisional: bool,
+    /// Take effects out that other trials gave and these do not
+    #[arg(long, requires = "apply")]
+    replace: bool,
+    #[command(flatten)]
+    running: Running,
 }
 
 /// One step of the workflow; each looks at the trials anew and writes nothing but the last.
@@ -90,9 +111,9 @@ impl Gap {
             (Some(Step::Locate(source)), _) => source.locate(),
             (Some(Step::Name(source)), _) => source.name(),
             (Some(Step::Fit(source)), _) => source.fit(),
-            (Some(Step::Report { source, out }), _) => source.report(&out, false),
+            (Some(Step::Report { source, out }), _) => source.report(&out, None),
             (Some(Step::Bench(bench)), _) => bench.run(),
-            (None, Some(out)) => self.source.report(&out, self.apply),
+            (None, Some(out)) => self.source.report(&out, Some(&self.apply).filter(|apply| apply.apply)),
             (None, None) => usage_error("give --vehicle, --trials and --out, or a step"),
         }
     }
@@ -107,7 +128,7 @@ impl Source {
         Ok(config)
     }
 
-    fn run(&self) -> Result<Report> {
+    fn run(&self) -> Result<(Report, Trials)> {
         let (Some(vehicle), Some(folder)) = (&self.vehicle, &self.trials) else {
             usage_error("give --vehicle and --trials")
         };
@@ -131,15 +152,17 @@ impl Source {
             }
             gap::run(&trials, &gap::body_of(&trials)?, &mut |_| Predicted::default(), &config)?
         };
-        let simulated = trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some));
-        report.sources.model =
-            if simulated { "the sim_ columns of the trials".into() } else { bundle_hash(&bundle)? };
+        report.sources.model = if is_simulated(&trials) {
+            "the sim_ columns of the trials".into()
+        } else {
+            bundle_hash(&bundle)?
+        };
         report.sources.tool = format!("wade {} ({})", env!("CARGO_PKG_VERSION"), env!("WADE_COMMIT"));
-        Ok(report)
+        Ok((report, trials))
     }
 
     fn locate(&self) -> Result<ExitCode> {
-        let report = self.run()?;
+        let (report, _) = self.run()?;
         let text = match self.json {
             true => pretty(&json!({ "regions": report.regions, "regions_tried": report.regions_tried }))?,
             false => regions(&report),
@@ -149,7 +172,7 @@ impl Source {
     }
 
     fn name(&self) -> Result<ExitCode> {
-        let report = self.run()?;
+        let (report, _) = self.run()?;
         let names: Vec<&str> = report.effects.iter().map(|effect| effect.name).collect();
         let text = match self.json {
             true => pretty(&json!({
@@ -167,7 +190,7 @@ impl Source {
     }
 
     fn fit(&self) -> Result<ExitCode> {
-        let report = self.run()?;
+        let (report, _) = self.run()?;
         let text = match self.json {
             true => pretty(&json!({ "verdict": report.verdict, "effects": report.effects }))?,
             false => parameters(&report),
@@ -176,17 +199,22 @@ impl Source {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn report(&self, out: &Path, apply: bool) -> Result<ExitCode> {
-        let report = self.run()?;
+    fn report(&self, out: &Path, apply: Option<&Apply>) -> Result<ExitCode> {
+        let (report, trials) = self.run()?;
         let json = serde_json::to_string_pretty(&report)? + "\n";
         let page = report.page()?;
-        let applied = apply && report.is_applicable();
+        let effects = apply.map(|apply| effects_file(&report, &trials, apply.provisional));
+        let bundle = self.vehicles.bundle(&report.vehicle);
+        let bundle = Some(bundle).filter(|bundle| bundle.is_dir() && !is_simulated(&trials));
+        if let (Some(Ok(effects)), Some(bundle), Some(apply)) = (&effects, &bundle, apply) {
+            check_loss(effects, bundle, apply.replace)?;
+        }
         std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
         write(&out.join("report.json"), Some(&json))?;
         write(&out.join("index.html"), Some(&page))?;
         // one from an earlier run would pass for this one's
-        let effects = applied.then(|| effects_toml(&report));
-        write(&out.join("effects.toml"), effects.as_deref())?;
+        let text = effects.iter().flatten().next().map(EffectsFile::to_toml);
+        write(&out.join("effects.toml"), text.as_deref())?;
         let text = format!(
             "{}{}{}{}\n",
             verdict(&report),
@@ -195,21 +223,49 @@ impl Source {
             out.join("index.html").display()
         );
         emit(if self.json { &json } else { &text })?;
-        if apply && !applied {
-            eprintln!("nothing applied: {}", not_applied(&report));
+        match (effects, bundle, apply) {
+            (Some(Ok(effects)), Some(bundle), Some(apply)) => {
+                let version = bundle::apply(&bundle, effects)?;
+                eprintln!(
+                    "{}: version {version}; wade vehicle rollback {} takes it back",
+                    bundle.display(),
+                    report.vehicle
+                );
+                apply.running.reload(&report.vehicle);
+                Ok(ExitCode::SUCCESS)
+            }
+            (Some(Ok(_)), None, _) => {
+                eprintln!("the gap is another simulator's: {}", out.join("effects.toml").display());
+                Ok(ExitCode::SUCCESS)
+            }
+            (Some(Err(why)), ..) => {
+                eprintln!("nothing applied: {why}");
+                Ok(ExitCode::from(u8::from(why != NotApplicable::NothingMissing)))
+            }
+            _ => Ok(ExitCode::SUCCESS),
         }
-        let failed = apply && !applied && report.verdict != Verdict::NothingMissing;
-        Ok(ExitCode::from(u8::from(failed)))
     }
 }
 
-fn not_applied(report: &Report) -> &'static str {
-    match report.verdict {
-        Verdict::NothingMissing => "nothing is missing",
-        Verdict::Named => "no named effect is one of the water",
-        Verdict::Ambiguous => "other effects explain the gap as well",
-        Verdict::NoCandidateFits => "no effect of the library explains the gap",
+fn is_simulated(trials: &Trials) -> bool {
+    trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some))
+}
+
+/// Effects that other trials gave must not go unnoticed because these trials do not show them.
+fn check_loss(effects: &EffectsFile, directory: &Path, replace: bool) -> Result<()> {
+    let Some(before) = bundle::read(directory)?.effects.filter(|_| !replace) else { return Ok(()) };
+    let stays = |name| effects.effects.iter().any(|effect| effect.name == name);
+    let lost: Vec<&str> =
+        before.effects.iter().filter(|effect| !stays(effect.name)).map(|effect| effect.name.name()).collect();
+    if lost.is_empty() || before.evidence.trials_sha256 == effects.evidence.trials_sha256 {
+        return Ok(());
     }
+    bail!(
+        "{}: {} came from other trials ({}), and these do not name it: put all trials into one folder, or take it out with --replace",
+        directory.join("effects.toml").display(),
+        lost.join(" and "),
+        before.evidence.trials.join(", ")
+    )
 }
 
 /// The model's answers with its uncertainty.

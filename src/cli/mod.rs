@@ -8,6 +8,7 @@ mod gap_bench;
 mod predict;
 mod progress;
 mod query;
+mod running;
 mod serve;
 mod soak;
 mod state;
@@ -24,6 +25,7 @@ use clap::{Args, Parser, Subcommand};
 use wade::config::Config;
 use wade::model::Model;
 use wade::model::kernel::Isa;
+use wade::served::ServedVehicle;
 
 /// This program, its version and commit, as reports name it.
 const PROGRAM: &str = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
@@ -117,8 +119,14 @@ impl Vehicles {
         self.directory().join(name)
     }
 
+    /// The model without the effects that were added to it.
     fn model(&self, name: &str) -> Result<Model> {
         Ok(wade::bundle::load(&self.bundle(name), Isa::available()[0])?)
+    }
+
+    /// What a server would serve.
+    fn served(&self, name: &str) -> Result<ServedVehicle> {
+        Ok(wade::bundle::load_served(&self.bundle(name), Isa::available()[0])?)
     }
 }
 

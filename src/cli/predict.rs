@@ -5,17 +5,20 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use wade::forces::Forces;
+use wade::effects::Session;
+use wade::frame::Vec3;
 use wade::model::Model;
-use wade::service::Evaluator;
+use wade::service::wire::State;
+use wade::service::{Evaluated, Evaluator};
 use wade::states::{Row, unknown_columns};
 
 use super::Vehicles;
 
 /// Forces for every row of a table of states
 ///
-/// Columns: vx vy vz and depth; optionally wx wy wz, roll pitch, ax ay az, alx aly alz, rho, in SI units and radians.
-/// Adds fx fy fz mx my mz about the center of mass and in_domain (1 or 0); other columns are kept.
+/// Columns: vx vy vz and depth; optionally wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho, wheel_fl wheel_fr wheel_rl
+/// wheel_rr, in SI units and radians. Adds fx fy fz mx my mz about the center of mass and in_domain (1 or 0); other columns
+/// are kept. Where there is a column t, the rows are one run in time, along which effects remember waves and flooding.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   wade predict --vehicle warthog --states in.csv --out out.csv --per-surface")]
@@ -29,7 +32,7 @@ pub struct Predict {
     /// Table of states with forces
     #[arg(long, value_name = "CSV")]
     out: PathBuf,
-    /// Adds the forces of each surface
+    /// Adds the forces of each surface, with what effects put on it; what they put on the hull as a whole is in the net alone
     #[arg(long)]
     per_surface: bool,
     #[command(flatten)]
@@ -41,7 +44,7 @@ const NET: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
 impl Predict {
     /// Writes the table beside its place and renames it, so that a failure leaves no half of it.
     pub fn run(self) -> Result<ExitCode> {
-        let model = self.vehicles.model(&self.vehicle)?;
+        let vehicle = self.vehicles.served(&self.vehicle)?;
         let states = self.states.display();
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
@@ -51,14 +54,19 @@ impl Predict {
         check_columns(&headers).with_context(|| states.to_string())?;
         let staged = self.out.with_extension("partial");
         let mut writer = csv::Writer::from_path(&staged).with_context(|| staged.display().to_string())?;
-        writer.write_record(headers.iter().map(str::to_owned).chain(self.names(&model)))?;
+        writer.write_record(headers.iter().map(str::to_owned).chain(self.names(vehicle.model())))?;
         let mut evaluator = Evaluator::default();
+        let mut session = headers.iter().any(|header| header == "t").then(Session::default);
+        let mut before: Option<f64> = None;
         for (row, record) in reader.records().enumerate() {
             let at = || format!("{states}, row {}", row + 2);
             let record = record.with_context(at)?;
-            let state = Row::read(&record, &headers).with_context(at)?.state();
-            let evaluated = evaluator.evaluate(&model, &state).with_context(at)?;
-            let added = self.values(evaluated.forces);
+            let row = Row::read(&record, &headers).with_context(at)?;
+            let time_step = time_step(row.t, before, session.is_some()).with_context(at)?;
+            before = row.t;
+            let state = State { time_step, ..row.state() };
+            let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut()).with_context(at)?;
+            let added = self.values(&evaluated);
             writer.write_record(record.iter().map(str::to_owned).chain(added))?;
         }
         writer.flush()?;
@@ -73,14 +81,29 @@ impl Predict {
             .collect()
     }
 
-    fn values(&self, forces: &Forces) -> Vec<String> {
+    fn values(&self, Evaluated { forces, effects, .. }: &Evaluated<'_>) -> Vec<String> {
+        let no_effects = vec![Vec3::zeros(); forces.surfaces.len()];
+        let added = if effects.loads.is_empty() { &no_effects } else { &effects.surface_forces };
         let wrench = forces.wrench.force.iter().chain(forces.wrench.moment.iter()).map(f64::to_string);
         let in_domain = u8::from(forces.outside.is_inside()).to_string();
-        let surfaces = forces.surfaces.iter().filter(|_| self.per_surface);
-        wrench
-            .chain([in_domain])
-            .chain(surfaces.flat_map(|load| load.force.iter().map(f64::to_string)))
-            .collect()
+        let surfaces = forces.surfaces.iter().zip(added).filter(|_| self.per_surface);
+        let forces =
+            surfaces.flat_map(|(load, added)| <[f64; 3]>::from(load.force + added).map(|f| f.to_string()));
+        wrench.chain([in_domain]).chain(forces).collect()
+    }
+}
+
+/// Seconds since the row before; 0 in the first, and where the rows are no run in time.
+fn time_step(t: Option<f64>, before: Option<f64>, is_run: bool) -> Result<f32> {
+    match (t, before) {
+        _ if !is_run => Ok(0.0),
+        (None, _) => bail!("column t is blank: in a run in time every row has one"),
+        (Some(t), Some(before)) if t < before => {
+            bail!(
+                "t = {t} comes after {before}: the rows of a run must be in the order of time; leave t out for single states"
+            )
+        }
+        (Some(t), before) => Ok(before.map_or(0.0, |before| (t - before) as f32)),
     }
 }
 

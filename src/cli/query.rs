@@ -9,6 +9,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use wade::client::{Client, GrpcClient, InProcess, Method, Reply, ShmClient};
+use wade::effects::{BoxQuantity, LeftOut};
 use wade::service::shm::Wait;
 use wade::service::{grpc, shm};
 
@@ -92,9 +93,9 @@ impl Query {
                 return Ok((Client::Shm(Box::new(client)), names.unwrap_or_default()));
             }
             (None, Transport::Inproc) => {
-                let model = self.vehicles.model(vehicle)?;
-                let names = surface_names(&model);
-                return Ok((Client::InProcess(Box::new(InProcess::new(Arc::new(model)))), names));
+                let served = self.vehicles.served(vehicle)?;
+                let names = surface_names(served.model());
+                return Ok((Client::InProcess(Box::new(InProcess::new(Arc::new(served)))), names));
             }
         };
         let names = grpc.vehicle()?.surfaces.into_iter().map(|surface| surface.name).collect();
@@ -117,6 +118,15 @@ fn to_json(vehicle: &str, names: &[String], reply: &Reply) -> Value {
             "force": surface.force,
             "point": surface.point,
             "wetted_fraction": surface.wetted_fraction,
+            "effects_force": reply.effect_surface_forces.get(i).copied().unwrap_or_default(),
+        })
+    });
+    let effects = reply.effects.iter().map(|load| {
+        json!({
+            "name": load.effect.name(),
+            "force": load.force,
+            "moment": load.moment,
+            "left_out": load.left_out.map(LeftOut::name),
         })
     });
     let outside =
@@ -130,9 +140,18 @@ fn to_json(vehicle: &str, names: &[String], reply: &Reply) -> Value {
         "uncertainty": {"force": reply.uncertainty},
         "in_domain": reply.outside.is_inside(),
         "outside": outside.collect::<Vec<_>>(),
-        "effects": [],
+        "effects": effects.collect::<Vec<_>>(),
+        "effects_outside": effects_outside(reply)
+            .map(|(quantity, excess)| json!({"quantity": quantity.name(), "excess": excess}))
+            .collect::<Vec<_>>(),
+        "added_mass": reply.added_mass.map(|matrix| matrix.chunks(6).map(<[f32]>::to_vec).collect::<Vec<_>>()),
         "compute_ns": reply.compute_ns,
     })
+}
+
+/// Where the state lies outside the box in which the effects were seen.
+fn effects_outside(reply: &Reply) -> impl Iterator<Item = (BoxQuantity, f64)> + '_ {
+    BoxQuantity::ALL.into_iter().zip(reply.effects_outside).filter(|(_, excess)| *excess != 0.0)
 }
 
 fn to_table(vehicle: &str, names: &[String], reply: &Reply) -> String {
@@ -149,12 +168,19 @@ fn to_table(vehicle: &str, names: &[String], reply: &Reply) -> String {
         let wet = surface.wetted_fraction * 100.0;
         line(format!("{:<18} {wet:>4.0}% {}", name_of(names, i), row(surface.force)));
     }
+    for load in &reply.effects {
+        let why = load.left_out.map_or_else(String::new, |reason| format!("   left out: {}", reason.name()));
+        line(format!("+ {:<22} {}{why}", load.effect.name(), row(load.force)));
+    }
     line(format!("{:<24} {}", "net force [N]", row(reply.force)));
     line(format!("{:<24} {}", "  +- one std. dev.", row(reply.uncertainty)));
     let about = reply.about.map(|x| format!("{x:.3}")).join(", ");
     line(format!("{:<24} {}   about ({about}) m", "net moment [N m]", row(reply.moment)));
     for (quantity, excess) in reply.outside.iter() {
         line(format!("outside the training domain: {} by {excess:+.4}", quantity.name()));
+    }
+    for (quantity, excess) in effects_outside(reply) {
+        line(format!("outside the box in which the effects were seen: {} by {excess:+.4}", quantity.name()));
     }
     line(format!("computed in {:.1} us", reply.compute_ns as f64 * 1e-3));
     text

@@ -189,11 +189,11 @@ impl Soak {
         let shm = |wait| Ok(Client::Shm(Box::new(ShmClient::new(vehicle, wait, TIMEOUT).in_namespace(at))));
         match self.transport {
             Transport::Inproc => {
-                let model = self.vehicles.model(vehicle).map_err(|error| ClientError::NoServer {
+                let served = self.vehicles.served(vehicle).map_err(|error| ClientError::NoServer {
                     at: "this process".into(),
                     reason: error.to_string(),
                 })?;
-                Ok(Client::InProcess(Box::new(InProcess::new(Arc::new(model)))))
+                Ok(Client::InProcess(Box::new(InProcess::new(Arc::new(served)))))
             }
             Transport::Grpc => tcp(Method::Unary),
             Transport::GrpcStream => tcp(Method::Stream),

@@ -13,10 +13,10 @@ pub struct StateArgs {
     #[arg(long, allow_negative_numbers = true, conflicts_with = "velocity")]
     speed: Option<f32>,
     /// Velocity over ground [m/s]
-    #[arg(long, value_name = "VX,VY,VZ", value_parser = vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "VX,VY,VZ", value_parser = numbers::<3>, allow_hyphen_values = true)]
     velocity: Option<[f32; 3]>,
     /// Angular velocity [rad/s]
-    #[arg(long, value_name = "WX,WY,WZ", value_parser = vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "WX,WY,WZ", value_parser = numbers::<3>, allow_hyphen_values = true)]
     angular: Option<[f32; 3]>,
     /// Water surface above the ground under the vehicle [m]
     #[arg(long, allow_negative_numbers = true)]
@@ -31,17 +31,29 @@ pub struct StateArgs {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pitch: f64,
     /// Velocity of the water over ground, body frame [m/s]
-    #[arg(long, value_name = "CX,CY,CZ", value_parser = vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "CX,CY,CZ", value_parser = numbers::<3>, allow_hyphen_values = true)]
     current: Option<[f32; 3]>,
     /// Acceleration [m/s2]
-    #[arg(long, value_name = "AX,AY,AZ", value_parser = vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "AX,AY,AZ", value_parser = numbers::<3>, allow_hyphen_values = true)]
     acceleration: Option<[f32; 3]>,
     /// Angular acceleration [rad/s2]
-    #[arg(long, value_name = "AX,AY,AZ", value_parser = vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "AX,AY,AZ", value_parser = numbers::<3>, allow_hyphen_values = true)]
     angular_acceleration: Option<[f32; 3]>,
     /// Whether water reaches under the tires
     #[arg(long, value_enum, default_value_t = Contact::Wetted)]
     ground_contact: Contact,
+    /// Angle from the world's x to the vehicle's [rad], for effects that are fixed in the world
+    #[arg(long, allow_negative_numbers = true)]
+    heading: Option<f32>,
+    /// Rate at which the water rises [m/s], for the blow of entering it
+    #[arg(long, allow_negative_numbers = true)]
+    depth_rate: Option<f32>,
+    /// Wheel speeds [rad/s], for the thrust of wheels
+    #[arg(long, value_name = "FL,FR,RL,RR", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    wheel_speeds: Option<[f32; 4]>,
+    /// Leave the force of added mass out, for a caller who integrates with the matrix
+    #[arg(long)]
+    implicit_added_mass: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -65,6 +77,11 @@ impl StateArgs {
             depth: self.depth,
             density: self.density,
             dry_contact: self.ground_contact == Contact::Dry,
+            heading: self.heading,
+            depth_rate: self.depth_rate,
+            wheel_speeds: self.wheel_speeds,
+            time_step: 0.0,
+            implicit_added_mass: self.implicit_added_mass,
         }
     }
 }
@@ -74,9 +91,9 @@ fn gravity(roll: f64, pitch: f64) -> [f32; 3] {
     single(&-up_from_roll_pitch(roll, pitch).into_inner())
 }
 
-/// Three numbers with commas between.
-pub fn vector(text: &str) -> Result<[f32; 3], String> {
+/// So many numbers with commas between.
+fn numbers<const COUNT: usize>(text: &str) -> Result<[f32; COUNT], String> {
     let values: Result<Vec<f32>, _> = text.split(',').map(|number| number.trim().parse()).collect();
-    let values = values.map_err(|error| format!("{error}: three numbers such as 0.5,0,-0.1 are needed"))?;
-    <[f32; 3]>::try_from(values).map_err(|values| format!("{} numbers, three are needed", values.len()))
+    let values = values.map_err(|error| format!("{error}: {COUNT} numbers such as 0.5,0,-0.1 are needed"))?;
+    <[f32; COUNT]>::try_from(values).map_err(|values| format!("{} numbers, {COUNT} are needed", values.len()))
 }

@@ -311,6 +311,10 @@ impl Train {
             else {
                 bail!("{name}: there is no bundle of it");
             };
+            // effects close the gap of the weights that they were fitted to
+            if bundle.effects.take().is_some() {
+                eprintln!("{name}: its effects are taken out with its former weights; run wade gap again");
+            }
             bundle.trained = Some(weights.clone());
             bundle.version += 1;
             bundle::write(&self.data.vehicles.bundle(name), bundle)?;

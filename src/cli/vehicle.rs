@@ -8,9 +8,10 @@ use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use wade::bundle::{self, Bundle};
+use wade::bundle::{self, Bundle, Kept};
 use wade::condition::FRESH_WATER;
 use wade::domain::Quantity;
+use wade::effects::ActiveEffect;
 use wade::frame::WaterPlane;
 use wade::geometry::distance::SignedDistanceGrid;
 use wade::geometry::hydrostatics::hydrostatics;
@@ -18,6 +19,7 @@ use wade::vehicle::build::build_reporting;
 use wade::vehicle::shipped;
 use wade::vehicle::spec::VehicleSpec;
 
+use super::running::Running;
 use super::{Vehicles, bundle_names, emit};
 
 /// Build, check and show vehicle bundles
@@ -25,7 +27,8 @@ use super::{Vehicles, bundle_names, emit};
 #[command(after_help = "Examples:
   wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover
   wade vehicle check vehicles/husky
-  wade vehicle show husky")]
+  wade vehicle show husky
+  wade vehicle rollback husky")]
 pub struct Vehicle {
     #[command(subcommand)]
     command: Command,
@@ -78,6 +81,23 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Put the version before the last wade gap --apply back into its place, or any that was kept
+    ///
+    /// Versions lie in <VEHICLES>/<NAME>.versions. What leaves its place is kept too, so that --to puts it back.
+    #[command(after_help = "Examples:
+  wade vehicle rollback husky
+  wade vehicle rollback husky --to 4")]
+    Rollback {
+        /// Name of the vehicle
+        name: String,
+        /// Version to go to [default: the one before]
+        #[arg(long, value_name = "VERSION")]
+        to: Option<u32>,
+        #[command(flatten)]
+        vehicles: Vehicles,
+        #[command(flatten)]
+        running: Running,
+    },
     /// Dimensions, surfaces, training domain and hydrostatics of a vehicle
     #[command(after_help = "Example: wade vehicle show warthog")]
     Show {
@@ -124,7 +144,15 @@ impl Vehicle {
                     emit(&names.iter().map(|name| format!("{name}\n")).collect::<String>())?;
                 }
             }
-            Command::Show { name, vehicles, json } => show(&bundle::read(&vehicles.bundle(&name))?, json)?,
+            Command::Rollback { name, to, vehicles, running } => {
+                let version = bundle::roll_back(&vehicles.bundle(&name), to)?;
+                println!("{name}: version {version} is in its place again");
+                running.reload(&name);
+            }
+            Command::Show { name, vehicles, json } => {
+                let directory = vehicles.bundle(&name);
+                show(&bundle::read(&directory)?, &bundle::kept(&directory)?, json)?;
+            }
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -151,7 +179,8 @@ fn build(spec_text: &str, spec_path: &Path, stl: &[u8], out: &Path, seal: bool) 
     })?;
     bar.finish_and_clear();
     let vehicle_translation = vehicle.translation;
-    let bundle = Bundle { vehicle, version, trained: None, distance, spec: Some(spec_text.to_owned()) };
+    let bundle =
+        Bundle { vehicle, version, trained: None, effects: None, distance, spec: Some(spec_text.to_owned()) };
     bundle::write(out, &bundle)?;
     let t = vehicle_translation;
     println!("{}: version {version}, no weights yet", out.display());
@@ -176,7 +205,7 @@ fn check(directory: &Path, as_json: bool) -> ExitCode {
 /// Depths at which hydrostatics are shown, as shares of the height.
 const SHOWN_DEPTHS: [f64; 4] = [0.15, 0.30, 0.45, 0.60];
 
-fn show(bundle: &Bundle, as_json: bool) -> Result<()> {
+fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     let vehicle = &bundle.vehicle;
     let lift = SHOWN_DEPTHS.map(|share| {
         let depth = share * vehicle.dimensions.height;
@@ -189,6 +218,7 @@ fn show(bundle: &Bundle, as_json: bool) -> Result<()> {
     let provenance = bundle.trained.as_ref().map(|(weights, _)| weights.provenance.as_str());
     let ranges = || Quantity::ALL.into_iter().filter_map(|q| Some((q.name(), domain?.range(q)?)));
     let d = &vehicle.dimensions;
+    let effects: Vec<&ActiveEffect> = bundle.effects.iter().flat_map(|file| &file.effects).collect();
     if as_json {
         let surfaces = vehicle.surfaces.iter().map(|s| {
             json!({"name": s.name, "kind": s.kind, "centroid_m": s.centroid.as_slice(),
@@ -201,6 +231,9 @@ fn show(bundle: &Bundle, as_json: bool) -> Result<()> {
             "faces": vehicle.hull.mesh.faces.len(), "surfaces": surfaces.collect::<Vec<_>>(),
             "domain": ranges().map(|(name, range)| (name.to_owned(), json!([range.min, range.max])))
                 .collect::<serde_json::Map<_, _>>(),
+            "effects": effects,
+            "kept": kept.iter().map(|kept| json!({"version": kept.version, "effects": kept.effects}))
+                .collect::<Vec<_>>(),
             "hydrostatics": lift.map(|(depth, force)| json!({"depth_m": depth, "fz_n": force})),
         });
         return emit(&format!("{document:#}\n"));
@@ -234,6 +267,17 @@ fn show(bundle: &Bundle, as_json: bool) -> Result<()> {
     }
     for (name, range) in ranges() {
         line(format!("trained for {name:<20} {:.4} to {:.4}", range.min, range.max));
+    }
+    for effect in effects {
+        line(format!("effect {}: {}", effect.name.name(), effect.equation));
+        for (name, p) in &effect.parameters {
+            let unit = if p.unit == "1" { "" } else { &p.unit };
+            line(format!("  {name:<16} {:.4} +- {:.4} {unit}", p.value, p.std));
+        }
+    }
+    for kept in kept {
+        let effects = if kept.effects.is_empty() { "no effects".into() } else { kept.effects.join(", ") };
+        line(format!("kept: version {}, {effects}", kept.version));
     }
     for (depth, force) in lift {
         line(format!("lift at rest in fresh water, {depth:.3} m deep: {force:.1} N"));

@@ -9,9 +9,11 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Request, Status, Streaming};
 
-use super::{ClientError, Reply, SurfaceReply};
+use super::{ClientError, EffectReply, Reply, SurfaceReply};
 use crate::domain::{Domain, Outside, Quantity, Range};
+use crate::effects::{BoxQuantity, Effect, LeftOut, OutsideBox};
 use crate::service::proto;
+use crate::service::proto::admin_client::AdminClient;
 use crate::service::proto::hydrodynamics_client::HydrodynamicsClient;
 use crate::service::wire::State;
 
@@ -127,7 +129,7 @@ impl GrpcClient {
 
     /// The forces in each state of a batch.
     pub fn evaluate_batch(&mut self, states: &[State]) -> Result<proto::EvaluateBatchResponse, ClientError> {
-        if states.windows(2).any(|pair| pair[0].dry_contact != pair[1].dry_contact) {
+        if states.windows(2).any(|pair| shared(&pair[0]) != shared(&pair[1])) {
             return Err(ClientError::MixedBatch);
         }
         let request = self.request(batch_message(&self.vehicle, states));
@@ -185,6 +187,23 @@ impl GrpcClient {
     }
 }
 
+/// Asks the server at a URL, `http://HOST:PORT` or `unix:PATH`, to read a vehicle's bundle again.
+pub fn reload(url: &str, vehicle: &str, timeout: Duration) -> Result<Vec<proto::Reloaded>, ClientError> {
+    let no_server = |reason: String| ClientError::NoServer { at: url.to_owned(), reason };
+    let failed = |error: &dyn std::error::Error| no_server(chain(error));
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|error| failed(&error))?;
+    let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| failed(&error))?;
+    runtime.block_on(async {
+        let endpoint = endpoint.connect_timeout(timeout).timeout(timeout);
+        let mut client = AdminClient::new(endpoint.connect().await.map_err(|error| failed(&error))?);
+        let request = proto::ReloadRequest { vehicle: vehicle.to_owned() };
+        let response =
+            client.reload(request).await.map_err(|status| no_server(status.message().to_owned()))?;
+        Ok(response.into_inner().vehicles)
+    })
+}
+
 async fn open(client: &mut HydrodynamicsClient<Channel>) -> Result<Open, Status> {
     let (requests, outgoing) = mpsc::channel(1);
     let answers = client.stream(ReceiverStream::new(outgoing)).await?.into_inner();
@@ -209,6 +228,11 @@ fn message(state: &State) -> proto::State {
         density_kgpm3: Some(state.density),
         attitude: Some(proto::state::Attitude::GravityDirection(proto::Vector3 { x, y, z })),
         ground_contact: ground_contact(state).into(),
+        heading_rad: state.heading,
+        depth_rate_mps: state.depth_rate,
+        wheel_speed_radps: state.wheel_speeds.map_or_else(Vec::new, Vec::from),
+        time_step_s: state.time_step,
+        implicit_added_mass: state.implicit_added_mass,
     }
 }
 
@@ -216,7 +240,13 @@ fn ground_contact(state: &State) -> proto::GroundContact {
     if state.dry_contact { proto::GroundContact::Dry } else { proto::GroundContact::Wetted }
 }
 
-/// A batch has one ground contact for all: that of its first state.
+/// What the states of a batch have in common: the message carries it once, or not at all.
+fn shared(state: &State) -> [bool; 5] {
+    let State { heading, depth_rate, wheel_speeds, .. } = state;
+    let given = [heading.is_some(), depth_rate.is_some(), wheel_speeds.is_some()];
+    [state.dry_contact, state.implicit_added_mass, given[0], given[1], given[2]]
+}
+
 fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateBatchRequest {
     let rows = |row: fn(&State) -> [f32; 3]| states.iter().flat_map(row).collect();
     proto::EvaluateBatchRequest {
@@ -231,6 +261,10 @@ fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateBatchRequest
         gravity_direction: rows(|s| s.gravity),
         ground_contact: states.first().map_or(proto::GroundContact::Unspecified, ground_contact).into(),
         omit_surfaces: false,
+        heading_rad: states.iter().filter_map(|s| s.heading).collect(),
+        depth_rate_mps: states.iter().filter_map(|s| s.depth_rate).collect(),
+        wheel_speed_radps: states.iter().filter_map(|s| s.wheel_speeds).flatten().collect(),
+        implicit_added_mass: states.first().is_some_and(|s| s.implicit_added_mass),
     }
 }
 
@@ -251,6 +285,10 @@ impl From<proto::EvaluateResponse> for Reply {
             about: vector(wrench.about_m),
             uncertainty: vector(response.uncertainty_n),
             outside: outside(response.outside.iter()),
+            effects: response.effects.iter().filter_map(effect).collect(),
+            effect_surface_forces: response.effect_surface_force_n.as_chunks::<3>().0.to_vec(),
+            effects_outside: outside_box(response.effects_outside.iter()),
+            added_mass: response.added_mass.as_slice().try_into().ok(),
             compute_ns: response.compute_ns,
         }
     }
@@ -262,6 +300,16 @@ pub fn replies(response: proto::EvaluateBatchResponse) -> Vec<Reply> {
     let surface_count = response.wetted_fraction.len() / states.max(1);
     let about = response.about_m.map_or([0.0; 3], |v| [v.x, v.y, v.z]);
     let row = |values: &[f32], i: usize| values.as_chunks::<3>().0.get(i).copied().unwrap_or_default();
+    let effect_count = response.effects.len();
+    let effect = |state: usize, number: usize| {
+        let at = state * effect_count + number;
+        Some(EffectReply {
+            effect: Effect::from_code(*response.effects.get(number)? as u32)?,
+            force: row(&response.effect_force_n, at),
+            moment: row(&response.effect_moment_nm, at),
+            left_out: LeftOut::from_code(*response.effect_left_out.get(at)? as u32),
+        })
+    };
     let reply = |i: usize| {
         let (from, to) = (i * surface_count, (i + 1) * surface_count);
         Reply {
@@ -277,6 +325,15 @@ pub fn replies(response: proto::EvaluateBatchResponse) -> Vec<Reply> {
             about,
             uncertainty: row(&response.uncertainty_n, i),
             outside: outside(response.outside.iter().filter(|outside| outside.index as usize == i)),
+            effects: (0..effect_count).filter_map(|number| effect(i, number)).collect(),
+            effect_surface_forces: match effect_count {
+                0 => Vec::new(),
+                _ => response.effect_surface_force_n.as_chunks::<3>().0[from..to].to_vec(),
+            },
+            effects_outside: outside_box(
+                response.effects_outside.iter().filter(|outside| outside.index as usize == i),
+            ),
+            added_mass: response.added_mass.as_chunks::<36>().0.get(i).copied(),
             compute_ns: response.compute_ns,
         }
     };
@@ -286,6 +343,26 @@ pub fn replies(response: proto::EvaluateBatchResponse) -> Vec<Reply> {
 fn surfaces(forces: &[f32], points: &[f32], wetted: &[f32]) -> Vec<SurfaceReply> {
     let rows = forces.as_chunks::<3>().0.iter().zip(points.as_chunks::<3>().0).zip(wetted);
     rows.map(|((&force, &point), &wetted_fraction)| SurfaceReply { force, point, wetted_fraction }).collect()
+}
+
+fn effect(load: &proto::EffectLoad) -> Option<EffectReply> {
+    let vector = |v: &Option<proto::Vector3>| v.as_ref().map_or([0.0; 3], |v| [v.x, v.y, v.z]);
+    Some(EffectReply {
+        effect: Effect::from_code(load.effect as u32)?,
+        force: vector(&load.force_n),
+        moment: vector(&load.moment_nm),
+        left_out: LeftOut::from_code(load.left_out as u32),
+    })
+}
+
+fn outside_box<'a>(entries: impl Iterator<Item = &'a proto::EffectOutside>) -> OutsideBox {
+    let mut outside = OutsideBox::default();
+    for entry in entries {
+        if let Some(place) = BoxQuantity::ALL.into_iter().position(|q| q as i32 == entry.quantity) {
+            outside[place] = entry.excess.into();
+        }
+    }
+    outside
 }
 
 fn outside<'a>(entries: impl Iterator<Item = &'a proto::Outside>) -> Outside {

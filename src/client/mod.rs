@@ -6,15 +6,15 @@ mod shm;
 use std::sync::Arc;
 use std::time::Duration;
 
-pub use grpc::{GrpcClient, Method};
+pub use grpc::{GrpcClient, Method, reload};
 pub use shm::ShmClient;
 
 use crate::domain::Outside;
-use crate::forces::Forces;
-use crate::model::Model;
-use crate::service::Evaluator;
-use crate::service::grpc::single;
+use crate::effects::{Effect, LeftOut, OutsideBox, Session};
+use crate::served::ServedVehicle;
+use crate::service::grpc::{added_mass, single};
 use crate::service::wire::{InvalidState, State};
+use crate::service::{Evaluated, Evaluator};
 
 /// Why a call got no forces.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -41,8 +41,10 @@ pub enum ClientError {
     /// The state is wrong.
     #[error(transparent)]
     Invalid(#[from] InvalidState),
-    /// A batch with both ground contacts, of which the message carries one.
-    #[error("the states of a batch must have the same ground contact")]
+    /// A batch of states that differ in what the message carries once.
+    #[error(
+        "the states of a batch must agree in ground contact, in implicit added mass, and in what is given of heading, depth rate and wheel speeds"
+    )]
     MixedBatch,
     /// A batch longer than the transport carries.
     #[error("a batch of {len}, the limit of this transport is {limit}")]
@@ -65,6 +67,19 @@ pub struct SurfaceReply {
     pub wetted_fraction: f32,
 }
 
+/// The load of an effect as it travels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectReply {
+    /// Which.
+    pub effect: Effect,
+    /// Force, body frame [N].
+    pub force: [f32; 3],
+    /// Moment [N m] about the reference point of the reply.
+    pub moment: [f32; 3],
+    /// Why it is zero, where it was left out.
+    pub left_out: Option<LeftOut>,
+}
+
 /// An answer as it travels: the same bits whatever the transport.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reply {
@@ -84,12 +99,21 @@ pub struct Reply {
     pub uncertainty: [f32; 3],
     /// How far each quantity lies outside the training domain.
     pub outside: Outside,
+    /// The effects that were added to the model; with the surfaces they sum to the net wrench.
+    pub effects: Vec<EffectReply>,
+    /// Share of the effects' forces that acts on each surface [N], a part of `effects`; empty where there are none.
+    pub effect_surface_forces: Vec<[f32; 3]>,
+    /// How far the state lies outside the box in which the effects were seen.
+    pub effects_outside: OutsideBox,
+    /// Added mass and inertia by rows, forces first [kg, kg m, kg m2], where there is such an effect.
+    pub added_mass: Option<[f32; 36]>,
     /// The server's own time [ns].
     pub compute_ns: u64,
 }
 
 impl Reply {
-    fn new(model: &Model, forces: &Forces, compute_ns: u64) -> Self {
+    fn new(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> Self {
+        let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
         let surface = |load: &crate::forces::SurfaceForce| SurfaceReply {
             force: single(&load.force),
             point: single(&load.point),
@@ -104,34 +128,56 @@ impl Reply {
             about: single(&model.vehicle().center_of_mass),
             uncertainty: single(&forces.uncertainty),
             outside: Outside { excess: forces.outside.excess.map(|excess| f64::from(excess as f32)) },
-            compute_ns,
+            effects: effects.loads.iter().map(EffectReply::from).collect(),
+            effect_surface_forces: effects.surface_forces.iter().map(single).collect(),
+            effects_outside: effects.outside.map(|excess| f64::from(excess as f32)),
+            added_mass: added_mass(effects),
+            compute_ns: *compute_ns,
         }
     }
 }
 
-/// A model in this process.
+impl From<&crate::effects::EffectLoad> for EffectReply {
+    fn from(load: &crate::effects::EffectLoad) -> Self {
+        Self {
+            effect: load.effect,
+            force: single(&load.wrench.force),
+            moment: single(&load.wrench.moment),
+            left_out: load.left_out,
+        }
+    }
+}
+
+/// A vehicle in this process.
 #[derive(Debug)]
 pub struct InProcess {
-    model: Arc<Model>,
+    vehicle: Arc<ServedVehicle>,
     evaluator: Evaluator,
+    session: Option<Session>,
 }
 
 impl InProcess {
-    /// Asks this model.
-    pub fn new(model: Arc<Model>) -> Self {
-        Self { model, evaluator: Evaluator::default() }
+    /// Asks this vehicle; each state by itself.
+    pub fn new(vehicle: Arc<ServedVehicle>) -> Self {
+        Self { vehicle, evaluator: Evaluator::default(), session: None }
+    }
+
+    /// Takes the states for a run, one after the other, so that effects remember.
+    pub fn in_session(self) -> Self {
+        Self { session: Some(Session::default()), ..self }
     }
 
     /// The forces in one state.
     pub fn evaluate(&mut self, state: &State) -> Result<Reply, ClientError> {
-        let evaluated = self.evaluator.evaluate(&self.model, state)?;
-        Ok(Reply::new(&self.model, evaluated.forces, evaluated.compute_ns))
+        let evaluated = self.evaluator.evaluate(&self.vehicle, state, self.session.as_mut())?;
+        Ok(Reply::new(&self.vehicle, &evaluated))
     }
 
     fn compute(&mut self, states: &[State]) -> Result<u64, ClientError> {
-        states
-            .iter()
-            .try_fold(0, |ns, state| Ok(ns + self.evaluator.evaluate(&self.model, state)?.compute_ns))
+        let Self { vehicle, evaluator, session } = self;
+        states.iter().try_fold(0, |ns, state| {
+            Ok(ns + evaluator.evaluate(vehicle, state, session.as_mut())?.compute_ns)
+        })
     }
 }
 

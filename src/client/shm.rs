@@ -11,10 +11,12 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::port_name::PortName;
 use iceoryx2::prelude::{ZeroCopySend, ipc};
 
-use super::{ClientError, Reply, SurfaceReply};
+use super::{ClientError, EffectReply, Reply, SurfaceReply};
+use crate::effects::{Effect, LeftOut};
 use crate::service::shm::{self, ShmError, Wait};
 use crate::service::shm_layout::{
-    Answer, BatchAnswer, BatchHeader, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, Status, wake_name,
+    Answer, BatchAnswer, BatchHeader, BatchQuery, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query,
+    SERVER_POLLS, Status, wake_name,
 };
 use crate::service::wire::State;
 use crate::vehicle::MAX_SURFACES;
@@ -30,6 +32,7 @@ pub struct ShmClient {
     wait: Wait,
     timeout: Duration,
     sequence: u64,
+    session: u64,
     link: Option<Link>,
 }
 
@@ -48,7 +51,12 @@ impl ShmClient {
     /// A client that connects with its first call. `timeout` bounds each call [s].
     pub fn new(vehicle: &str, wait: Wait, timeout: Duration) -> Self {
         let names = Names::new(shm::NAMESPACE);
-        Self { names, vehicle: vehicle.to_owned(), wait, timeout, sequence: 0, link: None }
+        Self { names, vehicle: vehicle.to_owned(), wait, timeout, sequence: 0, session: 0, link: None }
+    }
+
+    /// Takes the states from now on for a run of this number, one after the other, so that effects remember; 0 for none.
+    pub fn in_session(self, session: u64) -> Self {
+        Self { session, ..self }
     }
 
     /// Asks the server of another namespace than the default.
@@ -58,9 +66,10 @@ impl ShmClient {
 
     /// The forces in one state.
     pub fn evaluate(&mut self, state: &State) -> Result<Answer, ClientError> {
+        let session = self.session;
         let answer = self.exchange(|link, sequence, deadline| {
             let wake_key = link.wake_key();
-            let query = Query { sequence, wake_key, ..Query::from(state) };
+            let query = Query { sequence, wake_key, session, ..Query::from(state) };
             let pending = link.single.send_copy(query).map_err(|error| link.lost(&error))?;
             link.notify();
             let taken = || pending.receive().map(|response| response.map(|response| *response));
@@ -96,7 +105,7 @@ impl ShmClient {
         }
         let mut queries = Box::new([Query::default(); MAX_BATCH]);
         for (query, state) in queries.iter_mut().zip(states) {
-            *query = Query::from(state);
+            *query = Query { session: self.session, ..Query::from(state) };
         }
         self.exchange(|link, sequence, deadline| {
             let header = BatchHeader { sequence, wake_key: link.wake_key(), count: len as u32, reserved: 0 };
@@ -261,15 +270,31 @@ impl From<&Answer> for Reply {
             point: answer.surface_point_m[i],
             wetted_fraction: answer.wetted_fraction[i],
         };
+        let effect = |slot: &EffectAnswer| {
+            Some(EffectReply {
+                effect: Effect::from_code(slot.effect)?,
+                force: slot.force_n,
+                moment: slot.moment_nm,
+                left_out: LeftOut::from_code(slot.left_out),
+            })
+        };
+        let surface_count = (answer.surface_count as usize).min(MAX_SURFACES);
         Self {
             version: answer.bundle_version,
             provenance: answer.provenance().to_owned(),
-            surfaces: (0..(answer.surface_count as usize).min(MAX_SURFACES)).map(surface).collect(),
+            surfaces: (0..surface_count).map(surface).collect(),
             force: answer.force_n,
             moment: answer.moment_nm,
             about: answer.about_m,
             uncertainty: answer.uncertainty_n,
             outside: answer.outside(),
+            effects: answer.effects.iter().take(answer.effect_count as usize).filter_map(effect).collect(),
+            effect_surface_forces: match answer.effect_count {
+                0 => Vec::new(),
+                _ => answer.effect_surface_force_n[..surface_count].to_vec(),
+            },
+            effects_outside: answer.effects_outside.map(f64::from),
+            added_mass: (answer.flags & HAS_ADDED_MASS != 0).then_some(answer.added_mass),
             compute_ns: answer.compute_ns,
         }
     }

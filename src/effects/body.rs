@@ -3,6 +3,7 @@
 use super::hydrotable::Hydrotable;
 use super::immersion::{Immersion, WetPanel};
 use crate::condition::Condition;
+use crate::forces::SurfaceForce;
 use crate::frame::{Vec3, WaterPlane};
 use crate::vehicle::{SurfaceKind, Vehicle};
 
@@ -27,9 +28,14 @@ impl Panel {
     /// Four points of equal weight with the first and second moments of the wet part of the panel, which is as wide as
     /// the panel and as high as its share.
     pub fn points(&self, wet: &WetPanel) -> [Vec3; 4] {
-        let s = Vec3::new(self.spread.x, self.spread.y, self.spread.z * wet.fraction);
+        let s = self.wet_spread(wet);
         [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]
             .map(|(x, y, z)| wet.point + Vec3::new(x * s.x, y * s.y, z * s.z))
+    }
+
+    /// Spread of the wet part about its centroid, one standard deviation [m].
+    pub fn wet_spread(&self, wet: &WetPanel) -> Vec3 {
+        Vec3::new(self.spread.x, self.spread.y, self.spread.z * wet.fraction)
     }
 
     /// Area that meets the flow along each axis [m2]: the side that looks ahead, and always the bottom, since the top of
@@ -152,6 +158,17 @@ impl Body {
                 immerse_box(block, *height, self.z0, &plane, out);
             }
         }
+    }
+
+    /// The same where a model has found the wet part of each surface already.
+    pub fn immerse_as(&self, condition: &Condition, surfaces: &[SurfaceForce], out: &mut Immersion) {
+        let Hull::Mesh { table, .. } = &self.hull else { return self.immerse(condition, out) };
+        out.depth = condition.depth.max(0.0);
+        out.panels.clear();
+        let wet =
+            |surface: &SurfaceForce| WetPanel { fraction: surface.wetted_fraction, point: surface.point };
+        out.panels.extend(surfaces.iter().map(wet));
+        table.immerse(&condition.water_plane(self.z0), out);
     }
 
     /// True where the wheels' places and sizes are known, not assumed.

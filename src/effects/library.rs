@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 /// Most coefficients of one effect.
 pub const MAX_COEFFICIENTS: usize = 7;
 
+/// Physical effects in the library: the most that a model can have.
+pub const PHYSICS: usize = 14;
+
 /// Nonlinear parameters of an effect; those it has none for are 0.
 pub type Shape = [f64; 3];
 
@@ -20,7 +23,7 @@ pub enum Kind {
     Drive,
 }
 
-/// A named reason why a model and a measurement disagree.
+/// A named reason why a model and a measurement disagree. The place in this list is the wire's, see [`Effect::code`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Effect {
@@ -149,6 +152,43 @@ impl Effect {
             Self::RollingResistance => "rolling_resistance",
             Self::DriveGain => "drive_gain",
             Self::MassError => "mass_error",
+        }
+    }
+
+    /// Number on the wire, from 1; new effects come last.
+    pub fn code(self) -> u32 {
+        self as u32 + 1
+    }
+
+    /// The effect of a number of the wire.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|effect| effect.code() == code)
+    }
+
+    /// Equation of a physical effect in a line, without what is common to all: loads act on the wet hull.
+    pub fn equation(self) -> &'static str {
+        match self {
+            Self::AddedMass => {
+                "W = -(M_A nu_dot + C_A(nu) nu), M_A = rho V diag(surge, sway, heave, roll (b2+d2)/12, pitch (l2+d2)/12, yaw (l2+b2)/12)"
+            }
+            Self::LinearDamping => "f_i = -c_i rho sqrt(g L) A_i u_i, u = v + omega x r",
+            Self::DragCoefficientError => "f_i = -1/2 rho C_i A_i |v| v_i",
+            Self::Rotation => "f = D(v + omega x r) - D(v), D_i(u) = -1/2 rho C A_i |u| u_i",
+            Self::Current => "f = D(v - R^T u) - D(v) with the model's drag D",
+            Self::WaterLevelOffset => {
+                "W = offset dF/dd: rho g A_wp upwards, and the model's drag in proportion to the depth"
+            }
+            Self::DensityError => "W = e W_model",
+            Self::HullFlooding => {
+                "W = -phi rho g V h_in / h_out upwards, dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)"
+            }
+            Self::WaterEntrySlamming => "F = -C rho (dV/dt)+ u, on entry only",
+            Self::WaveMemory => "F = -k rho V Re z, z' = -(1/T - i W) z + motion",
+            Self::ChannelBlockage => "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d)",
+            Self::Squat => "Fz = -c 1/2 rho v^2 A_wp g(Fr_h), and a trim",
+            Self::WheelPaddleThrust => "F = 1/2 rho C A |omega r| (omega r - v_x) on each wet wheel",
+            Self::BedMotion => "F = 1/2 rho A |v_g| (-C_D v_g + C_L |v_g| up)",
+            _ => "",
         }
     }
 
@@ -305,6 +345,10 @@ mod tests {
             let coefficients = effect.coefficients();
             assert!((1..=MAX_COEFFICIENTS).contains(&coefficients.len()));
             assert!(coefficients.iter().all(|c| c.bounds[0] < c.bounds[1] && c.bounds[0] <= 0.0));
+            assert_eq!(Effect::from_code(effect.code()), Some(effect));
+            assert_eq!(effect.equation().is_empty(), effect.kind() != Kind::Physics);
         }
+        let physics = Effect::ALL.into_iter().filter(|effect| effect.kind() == Kind::Physics);
+        assert_eq!(physics.count(), PHYSICS);
     }
 }

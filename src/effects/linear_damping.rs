@@ -11,19 +11,71 @@ use crate::wrench::Wrench;
 
 pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let scale = input.condition.density * (GRAVITY * input.body.length).sqrt();
+    let omega = input.condition.angular_velocity;
     for (index, panel) in input.body.panels.iter().enumerate() {
         let part = &input.immersion.panels[index];
-        let wet = part.fraction;
-        if wet == 0.0 {
+        if part.fraction == 0.0 {
             continue;
         }
-        let area = (panel.facing_plus + panel.facing_minus) * (0.25 * wet * scale);
-        for point in panel.points(part) {
-            let u = input.local_velocity(&point);
-            for axis in 0..3 {
-                let force = Vec3::ith(axis, -area[axis] * u[axis]);
-                emit(axis, Part::Panel(index), input.at(force, &point));
+        let area = (panel.facing_plus + panel.facing_minus) * (part.fraction * scale);
+        let u = input.local_velocity(&part.point);
+        let variance = panel.wet_spread(part).map(|spread| spread * spread);
+        for axis in 0..3 {
+            let mut load = input.at(Vec3::ith(axis, -area[axis] * u[axis]), &part.point);
+            // velocity and lever both vary linearly over the panel: the second moments of its area give the rest exactly
+            let turned =
+                Vec3::from_fn(|i, _| if i == axis { 0.0 } else { omega[i] * variance[3 - axis - i] });
+            load.moment -= turned * area[axis];
+            emit(axis, Part::Panel(index), load);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::condition::Condition;
+    use crate::effects::{Body, Immersion};
+    use crate::vehicle::shipped;
+
+    #[test]
+    fn second_moments_give_what_four_points_give() {
+        let body = Body::of_vehicle(&shipped::husky().unwrap().vehicle().unwrap());
+        let condition = Condition {
+            angular_velocity: Vec3::new(0.3, -0.5, 0.8),
+            ..Condition::level(Vec3::new(0.4, -0.2, 0.1), 0.17)
+        };
+        let mut immersion = Immersion::default();
+        body.immerse(&condition, &mut immersion);
+        let input = Input {
+            body: &body,
+            condition: &condition,
+            immersion: &immersion,
+            predicted: Wrench::default(),
+            base_drag: Vec3::zeros(),
+            yaw: 0.0,
+            wetting_rate: 0.0,
+            channel_width: None,
+            wheel_speeds: [None; 4],
+        };
+        let mut found = [Wrench::default(); 3];
+        basis(&input, &mut |axis, _, load| found[axis] += load);
+        let scale = 1000.0 * (GRAVITY * body.length).sqrt();
+        let mut expected = [Wrench::default(); 3];
+        for (panel, part) in body.panels.iter().zip(&immersion.panels) {
+            let area = (panel.facing_plus + panel.facing_minus) * (0.25 * part.fraction * scale);
+            for point in panel.points(part) {
+                let u = input.local_velocity(&point);
+                for (axis, sum) in expected.iter_mut().enumerate() {
+                    *sum += input.at(Vec3::ith(axis, -area[axis] * u[axis]), &point);
+                }
             }
+        }
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found.force - expected.force).norm() < 1e-9 * (1.0 + expected.force.norm()));
+            assert!((found.moment - expected.moment).norm() < 1e-9 * (1.0 + expected.moment.norm()));
+            assert!(expected.moment.norm() > 0.1);
         }
     }
 }

@@ -7,11 +7,13 @@
 //! fitted values. Nothing here allocates once a [`Body`] is prepared. Hydrostatics (E1) lies in `geometry::hydrostatics`.
 //!
 //! Reading order: `library` (names, coefficients, bounds), `body` (what an effect needs to know of a hull), `immersion`
-//! (where the water reaches), `input` (a state), then the effects.
+//! (where the water reaches), `input` (a state), then the effects. `file` is `effects.toml`, `validity` the box in which they
+//! were seen, `active` the request path.
 
 pub mod form_drag;
 pub mod skin_friction;
 
+mod active;
 mod added_mass;
 mod bed_motion;
 mod body;
@@ -19,6 +21,7 @@ mod channel_blockage;
 mod current;
 mod density_error;
 mod drag_coefficient_error;
+mod file;
 mod hull_flooding;
 mod hydrotable;
 mod immersion;
@@ -27,17 +30,21 @@ mod library;
 mod linear_damping;
 mod rotation;
 mod squat;
+mod validity;
 mod water_entry_slamming;
 mod water_level_offset;
 mod wave_memory;
 mod wheel_paddle_thrust;
 
+pub use active::{ActiveEffects, Circumstances, EffectLoad, EffectLoads, LeftOut, Session};
 pub use added_mass::{coefficients as added_mass_coefficients, matrix as added_mass_matrix};
 pub use body::{Block, Body, Panel};
+pub use file::{ActiveEffect, EffectsFile, EffectsFileError, Evidence, ParameterValue};
 pub use hull_flooding::level_after;
 pub use immersion::{Immersion, WetPanel};
 pub use input::{BaseDrag, Input, Memory, Part};
-pub use library::{Coefficient, Effect, Kind, MAX_COEFFICIENTS, Shape};
+pub use library::{Coefficient, Effect, Kind, MAX_COEFFICIENTS, PHYSICS, Shape};
+pub use validity::{BoxQuantity, OutsideBox, Validity};
 
 use crate::wrench::Wrench;
 

@@ -1,96 +1,105 @@
-//! The physical effects of a report as the text of `effects.toml`.
+//! The physical effects of a report as `effects.toml`.
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
-
 use super::report::{NamedEffect, Report, Verdict};
-use crate::effects::Kind;
+use crate::effects::{ActiveEffect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
+use crate::trials::Trials;
 
-/// Version of the file's format.
-const FORMAT: u32 = 1;
-
-#[derive(Serialize)]
-struct File<'a> {
-    format: u32,
-    vehicle: &'a str,
-    verdict: Verdict,
-    sources: Source<'a>,
-    /// Ranges of the trials, outside which an effect is clamped and flagged.
-    validity: &'a BTreeMap<&'static str, [f64; 2]>,
-    effect: Vec<Entry<'a>>,
+/// Why nothing of a report may be added to a model.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotApplicable {
+    /// There is no gap.
+    #[error("nothing is missing")]
+    NothingMissing,
+    /// A gap without a name.
+    #[error("no effect of the library explains the gap")]
+    NoCandidateFits,
+    /// More than one name.
+    #[error(
+        "other effects explain the gap as well; record the trial that tells them apart, and run again with it"
+    )]
+    Ambiguous,
+    /// Sensors and drive alone.
+    #[error("no named effect is one of the water")]
+    NotPhysics,
+    /// Seen in one condition only.
+    #[error(
+        "{effects} was seen in one condition only: record another, or take it as it is with --provisional"
+    )]
+    Provisional {
+        /// Names of the effects.
+        effects: String,
+    },
 }
 
-#[derive(Serialize)]
-struct Source<'a> {
-    trials_sha256: &'a str,
-    model_sha256: &'a str,
-    tool: &'a str,
-    trials: usize,
-    samples: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    generated: Option<&'a str>,
+/// The physical effects of a report: coefficients, units, standard errors, covariance, the ranges in which they were seen,
+/// and the hashes of what they rest on. Faults of sensors and drive are never in it. What was seen in one condition only is
+/// in it where that is asked for. The hash of the weights is left to whoever puts it into a bundle.
+pub fn effects_file(
+    report: &Report,
+    trials: &Trials,
+    with_provisional: bool,
+) -> Result<EffectsFile, NotApplicable> {
+    match report.verdict {
+        Verdict::Named => {}
+        Verdict::NothingMissing => return Err(NotApplicable::NothingMissing),
+        Verdict::NoCandidateFits => return Err(NotApplicable::NoCandidateFits),
+        Verdict::Ambiguous => return Err(NotApplicable::Ambiguous),
+    }
+    let physical: Vec<&NamedEffect> = report.effects.iter().filter(|e| e.kind == Kind::Physics).collect();
+    if physical.is_empty() {
+        return Err(NotApplicable::NotPhysics);
+    }
+    let provisional: Vec<&str> = physical.iter().filter(|e| e.provisional).map(|e| e.name).collect();
+    if !provisional.is_empty() && !with_provisional {
+        return Err(NotApplicable::Provisional { effects: provisional.join(" and ") });
+    }
+    let effects = physical.into_iter().map(|effect| active(effect, report, trials)).collect();
+    Ok(EffectsFile::new(report.vehicle.clone(), evidence(report, trials), validity(report), effects))
 }
 
-#[derive(Serialize)]
-struct Entry<'a> {
-    name: &'a str,
-    provisional: bool,
-    share_of_gap: f64,
-    /// Nonlinear parameters in the order of the effect's file.
-    shape: [f64; 3],
-    /// Names of the coefficients, in the order of the covariance.
-    coefficients: &'a [&'static str],
-    values: Vec<f64>,
-    standard_errors: Vec<f64>,
-    units: Vec<&'static str>,
-    covariance: &'a [Vec<f64>],
-    /// Drag of the model that the effect scales with, along x, y, z.
-    base_drag: [f64; 3],
-}
-
-impl Report {
-    /// True where there is something to add to a model: physics, named without a rival.
-    pub fn is_applicable(&self) -> bool {
-        self.verdict == Verdict::Named && self.effects.iter().any(|effect| effect.kind == Kind::Physics)
+fn evidence(report: &Report, trials: &Trials) -> Evidence {
+    let mut names: Vec<String> = trials.trials.iter().map(|trial| trial.name.clone()).collect();
+    names.sort();
+    Evidence {
+        trials: names,
+        trials_sha256: report.sources.trials.clone(),
+        generated: report.generated.clone(),
+        samples: report.samples,
+        model_sha256: report.sources.model.clone(),
+        weights_sha256: String::new(),
+        tool: report.sources.tool.clone(),
+        closure: report.gap.held_out.get("all").and_then(|all| all.closure),
     }
 }
 
-/// `effects.toml` with the physical effects of a report: coefficients, units, standard errors, covariance, the ranges in
-/// which they were seen, and the hashes of what they rest on. Faults of sensors and drive are never in it.
-pub fn effects_toml(report: &Report) -> String {
-    let physical = report.effects.iter().filter(|effect| effect.kind == Kind::Physics);
-    let sources = Source {
-        trials_sha256: &report.sources.trials,
-        model_sha256: &report.sources.model,
-        tool: &report.sources.tool,
-        trials: report.trials,
-        samples: report.samples,
-        generated: report.generated.as_deref(),
-    };
-    let file = File {
-        format: FORMAT,
-        vehicle: &report.vehicle,
-        verdict: report.verdict,
-        sources,
-        validity: &report.validity,
-        effect: physical.map(|effect| entry(effect, report.base_drag)).collect(),
-    };
-    toml::to_string(&file).expect("plain numbers, strings and tables are always TOML")
+fn validity(report: &Report) -> Validity {
+    let range = |name: &str| report.validity.get(name).copied().unwrap_or_default();
+    Validity {
+        depth_m: range("depth_m"),
+        speed_mps: range("speed_mps"),
+        acceleration_mps2: range("acceleration_mps2"),
+        angular_speed_radps: range("angular_speed_radps"),
+        density_kgpm3: range("density_kgpm3"),
+    }
 }
 
-fn entry(effect: &NamedEffect, base_drag: [f64; 3]) -> Entry<'_> {
-    let parameters = || effect.coefficients.iter().filter_map(|name| effect.parameters.get(name));
-    Entry {
-        name: effect.name,
+fn active(effect: &NamedEffect, report: &Report, trials: &Trials) -> ActiveEffect {
+    let parameters = effect.parameters.iter().map(|(name, parameter)| {
+        let unit = parameter.unit.to_owned();
+        ((*name).to_owned(), ParameterValue { value: parameter.value, std: parameter.std, unit })
+    });
+    ActiveEffect {
+        name: effect.effect,
+        equation: effect.effect.equation().to_owned(),
         provisional: effect.provisional,
         share_of_gap: effect.share_of_gap,
         shape: effect.shape,
-        coefficients: &effect.coefficients,
-        values: parameters().map(|p| p.value).collect(),
-        standard_errors: parameters().map(|p| p.std).collect(),
-        units: parameters().map(|p| p.unit).collect(),
-        covariance: &effect.covariance,
-        base_drag,
+        base_drag: report.base_drag,
+        channel_width: trials.manifest.channel_width,
+        coefficients: effect.coefficients.iter().map(|name| (*name).to_owned()).collect(),
+        covariance: effect.covariance.clone(),
+        parameters: parameters.collect::<BTreeMap<_, _>>(),
     }
 }

@@ -39,7 +39,7 @@ mod verdict;
 
 pub use config::Config;
 pub use detect::{Detectable, Excitation, GapSize};
-pub use effects_file::effects_toml;
+pub use effects_file::{NotApplicable, effects_file};
 pub use fit::Parameter;
 pub use holdout::{Closure, Worse};
 pub use locate::{Condition as RegionCondition, Region};

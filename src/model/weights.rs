@@ -79,7 +79,7 @@ impl Anchored {
         std::array::from_fn(|i| coordinates[i] as f32 / self.coordinate_scale[i])
     }
 
-    /// How much of the learnt part counts at a distance: all of it up to 1, nothing from [`FAR`], smooth between.
+    /// How much of the learnt part counts at a distance: all of it up to 1, nothing from 3, smooth between.
     pub fn trust(distance: f64) -> f64 {
         let x = ((FAR - distance) / (FAR - 1.0)).clamp(0.0, 1.0);
         x * x * (3.0 - 2.0 * x)

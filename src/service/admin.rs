@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::bundle::{self, BundleError, Fault};
 use crate::engine::{Engine, UnknownVehicle};
 use crate::metrics::Metrics;
-use crate::model::Model;
 use crate::model::kernel::Isa;
+use crate::served::ServedVehicle;
 
 /// No bundle to serve.
 #[derive(Debug, thiserror::Error)]
@@ -67,22 +67,22 @@ impl Reloader {
         if names.is_empty() {
             return Err(LoadError::Empty { directory });
         }
-        let mut models = Vec::new();
+        let mut vehicles = Vec::new();
         for name in names {
-            match bundle::load(&directory.join(&name), self.isa) {
-                Ok(model) => models.push(model),
+            match bundle::load_served(&directory.join(&name), self.isa) {
+                Ok(vehicle) => vehicles.push(vehicle),
                 Err(BundleError { fault: Fault::NoWeights, .. }) => {
                     tracing::warn!(vehicle = name, "not served: it has no weights yet");
                 }
                 Err(error) => return Err(error.into()),
             }
         }
-        if models.is_empty() {
+        if vehicles.is_empty() {
             return Err(LoadError::Empty { directory });
         }
-        for model in models {
-            announce(&model, &self.metrics);
-            self.engine.swap(model);
+        for vehicle in vehicles {
+            announce(&vehicle, &self.metrics);
+            self.engine.swap(vehicle);
         }
         Ok(())
     }
@@ -91,7 +91,7 @@ impl Reloader {
     /// leaves the version before it in service.
     pub fn reload(&self, vehicle: &str) -> Result<Vec<Reload>, UnknownVehicle> {
         let _guard = self.one_at_a_time.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut names: Vec<String> = self.engine.models().keys().cloned().collect();
+        let mut names: Vec<String> = self.engine.vehicles().keys().cloned().collect();
         // a folder that cannot be listed refuses each vehicle below, by name
         names.extend(bundle::names_in(&self.directory).unwrap_or_default());
         names.sort();
@@ -99,34 +99,37 @@ impl Reloader {
         if !vehicle.is_empty() {
             names.retain(|name| name == vehicle);
             if names.is_empty() {
-                self.engine.model(vehicle)?;
+                self.engine.vehicle(vehicle)?;
             }
         }
         Ok(names.into_iter().map(|name| self.reload_one(name)).collect())
     }
 
     fn reload_one(&self, vehicle: String) -> Reload {
-        let loaded = bundle::load(&self.directory.join(&vehicle), self.isa);
+        let loaded = bundle::load_served(&self.directory.join(&vehicle), self.isa);
         self.metrics.count_reload(loaded.is_ok());
         match loaded {
-            Ok(model) => {
-                announce(&model, &self.metrics);
-                let served_version = model.version();
-                self.engine.swap(model);
+            Ok(served) => {
+                announce(&served, &self.metrics);
+                let served_version = served.model().version();
+                self.engine.swap(served);
                 Reload { vehicle, served_version, refusal: None }
             }
             Err(refusal) => {
                 tracing::warn!(vehicle, %refusal, "bundle refused; the version before it stays");
-                let served_version = self.engine.model(&vehicle).map_or(0, |model| model.version());
+                let served_version =
+                    self.engine.vehicle(&vehicle).map_or(0, |served| served.model().version());
                 Reload { vehicle, served_version, refusal: Some(refusal) }
             }
         }
     }
 }
 
-fn announce(model: &Model, metrics: &Metrics) {
+fn announce(served: &ServedVehicle, metrics: &Metrics) {
+    let model = served.model();
+    let effects = served.effects().map_or(0, |file| file.effects.len());
     let vehicle = &model.vehicle().name;
     metrics.set_bundle_version(vehicle, model.version());
     let (version, provenance) = (model.version(), model.provenance());
-    tracing::info!(vehicle, version, provenance, kernel = model.isa().name(), "bundle loaded");
+    tracing::info!(vehicle, version, provenance, kernel = model.isa().name(), effects, "bundle loaded");
 }

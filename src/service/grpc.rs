@@ -4,7 +4,7 @@ mod convert;
 mod handlers;
 mod stream;
 
-pub use convert::single;
+pub use convert::{added_mass, single};
 
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};

@@ -3,14 +3,17 @@
 pub mod admin;
 pub mod grpc;
 pub mod http;
+mod sessions;
 pub mod shm;
 pub mod shm_layout;
 pub mod wire;
 
 use std::time::Instant;
 
+use crate::effects::{EffectLoads, Session};
 use crate::forces::Forces;
-use crate::model::{Model, Workspace};
+use crate::model::Workspace;
+use crate::served::{Loads, ServedVehicle};
 use wire::{InvalidState, State};
 
 /// Generated from proto/wade/v1.
@@ -26,25 +29,34 @@ pub mod proto {
 #[derive(Debug, Default)]
 pub struct Evaluator {
     workspace: Workspace,
-    forces: Forces,
+    loads: Loads,
 }
 
 /// An answer that lives in its [`Evaluator`].
 #[derive(Debug)]
 pub struct Evaluated<'e> {
-    /// The forces.
+    /// The forces on the surfaces, and the net wrench.
     pub forces: &'e Forces,
+    /// The share of the effects.
+    pub effects: &'e EffectLoads,
     /// Time from the checked state to the forces [ns].
     pub compute_ns: u64,
 }
 
 impl Evaluator {
-    /// Checks a state and answers it.
-    pub fn evaluate(&mut self, model: &Model, state: &State) -> Result<Evaluated<'_>, InvalidState> {
+    /// Checks a state and answers it. Effects that remember live in the session; without one they are left out.
+    pub fn evaluate(
+        &mut self,
+        vehicle: &ServedVehicle,
+        state: &State,
+        session: Option<&mut Session>,
+    ) -> Result<Evaluated<'_>, InvalidState> {
         let condition = state.check()?;
+        let circumstances = state.circumstances()?;
         let start = Instant::now();
-        model.evaluate(&condition, &mut self.workspace, &mut self.forces);
-        Ok(Evaluated { forces: &self.forces, compute_ns: nanoseconds_since(start) })
+        vehicle.evaluate(&condition, &circumstances, session, &mut self.workspace, &mut self.loads);
+        let Loads { forces, effects } = &self.loads;
+        Ok(Evaluated { forces, effects, compute_ns: nanoseconds_since(start) })
     }
 }
 

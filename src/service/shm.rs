@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use iceoryx2::active_request::ActiveRequest;
+use iceoryx2::identifiers::UniqueClientId;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::{ListenerKey, Notifier};
@@ -16,14 +17,15 @@ use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, SignalHandlin
 use iceoryx2::service::port_factory::{event, request_response};
 use serde::{Deserialize, Serialize};
 
+use super::sessions::{CAPACITY, Sessions};
 use super::shm_layout::{
-    Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, Status, wake_name,
+    Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
 };
-use super::wire::{Refusal, State};
+use super::wire::{InvalidState, Refusal, State};
 use super::{Evaluator, nanoseconds_since};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
-use crate::model::Model;
+use crate::served::ServedVehicle;
 
 /// How the server waits for requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -166,6 +168,15 @@ pub(crate) fn events(
 
 type Request<Q, A> = ActiveRequest<ipc::Service, Q, (), A, ()>;
 
+/// A run of states of one client and one vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Run {
+    client: UniqueClientId,
+    /// Number of the vehicle's door.
+    door: usize,
+    session: u64,
+}
+
 /// The ports of one vehicle, and what has come in through them in this round.
 struct Door {
     vehicle: String,
@@ -192,6 +203,7 @@ struct Desk {
     engine: Arc<Engine>,
     metrics: Arc<Metrics>,
     evaluator: Evaluator,
+    sessions: Sessions<Run>,
     /// [`Answer::flags`] of every answer.
     flags: u32,
     done: Notifier<ipc::Service>,
@@ -210,6 +222,7 @@ impl ShmServer {
             engine,
             metrics,
             evaluator: Evaluator::default(),
+            sessions: Sessions::new(CAPACITY),
             flags: if config.wait == Wait::Spin { SERVER_POLLS } else { 0 },
             done: done.map_err(|error| ShmError::new("the notifier")(&error))?,
             sleepers: HashMap::new(),
@@ -224,9 +237,9 @@ impl ShmServer {
 
     /// Vehicles that are served and have no ports yet.
     fn without_door(&self) -> Vec<String> {
-        let models = self.desk.engine.models();
+        let vehicles = self.desk.engine.vehicles();
         let has_door = |name: &String| self.doors.iter().any(|door| door.vehicle == *name);
-        models.keys().filter(|name| !has_door(name)).cloned().collect()
+        vehicles.keys().filter(|name| !has_door(name)).cloned().collect()
     }
 
     fn open_door(&mut self, vehicle: String) -> Result<(), ShmError> {
@@ -299,7 +312,7 @@ impl ShmServer {
     /// and again, since that is where looking starts. True where there was anything.
     fn answer_round(&mut self) -> bool {
         let mut any = false;
-        for door in &mut self.doors {
+        for (number, door) in self.doors.iter_mut().enumerate() {
             while let Some(request) = taken(door.single.receive()) {
                 door.singles.push((Instant::now(), request));
             }
@@ -307,12 +320,13 @@ impl ShmServer {
                 door.batches.push((Instant::now(), request));
             }
             any |= !door.singles.is_empty() || !door.batches.is_empty();
-            if let Ok(model) = self.desk.engine.model(&door.vehicle) {
+            if let Ok(vehicle) = self.desk.engine.vehicle(&door.vehicle) {
+                let at = At { vehicle: &vehicle, door: number };
                 for (arrived, request) in door.singles.drain(..) {
-                    self.desk.answer(&model, arrived, &request, &door.single_recorder);
+                    self.desk.answer(at, arrived, &request, &door.single_recorder);
                 }
                 for (arrived, request) in door.batches.drain(..) {
-                    self.desk.answer_batch(&model, arrived, &request, &door.batch_recorder);
+                    self.desk.answer_batch(at, arrived, &request, &door.batch_recorder);
                 }
             }
         }
@@ -320,21 +334,41 @@ impl ShmServer {
     }
 }
 
+/// Whom a request is for.
+#[derive(Clone, Copy)]
+struct At<'s> {
+    vehicle: &'s ServedVehicle,
+    door: usize,
+}
+
 impl Desk {
-    fn answer(
-        &mut self,
-        model: &Model,
-        arrived: Instant,
-        request: &Request<Query, Answer>,
-        recorder: &Recorder,
-    ) {
-        let query = copy(request.payload());
-        let (mut answer, refusal) = match self.evaluator.evaluate(model, &State::from(&query)) {
-            Ok(evaluated) => (Answer::new(model, evaluated.forces, evaluated.compute_ns), None),
-            Err(invalid) => (Answer::invalid(invalid), Some(Refusal::from(invalid))),
+    /// Answers a query, in its session where it has one.
+    fn evaluate(&mut self, at: At, client: UniqueClientId, query: &Query) -> Result<Answer, InvalidState> {
+        let run = Run { client, door: at.door, session: query.session };
+        let state = State::from(query);
+        // a query that is refused begins no session
+        let known = match query.session {
+            0 => None,
+            _ => state.check().and_then(|_| state.circumstances()).map(|_| Some(self.sessions.get(run)))?,
         };
+        let (session, begins) = known.map_or((None, false), |(session, begins)| (Some(session), begins));
+        let evaluated = self.evaluator.evaluate(at.vehicle, &state, session)?;
+        let mut answer = Answer::new(at.vehicle, &evaluated);
         answer.sequence = query.sequence;
-        answer.flags = self.flags;
+        answer.flags |= self.flags | if begins { SESSION_BEGINS } else { 0 };
+        Ok(answer)
+    }
+
+    fn answer(&mut self, at: At, arrived: Instant, request: &Request<Query, Answer>, recorder: &Recorder) {
+        let query = copy(request.payload());
+        let (answer, refusal) = match self.evaluate(at, request.origin(), &query) {
+            Ok(answer) => (answer, None),
+            Err(invalid) => {
+                let answer =
+                    Answer { sequence: query.sequence, flags: self.flags, ..Answer::invalid(invalid) };
+                (answer, Some(Refusal::from(invalid)))
+            }
+        };
         if sent(request.loan_uninit().map(|slot| slot.write_payload(answer).send())) {
             wake(&self.done, &mut self.sleepers, query.wake_key);
         }
@@ -342,12 +376,12 @@ impl Desk {
             None => recorder.record(arrived.elapsed(), answer.is_outside().into()),
             Some(refusal) => self.metrics.refuse(Transport::shm, refusal.reason()),
         }
-        tracing::debug!(target: "wade::request", transport = "shm", vehicle = model.vehicle().name, status = answer.status);
+        tracing::debug!(target: "wade::request", transport = "shm", vehicle = at.vehicle.model().vehicle().name, status = answer.status);
     }
 
     fn answer_batch(
         &mut self,
-        model: &Model,
+        at: At,
         arrived: Instant,
         request: &Request<BatchQuery, BatchAnswer>,
         recorder: &Recorder,
@@ -367,15 +401,14 @@ impl Desk {
         for i in 0..if valid { count } else { 0 } {
             let query = copy(&request.payload().queries[i]);
             let slot = &mut answer.answers[i];
-            match self.evaluator.evaluate(model, &State::from(&query)) {
-                Ok(evaluated) => *slot = Answer::new(model, evaluated.forces, evaluated.compute_ns),
+            match self.evaluate(at, request.origin(), &query) {
+                Ok(answer) => *slot = answer,
                 Err(invalid) => {
                     *slot = Answer::invalid(invalid);
                     (answer.status, answer.index) = (Status::InvalidState as u32, i as u32);
                     break;
                 }
             }
-            slot.sequence = query.sequence;
             outside += u64::from(slot.is_outside());
             answer.count += 1;
         }
@@ -390,7 +423,7 @@ impl Desk {
         } else {
             self.metrics.refuse(Transport::shm_batch, "invalid_argument");
         }
-        tracing::debug!(target: "wade::request", transport = "shm_batch", vehicle = model.vehicle().name, count, status);
+        tracing::debug!(target: "wade::request", transport = "shm_batch", vehicle = at.vehicle.model().vehicle().name, count, status);
     }
 }
 

@@ -2,10 +2,10 @@
 //!
 //! | service | pattern | request | response |
 //! | --- | --- | --- | --- |
-//! | `<namespace>/v2/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
-//! | `<namespace>/v2/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
-//! | `<namespace>/v2/wake` | event | a client wakes the server | |
-//! | `<namespace>/v2/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
+//! | `<namespace>/v3/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
+//! | `<namespace>/v3/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
+//! | `<namespace>/v3/wake` | event | a client wakes the server | |
+//! | `<namespace>/v3/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
 //!
 //! The namespace is `wade` unless the server's configuration says otherwise.
 //!
@@ -15,11 +15,12 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use super::wire::{Field, InvalidState, Problem, State};
 use crate::domain::{Outside, Quantity};
-use crate::forces::Forces;
-use crate::model::Model;
+use crate::effects::{BoxQuantity, PHYSICS};
+use crate::served::ServedVehicle;
 use crate::vehicle::MAX_SURFACES;
 
-use super::grpc::single;
+use super::Evaluated;
+use super::grpc::{added_mass, single};
 
 /// Most states in one batch request.
 pub const MAX_BATCH: usize = 256;
@@ -40,22 +41,22 @@ impl Names {
 
     /// A vehicle's service for single queries.
     pub fn evaluate(&self, vehicle: &str) -> String {
-        format!("{}/v2/evaluate/{vehicle}", self.namespace)
+        format!("{}/v3/evaluate/{vehicle}", self.namespace)
     }
 
     /// A vehicle's service for batches.
     pub fn evaluate_batch(&self, vehicle: &str) -> String {
-        format!("{}/v2/evaluate_batch/{vehicle}", self.namespace)
+        format!("{}/v3/evaluate_batch/{vehicle}", self.namespace)
     }
 
     /// Event service on which clients wake the server.
     pub fn wake(&self) -> String {
-        format!("{}/v2/wake", self.namespace)
+        format!("{}/v3/wake", self.namespace)
     }
 
     /// Event service on which the server wakes clients.
     pub fn done(&self) -> String {
-        format!("{}/v2/done", self.namespace)
+        format!("{}/v3/done", self.namespace)
     }
 }
 
@@ -66,19 +67,36 @@ pub fn wake_name(key: u64) -> String {
 
 /// Flag of [`Query::flags`]: no water pressure under the contact patches.
 pub const DRY_CONTACT: u32 = 1;
+/// Flag of [`Query::flags`]: the caller adds [`Answer::added_mass`] to his own mass matrix, so that forces leave
+/// `-M_A nu_dot` out and keep the rest.
+pub const IMPLICIT_ADDED_MASS: u32 = 2;
+/// Flag of [`Query::flags`]: `heading_rad` holds a value.
+pub const HAS_HEADING: u32 = 4;
+/// Flag of [`Query::flags`]: `depth_rate_mps` holds a value.
+pub const HAS_DEPTH_RATE: u32 = 8;
+/// Flag of [`Query::flags`]: `wheel_speed_radps` holds values.
+pub const HAS_WHEEL_SPEEDS: u32 = 16;
 /// Flag of [`Answer::flags`]: the server polls, so that waking it is of no use.
 pub const SERVER_POLLS: u32 = 1;
+/// Flag of [`Answer::flags`]: the session begins with this query, at rest and dry. In the middle of a run it says that the
+/// server has forgotten the session, for another server or for too many sessions.
+pub const SESSION_BEGINS: u32 = 2;
+/// Flag of [`Answer::flags`]: `added_mass` holds a matrix.
+pub const HAS_ADDED_MASS: u32 = 4;
 
-/// A state and who asks. 104 bytes.
+/// A state and who asks. 136 bytes.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::Query")]
+#[type_name("wade::v3::Query")]
 pub struct Query {
     /// The client's own number, given back in the answer.
     pub sequence: u64,
     /// Name, as a number, of the client's listener on [`Names::done`]; 0 where the client polls.
     pub wake_key: u64,
-    /// [`DRY_CONTACT`]
+    /// The client's own number of a run of states that follow each other, for effects that remember; 0 for none. A client
+    /// may run many at a time, one an environment; those of other clients are apart.
+    pub session: u64,
+    /// [`DRY_CONTACT`], [`IMPLICIT_ADDED_MASS`], [`HAS_HEADING`], [`HAS_DEPTH_RATE`], [`HAS_WHEEL_SPEEDS`]
     pub flags: u32,
     /// Water depth [m].
     pub depth_m: f32,
@@ -96,14 +114,35 @@ pub struct Query {
     pub angular_acceleration_radps2: [f32; 3],
     /// Unit vector along gravity (down), body frame.
     pub gravity_direction: [f32; 3],
-    /// Zero.
-    pub reserved: u32,
+    /// Angle from the world's x to the body's x [rad].
+    pub heading_rad: f32,
+    /// Rate at which the water rises at the body origin [m/s].
+    pub depth_rate_mps: f32,
+    /// Wheel speeds front left, front right, rear left, rear right [rad/s].
+    pub wheel_speed_radps: [f32; 4],
+    /// Time since the query before it in the session [s].
+    pub time_step_s: f32,
 }
 
-/// The answer to a [`Query`]. 1,944 bytes.
+/// The load of one effect. 32 bytes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("wade::v3::EffectAnswer")]
+pub struct EffectAnswer {
+    /// Which: the number of `Effect` in proto/wade/v1/hydrodynamics.proto.
+    pub effect: u32,
+    /// Why it is zero: the number of `LeftOut` there; 0 where it is not left out.
+    pub left_out: u32,
+    /// Force, body frame [N].
+    pub force_n: [f32; 3],
+    /// Moment about `about_m` [N m].
+    pub moment_nm: [f32; 3],
+}
+
+/// The answer to a [`Query`]. 3,328 bytes.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::Answer")]
+#[type_name("wade::v3::Answer")]
 pub struct Answer {
     /// The query's number.
     pub sequence: u64,
@@ -115,7 +154,7 @@ pub struct Answer {
     pub field: u32,
     /// [`Problem`] with it.
     pub problem: u32,
-    /// [`SERVER_POLLS`]
+    /// [`SERVER_POLLS`], [`SESSION_BEGINS`], [`HAS_ADDED_MASS`]
     pub flags: u32,
     /// Version of the bundle that answered.
     pub bundle_version: u32,
@@ -139,12 +178,22 @@ pub struct Answer {
     pub surface_point_m: [[f32; 3]; MAX_SURFACES],
     /// Share of each surface under water.
     pub wetted_fraction: [f32; MAX_SURFACES],
+    /// How many of `effects` hold a load: with those of the surfaces they sum to `force_n` and `moment_nm`.
+    pub effect_count: u32,
+    /// The loads of the effects that were added to the model.
+    pub effects: [EffectAnswer; PHYSICS],
+    /// Share of the effects' forces that acts on each surface [N]: a part of `effects`, not to be added to them.
+    pub effect_surface_force_n: [[f32; 3]; MAX_SURFACES],
+    /// Distance from the box in which the effects were seen: depth, speed, acceleration, angular speed, density.
+    pub effects_outside: [f32; 5],
+    /// Added mass and inertia about `about_m` by rows, forces first [kg, kg m, kg m2].
+    pub added_mass: [f32; 36],
 }
 
 /// What comes before the states of a batch.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::BatchHeader")]
+#[type_name("wade::v3::BatchHeader")]
 pub struct BatchHeader {
     /// The client's own number, given back in the answer.
     pub sequence: u64,
@@ -159,7 +208,7 @@ pub struct BatchHeader {
 /// Up to [`MAX_BATCH`] states.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::BatchQuery")]
+#[type_name("wade::v3::BatchQuery")]
 pub struct BatchQuery {
     /// How many and who asks.
     pub header: BatchHeader,
@@ -170,7 +219,7 @@ pub struct BatchQuery {
 /// The answer to a [`BatchQuery`]: all of its states, or the first that is wrong.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
-#[type_name("wade::v2::BatchAnswer")]
+#[type_name("wade::v3::BatchAnswer")]
 pub struct BatchAnswer {
     /// The query's number.
     pub sequence: u64,
@@ -212,16 +261,27 @@ impl From<&Query> for State {
             depth: query.depth_m,
             density: query.density_kgpm3,
             dry_contact: query.flags & DRY_CONTACT != 0,
+            heading: (query.flags & HAS_HEADING != 0).then_some(query.heading_rad),
+            depth_rate: (query.flags & HAS_DEPTH_RATE != 0).then_some(query.depth_rate_mps),
+            wheel_speeds: (query.flags & HAS_WHEEL_SPEEDS != 0).then_some(query.wheel_speed_radps),
+            time_step: query.time_step_s,
+            implicit_added_mass: query.flags & IMPLICIT_ADDED_MASS != 0,
         }
     }
 }
 
 impl From<&State> for Query {
     fn from(state: &State) -> Self {
+        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         Self {
             sequence: 0,
             wake_key: 0,
-            flags: if state.dry_contact { DRY_CONTACT } else { 0 },
+            session: 0,
+            flags: flag(state.dry_contact, DRY_CONTACT)
+                | flag(state.implicit_added_mass, IMPLICIT_ADDED_MASS)
+                | flag(state.heading.is_some(), HAS_HEADING)
+                | flag(state.depth_rate.is_some(), HAS_DEPTH_RATE)
+                | flag(state.wheel_speeds.is_some(), HAS_WHEEL_SPEEDS),
             depth_m: state.depth,
             density_kgpm3: state.density,
             velocity_mps: state.velocity,
@@ -230,7 +290,10 @@ impl From<&State> for Query {
             acceleration_mps2: state.acceleration,
             angular_acceleration_radps2: state.angular_acceleration,
             gravity_direction: state.gravity,
-            reserved: 0,
+            heading_rad: state.heading.unwrap_or(0.0),
+            depth_rate_mps: state.depth_rate.unwrap_or(0.0),
+            wheel_speed_radps: state.wheel_speeds.unwrap_or_default(),
+            time_step_s: state.time_step,
         }
     }
 }
@@ -255,12 +318,23 @@ impl Answer {
         surface_force_n: [[0.0; 3]; MAX_SURFACES],
         surface_point_m: [[0.0; 3]; MAX_SURFACES],
         wetted_fraction: [0.0; MAX_SURFACES],
+        effect_count: 0,
+        effects: [EffectAnswer { effect: 0, left_out: 0, force_n: [0.0; 3], moment_nm: [0.0; 3] }; PHYSICS],
+        effect_surface_force_n: [[0.0; 3]; MAX_SURFACES],
+        effects_outside: [0.0; 5],
+        added_mass: [0.0; 36],
     };
 
-    /// The forces of a model.
-    pub fn new(model: &Model, forces: &Forces, compute_ns: u64) -> Self {
+    /// The forces of a vehicle.
+    pub fn new(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> Self {
+        let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
+        let matrix = added_mass(effects);
         let mut answer = Self {
-            compute_ns,
+            compute_ns: *compute_ns,
+            flags: if matrix.is_some() { HAS_ADDED_MASS } else { 0 },
+            effect_count: effects.loads.len() as u32,
+            effects_outside: effects.outside.map(|excess| excess as f32),
+            added_mass: matrix.unwrap_or([0.0; 36]),
             bundle_version: model.version(),
             surface_count: forces.surfaces.len() as u32,
             force_n: single(&forces.wrench.force),
@@ -277,6 +351,17 @@ impl Answer {
             answer.surface_force_n[i] = single(&load.force);
             answer.surface_point_m[i] = single(&load.point);
             answer.wetted_fraction[i] = load.wetted_fraction as f32;
+        }
+        for (slot, load) in answer.effects.iter_mut().zip(&effects.loads) {
+            *slot = EffectAnswer {
+                effect: load.effect.code(),
+                left_out: load.left_out.map_or(0, |reason| reason as u32),
+                force_n: single(&load.wrench.force),
+                moment_nm: single(&load.wrench.moment),
+            };
+        }
+        for (slot, force) in answer.effect_surface_force_n.iter_mut().zip(&effects.surface_forces) {
+            *slot = single(force);
         }
         answer
     }
@@ -324,8 +409,9 @@ impl Answer {
     }
 }
 
-const _: () = assert!(size_of::<Query>() == 104 && align_of::<Query>() == 8);
-const _: () = assert!(size_of::<Answer>() == 1944 && align_of::<Answer>() == 8);
-const _: () = assert!(size_of::<BatchQuery>() == 24 + 104 * MAX_BATCH);
-const _: () = assert!(size_of::<BatchAnswer>() == 32 + 1944 * MAX_BATCH);
-const _: () = assert!(Quantity::ALL.len() == 8);
+const _: () = assert!(size_of::<Query>() == 136 && align_of::<Query>() == 8);
+const _: () = assert!(size_of::<EffectAnswer>() == 32);
+const _: () = assert!(size_of::<Answer>() == 3328 && align_of::<Answer>() == 8);
+const _: () = assert!(size_of::<BatchQuery>() == 24 + 136 * MAX_BATCH);
+const _: () = assert!(size_of::<BatchAnswer>() == 32 + 3328 * MAX_BATCH);
+const _: () = assert!(Quantity::ALL.len() == 8 && BoxQuantity::ALL.len() == 5 && PHYSICS == 14);

@@ -5,6 +5,7 @@ use tonic::Code;
 use tonic_types::{ErrorDetails, StatusExt};
 
 use crate::condition::{Condition, FRESH_WATER, GroundContact};
+use crate::effects::Circumstances;
 use crate::engine::{Overloaded, UnknownVehicle};
 use crate::frame::Vec3;
 
@@ -29,6 +30,16 @@ pub struct State {
     pub density: f32,
     /// No water pressure under the contact patches.
     pub dry_contact: bool,
+    /// Angle from the world's x to the body's x [rad].
+    pub heading: Option<f32>,
+    /// Rate at which the water rises at the body origin [m/s].
+    pub depth_rate: Option<f32>,
+    /// Wheel speeds front left, front right, rear left, rear right [rad/s].
+    pub wheel_speeds: Option<[f32; 4]>,
+    /// Time since the state before it in the session [s].
+    pub time_step: f32,
+    /// The caller integrates added mass himself.
+    pub implicit_added_mass: bool,
 }
 
 impl Default for State {
@@ -43,6 +54,11 @@ impl Default for State {
             depth: 0.0,
             density: FRESH_WATER as f32,
             dry_contact: false,
+            heading: None,
+            depth_rate: None,
+            wheel_speeds: None,
+            time_step: 0.0,
+            implicit_added_mass: false,
         }
     }
 }
@@ -73,10 +89,18 @@ pub enum Field {
     RollPitch = 10,
     /// `ground_contact`
     GroundContact = 11,
+    /// `heading_rad`
+    Heading = 12,
+    /// `depth_rate_mps`
+    DepthRate = 13,
+    /// `wheel_speed_radps`
+    WheelSpeed = 14,
+    /// `time_step_s`
+    TimeStep = 15,
 }
 
 impl Field {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 15] = [
         Self::Velocity,
         Self::Current,
         Self::AngularVelocity,
@@ -88,6 +112,10 @@ impl Field {
         Self::Quaternion,
         Self::RollPitch,
         Self::GroundContact,
+        Self::Heading,
+        Self::DepthRate,
+        Self::WheelSpeed,
+        Self::TimeStep,
     ];
 
     /// The name that the wire gives it.
@@ -104,6 +132,10 @@ impl Field {
             Self::Quaternion => "world_from_body",
             Self::RollPitch => "roll_pitch",
             Self::GroundContact => "ground_contact",
+            Self::Heading => "heading_rad",
+            Self::DepthRate => "depth_rate_mps",
+            Self::WheelSpeed => "wheel_speed_radps",
+            Self::TimeStep => "time_step_s",
         }
     }
 
@@ -129,11 +161,20 @@ pub enum Problem {
     NotUnit = 5,
     /// No value of the enumeration.
     Unknown = 6,
+    /// Another number of values.
+    Count = 7,
 }
 
 impl Problem {
-    const ALL: [Self; 6] =
-        [Self::NotFinite, Self::TooLarge, Self::Negative, Self::NotPositive, Self::NotUnit, Self::Unknown];
+    const ALL: [Self; 7] = [
+        Self::NotFinite,
+        Self::TooLarge,
+        Self::Negative,
+        Self::NotPositive,
+        Self::NotUnit,
+        Self::Unknown,
+        Self::Count,
+    ];
 
     /// The problem of a code of the shared-memory layout.
     pub fn from_code(code: u32) -> Option<Self> {
@@ -161,6 +202,7 @@ impl std::fmt::Display for InvalidState {
             Problem::Negative => write!(f, "{name} must not be negative"),
             Problem::NotPositive => write!(f, "{name} must be greater than zero"),
             Problem::Unknown => write!(f, "{name} must be one of the values of its enumeration"),
+            Problem::Count => write!(f, "{name} must have four values, or none"),
             Problem::NotUnit => write!(f, "{name} must have length 1 (within {UNIT_TOLERANCE})"),
         }
     }
@@ -177,10 +219,33 @@ pub fn limit(field: Field) -> f64 {
         // anything further from 1 is refused for its length
         Field::Gravity | Field::Quaternion => 1e3,
         Field::RollPitch | Field::GroundContact => 1e3,
+        // a turn counter may have wound up
+        Field::Heading => 1e6,
+        Field::DepthRate | Field::WheelSpeed | Field::TimeStep => 1e3,
     }
 }
 
 impl State {
+    /// What effects need to know beside the condition, or the first field that is wrong.
+    pub fn circumstances(&self) -> Result<Circumstances, InvalidState> {
+        let optional = |field: Field, value: Option<f32>| value.map(|value| scalar(field, value)).transpose();
+        let time_step = scalar(Field::TimeStep, self.time_step)?;
+        if time_step < 0.0 {
+            return Err(InvalidState { field: Field::TimeStep, problem: Problem::Negative });
+        }
+        let wheel_speeds = self.wheel_speeds.map(|speeds| {
+            let [a, b, c, d] = speeds.map(|speed| scalar(Field::WheelSpeed, speed));
+            Ok([a?, b?, c?, d?])
+        });
+        Ok(Circumstances {
+            heading: optional(Field::Heading, self.heading)?,
+            depth_rate: optional(Field::DepthRate, self.depth_rate)?,
+            wheel_speeds: wheel_speeds.transpose()?,
+            time_step,
+            implicit_added_mass: self.implicit_added_mass,
+        })
+    }
+
     /// The condition that this state describes, or the first field that is wrong.
     pub fn check(&self) -> Result<Condition, InvalidState> {
         let velocity = vector(Field::Velocity, &self.velocity)?;
@@ -376,7 +441,8 @@ mod tests {
     use super::*;
 
     fn problem(state: State) -> (Field, Problem) {
-        let invalid = state.check().expect_err("the state is invalid");
+        let checked = state.check().and_then(|_| state.circumstances());
+        let invalid = checked.expect_err("the state is invalid");
         (invalid.field, invalid.problem)
     }
 
@@ -395,6 +461,10 @@ mod tests {
             (State { gravity: [0.0, 0.0, -0.9], ..good }, Field::Gravity, Problem::NotUnit),
             (State { gravity: [0.0; 3], ..good }, Field::Gravity, Problem::NotUnit),
             (State { gravity: [f32::NAN; 3], ..good }, Field::Gravity, Problem::NotFinite),
+            (State { heading: Some(f32::NAN), ..good }, Field::Heading, Problem::NotFinite),
+            (State { depth_rate: Some(1e9), ..good }, Field::DepthRate, Problem::TooLarge),
+            (State { wheel_speeds: Some([f32::INFINITY; 4]), ..good }, Field::WheelSpeed, Problem::NotFinite),
+            (State { time_step: -0.001, ..good }, Field::TimeStep, Problem::Negative),
         ];
         for (state, field, expected) in cases {
             assert_eq!(problem(state), (field, expected));

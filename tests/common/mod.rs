@@ -9,8 +9,10 @@ use tempfile::TempDir;
 use wade::bundle;
 use wade::client::{Client, GrpcClient, Method, ShmClient};
 use wade::config::Config;
+use wade::effects::{ActiveEffect, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
 use wade::model::Model;
 use wade::model::kernel::Isa;
+use wade::served::ServedVehicle;
 use wade::server::{self, Running};
 use wade::service::shm::Wait;
 use wade::service::wire::State;
@@ -26,6 +28,77 @@ pub fn vehicles() -> PathBuf {
 
 pub fn model(vehicle: &str) -> Model {
     model_on(vehicle, Isa::available()[0])
+}
+
+pub fn served_vehicle(vehicle: &str) -> ServedVehicle {
+    bundle::load_served(&vehicles().join(vehicle), Isa::available()[0])
+        .expect("the shipped bundles are sound")
+}
+
+/// An effect with made-up numbers, one for every coefficient.
+pub fn effect(name: Effect, value: f64) -> ActiveEffect {
+    let coefficients = name.coefficients();
+    let parameter =
+        |value: f64, unit: &str| ParameterValue { value, std: 0.1 * value.abs(), unit: unit.into() };
+    let shape = match name {
+        Effect::HullFlooding => [0.01, 0.0, 0.0],
+        Effect::WaveMemory => [0.8, 2.0, 0.0],
+        // exact where the estimate is the value
+        Effect::Current => [value, value, 0.0],
+        Effect::Rotation => [1.0, 0.0, 0.0],
+        _ => [0.0; 3],
+    };
+    let fitted = coefficients.iter().map(|c| (c.name.to_owned(), parameter(value, c.unit)));
+    let shapes = name.shape_names().iter().zip(shape);
+    let shapes = shapes.map(|((name, unit), value)| ((*name).to_owned(), parameter(value, unit)));
+    let count = coefficients.len();
+    ActiveEffect {
+        name,
+        equation: name.equation().to_owned(),
+        provisional: false,
+        share_of_gap: 0.5,
+        shape,
+        base_drag: [1.1, 1.3, 0.9],
+        channel_width: (name == Effect::ChannelBlockage).then_some(4.0),
+        coefficients: coefficients.iter().map(|c| c.name.to_owned()).collect(),
+        covariance: (0..count)
+            .map(|i| (0..count).map(|j| if i == j { 1e-4 } else { 0.0 }).collect())
+            .collect(),
+        parameters: fitted.chain(shapes).collect(),
+    }
+}
+
+/// A file with these effects and a box that holds every state of [`Numbers::state`].
+pub fn effects_file(vehicle: &str, effects: Vec<ActiveEffect>) -> EffectsFile {
+    let evidence = Evidence { trials: vec!["run00".into()], tool: "a test".into(), ..Evidence::default() };
+    let validity = Validity {
+        depth_m: [0.0, 1.0],
+        speed_mps: [0.0, 10.0],
+        acceleration_mps2: [0.0, 10.0],
+        angular_speed_radps: [0.0, 10.0],
+        density_kgpm3: [900.0, 2000.0],
+    };
+    EffectsFile::new(vehicle.into(), evidence, validity, effects)
+}
+
+/// Every physical effect of the library.
+pub fn every_effect(vehicle: &str) -> EffectsFile {
+    let physics = Effect::ALL.into_iter().filter(|effect| effect.kind() == Kind::Physics);
+    effects_file(vehicle, physics.map(|name| effect(name, 0.15)).collect())
+}
+
+/// The shipped bundle with effects, in memory.
+pub fn served_with(vehicle: &str, effects: EffectsFile) -> ServedVehicle {
+    ServedVehicle::new(model(vehicle), Some(effects))
+}
+
+/// Copies of the shipped bundles, each with every effect.
+pub fn copy_with_every_effect() -> TempDir {
+    let copy = copy_of_vehicles();
+    for vehicle in VEHICLES {
+        bundle::apply(&copy.path().join(vehicle), every_effect(vehicle)).expect("applied");
+    }
+    copy
 }
 
 pub fn model_on(vehicle: &str, isa: Isa) -> Model {
@@ -150,6 +223,11 @@ impl Numbers {
             depth: self.between(0.0, 0.5),
             density: self.between(950.0, 1950.0),
             dry_contact: self.between(0.0, 1.0) < 0.25,
+            heading: Some(self.between(-3.0, 3.0)),
+            depth_rate: Some(self.between(-0.5, 0.5)),
+            wheel_speeds: Some([(); 4].map(|()| self.between(-10.0, 10.0))),
+            time_step: self.between(0.0, 0.02),
+            implicit_added_mass: false,
         }
     }
 }

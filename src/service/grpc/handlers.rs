@@ -10,9 +10,10 @@ use tonic::{Request, Response, Status, Streaming};
 use super::Shared;
 use super::convert;
 use super::stream::Answers;
+use crate::effects::Session;
 use crate::engine::Admission;
 use crate::metrics::Transport;
-use crate::model::Model;
+use crate::served::ServedVehicle;
 use crate::service::admin::Reloader;
 use crate::service::proto::admin_server::Admin;
 use crate::service::proto::hydrodynamics_server::Hydrodynamics;
@@ -63,9 +64,9 @@ impl Hydrodynamics for Handlers {
         let call = Call::begin(&self.shared, self.names.unary, &request);
         let answer = call.admit(&self.requests).and_then(|_permit| {
             let request = request.get_ref();
-            let model = self.shared.engine.model(&request.vehicle)?;
+            let vehicle = self.shared.engine.vehicle(&request.vehicle)?;
             call.check_deadline(None)?;
-            answer_state(&model, request.state.as_ref())
+            answer_state(&vehicle, request.state.as_ref(), None)
         });
         call.end(answer)
     }
@@ -108,7 +109,8 @@ impl Hydrodynamics for Handlers {
         &self,
         _: Request<proto::ListVehiclesRequest>,
     ) -> Result<Response<proto::ListVehiclesResponse>, Status> {
-        let vehicles = self.shared.engine.models().values().map(|model| convert::summary(model)).collect();
+        let vehicles =
+            self.shared.engine.vehicles().values().map(|vehicle| convert::summary(vehicle)).collect();
         Ok(Response::new(proto::ListVehiclesResponse { vehicles }))
     }
 
@@ -117,8 +119,8 @@ impl Hydrodynamics for Handlers {
         request: Request<proto::GetVehicleRequest>,
     ) -> Result<Response<proto::GetVehicleResponse>, Status> {
         let request = request.get_ref();
-        let model = self.shared.engine.model(&request.vehicle).map_err(Refusal::from)?;
-        Ok(Response::new(convert::vehicle(&model, request.include_mesh)))
+        let vehicle = self.shared.engine.vehicle(&request.vehicle).map_err(Refusal::from)?;
+        Ok(Response::new(convert::vehicle(&vehicle, request.include_mesh)))
     }
 
     async fn get_latency(
@@ -136,10 +138,10 @@ impl Handlers {
         call: &Call<'_>,
         request: &proto::EvaluateBatchRequest,
     ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
-        let model = self.shared.engine.model(&request.vehicle)?;
+        let vehicle = self.shared.engine.vehicle(&request.vehicle)?;
         let states = convert::batch(request, self.max_batch)?;
         let with_surfaces = !request.omit_surfaces;
-        let mut response = convert::batch_response(&model, states.len(), with_surfaces);
+        let mut response = convert::batch_response(&vehicle, states.len(), with_surfaces);
         for (turn, states) in states.chunks(STATES_PER_TURN).enumerate() {
             if turn > 0 {
                 tokio::task::yield_now().await;
@@ -149,10 +151,9 @@ impl Handlers {
                     let index = turn * STATES_PER_TURN + i;
                     call.check_deadline(Some(index))?;
                     let evaluated = evaluator
-                        .evaluate(&model, state)
+                        .evaluate(&vehicle, state, None)
                         .map_err(|invalid| Refusal::Invalid { invalid, index: Some(index) })?;
-                    response.compute_ns += evaluated.compute_ns;
-                    convert::push(&mut response, evaluated.forces, index as u32, with_surfaces);
+                    convert::push(&mut response, &evaluated, index as u32, with_surfaces);
                 }
                 Ok::<(), Refusal>(())
             })?;
@@ -160,28 +161,29 @@ impl Handlers {
         let mut outside: Vec<u32> = response.outside.iter().map(|outside| outside.index).collect();
         outside.dedup();
         let out_of_domain = outside.len() as u64;
-        Ok((response, Answered { vehicle: model, out_of_domain }))
+        Ok((response, Answered { vehicle, out_of_domain }))
     }
 }
 
 /// What the metrics need to know of an answer.
 #[derive(Debug)]
 pub(super) struct Answered {
-    vehicle: Arc<Model>,
+    vehicle: Arc<ServedVehicle>,
     out_of_domain: u64,
 }
 
 /// Answers one state on the thread that read it.
 pub(super) fn answer_state(
-    model: &Arc<Model>,
+    vehicle: &Arc<ServedVehicle>,
     state: Option<&proto::State>,
+    session: Option<&mut Session>,
 ) -> Result<(proto::EvaluateResponse, Answered), Refusal> {
     let state = convert::state(state.ok_or(Refusal::MissingState)?)?;
     EVALUATOR.with_borrow_mut(|evaluator| {
-        let evaluated = evaluator.evaluate(model, &state)?;
-        let response = convert::response(model, evaluated.forces, evaluated.compute_ns);
+        let evaluated = evaluator.evaluate(vehicle, &state, session)?;
+        let response = convert::response(vehicle, &evaluated);
         let out_of_domain = u64::from(!response.in_domain);
-        Ok((response, Answered { vehicle: Arc::clone(model), out_of_domain }))
+        Ok((response, Answered { vehicle: Arc::clone(vehicle), out_of_domain }))
     })
 }
 
@@ -221,7 +223,7 @@ impl<'s> Call<'s> {
     pub(super) fn end<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<Response<T>, Status> {
         match outcome {
             Ok((response, answered)) => {
-                let vehicle = &answered.vehicle.vehicle().name;
+                let vehicle = &answered.vehicle.model().vehicle().name;
                 let elapsed = self.arrived.elapsed();
                 self.shared.metrics.recorder(self.transport, vehicle).record(elapsed, answered.out_of_domain);
                 tracing::debug!(target: "wade::request", transport = self.transport.name(), vehicle, ?elapsed);

@@ -11,6 +11,7 @@ use tonic::{Code, Status, Streaming};
 
 use super::handlers::{Call, STATES_PER_TURN, answer_state};
 use super::{Shared, size_limit, stopped};
+use crate::effects::Session;
 use crate::engine::Permit;
 use crate::metrics::Transport;
 use crate::service::proto;
@@ -21,6 +22,8 @@ pub struct Answers {
     requests: Streaming<proto::EvaluateRequest>,
     shared: Shared,
     vehicle: String,
+    /// What the effects of that vehicle remember.
+    session: Session,
     transport: Transport,
     deadline: Option<Instant>,
     stop: Pin<Box<dyn Future<Output = ()> + Send>>,
@@ -43,6 +46,7 @@ impl Answers {
             requests,
             shared,
             vehicle: String::new(),
+            session: Session::default(),
             transport,
             deadline,
             stop,
@@ -54,12 +58,14 @@ impl Answers {
 
     fn answer(&mut self, request: proto::EvaluateRequest) -> Result<proto::EvaluateResponse, Status> {
         let call = Call::in_stream(&self.shared, self.transport, self.deadline);
-        if !request.vehicle.is_empty() {
+        if !request.vehicle.is_empty() && request.vehicle != self.vehicle {
             self.vehicle = request.vehicle;
+            self.session = Session::default();
         }
-        let model = || Ok::<_, Refusal>(self.shared.engine.model(&self.vehicle)?);
-        let answer = call.check_deadline(None).and_then(|()| model());
-        let answer = answer.and_then(|model| answer_state(&model, request.state.as_ref()));
+        let vehicle = || Ok::<_, Refusal>(self.shared.engine.vehicle(&self.vehicle)?);
+        let answer = call.check_deadline(None).and_then(|()| vehicle());
+        let session = &mut self.session;
+        let answer = answer.and_then(|vehicle| answer_state(&vehicle, request.state.as_ref(), Some(session)));
         call.end(answer).map(tonic::Response::into_inner)
     }
 }

@@ -61,7 +61,8 @@ pub struct Known {
     pub condition: Condition,
     /// What is known of it.
     pub reading: Reading,
-    /// Dynamic load on each surface: force, and moment about the body origin where the data set has it.
+    /// Dynamic load that each surface is to answer, see `carry`: force, and moment about the body origin where the data
+    /// set has it.
     pub loads: Vec<(Vec3, Option<Vec3>)>,
 }
 
@@ -92,12 +93,14 @@ impl Known {
             let prepared = &vehicles[index];
             let mut reading = Reading::default();
             prepared.anchor.read(&prepared.vehicle, &first.condition, &mut reading);
+            let mut loads = mean_loads(data, &members, prepared);
+            carry(&mut loads, &reading);
             Some(Self {
                 vehicle: index,
                 case: first.case.clone(),
                 condition: first.condition,
-                loads: mean_loads(data, &members, prepared),
                 reading,
+                loads,
             })
         };
         groups.into_iter().filter_map(state).collect()
@@ -125,6 +128,29 @@ fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> Vec<(Ve
     }
     let count = members.len() as f64;
     sums.into_iter().map(|(force, moment)| (force / count, moment.map(|m| m / count))).collect()
+}
+
+/// Gives what was found on surfaces above still water to the wet ones, in proportion to what a coefficient is worth
+/// there; of a surface on which loads are setting in, the part that has not set in.
+///
+/// A bow wave climbs surfaces that the model keeps dry by construction. Their loads belong to the vehicle all the same:
+/// without this the net force would lack them, or be torn between them and the loads of the single surfaces.
+fn carry(loads: &mut [(Vec3, Option<Vec3>)], reading: &Reading) {
+    let whole: f64 = reading.surfaces.iter().map(|surface| surface.unit).sum();
+    if whole == 0.0 {
+        return;
+    }
+    let (mut force, mut moment) = (Vec3::zeros(), Some(Vec3::zeros()));
+    for (load, surface) in loads.iter_mut().zip(&reading.surfaces) {
+        let rest = 1.0 - surface.onset;
+        force += load.0 * rest;
+        moment = moment.zip(load.1).map(|(sum, moment)| sum + moment * rest);
+        *load = (load.0 * surface.onset, load.1.map(|moment| moment * surface.onset));
+    }
+    for (load, surface) in loads.iter_mut().zip(&reading.surfaces) {
+        let share = surface.unit / whole;
+        *load = (load.0 + force * share, load.1.zip(moment).map(|(own, carried)| own + carried * share));
+    }
 }
 
 /// Moment about `point` of a load with a moment about the origin [N m].

@@ -176,12 +176,12 @@ def _flags(state: State) -> int:
 
 def _query(sequence: int, wake_key: int, flags: int, floats: list[float]) -> bytes:
     try:
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, flags, *floats, 0)
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, layout.NO_SESSION, flags, *floats, *layout.UNTOLD)
     except OverflowError:
         # beyond single precision: infinite, which the server refuses and names
         limit = float(np.finfo(np.float32).max)
         floats = [x if abs(x) <= limit else math.copysign(math.inf, x) for x in floats]
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, flags, *floats, 0)
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, layout.NO_SESSION, flags, *floats, *layout.UNTOLD)
 
 
 def _read(address: int) -> np.void:
@@ -194,7 +194,9 @@ def _write_batch(address: int, sequence: int, wake_key: int, flags: int, rows: d
     count = chunk.stop - chunk.start
     batch["header"] = (sequence, wake_key, count, 0)
     queries = batch["queries"][:count]
+    queries["session"] = layout.NO_SESSION
     queries["flags"] = flags
+    queries["time_step_s"] = 0.0
     for name, array in rows.items():
         queries[name] = array[chunk]
 

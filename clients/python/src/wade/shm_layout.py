@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
-VERSION = "v2"
+VERSION = "v3"
 MAX_BATCH = 256
 MAX_SURFACES = 64
+#: Most effects that a vehicle can have.
+PHYSICS = 14
 
 #: Flag of a query: no water pressure under the contact patches.
 DRY_CONTACT = 1
@@ -27,6 +29,7 @@ QUERY = np.dtype(
     [
         ("sequence", "<u8"),
         ("wake_key", "<u8"),
+        ("session", "<u8"),
         ("flags", "<u4"),
         ("depth_m", "<f4"),
         ("density_kgpm3", "<f4"),
@@ -36,9 +39,18 @@ QUERY = np.dtype(
         ("acceleration_mps2", "<f4", 3),
         ("angular_acceleration_radps2", "<f4", 3),
         ("gravity_direction", "<f4", 3),
-        ("reserved", "<u4"),
+        ("heading_rad", "<f4"),
+        ("depth_rate_mps", "<f4"),
+        ("wheel_speed_radps", "<f4", 4),
+        ("time_step_s", "<f4"),
     ]
 )
+
+#: What a state has of these without a session and without a word about them.
+NO_SESSION = 0
+UNTOLD = (0.0,) * 7
+
+EFFECT_ANSWER = np.dtype([("effect", "<u4"), ("left_out", "<u4"), ("force_n", "<f4", 3), ("moment_nm", "<f4", 3)])
 
 ANSWER = np.dtype(
     [
@@ -59,6 +71,11 @@ ANSWER = np.dtype(
         ("surface_force_n", "<f4", (MAX_SURFACES, 3)),
         ("surface_point_m", "<f4", (MAX_SURFACES, 3)),
         ("wetted_fraction", "<f4", MAX_SURFACES),
+        ("effect_count", "<u4"),
+        ("effects", EFFECT_ANSWER, PHYSICS),
+        ("effect_surface_force_n", "<f4", (MAX_SURFACES, 3)),
+        ("effects_outside", "<f4", 5),
+        ("added_mass", "<f4", 36),
     ]
 )
 
@@ -91,6 +108,10 @@ FIELDS = {
     9: "world_from_body",
     10: "roll_pitch",
     11: "ground_contact",
+    12: "heading_rad",
+    13: "depth_rate_mps",
+    14: "wheel_speed_radps",
+    15: "time_step_s",
 }
 
 #: What is wrong with them, by code.
@@ -101,6 +122,7 @@ PROBLEMS = {
     4: "must be greater than zero",
     5: "must have length 1",
     6: "must be one of the values of its enumeration",
+    7: "must have four values, or none",
 }
 
 

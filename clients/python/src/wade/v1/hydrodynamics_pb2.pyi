@@ -13,6 +13,42 @@ class GroundContact(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     GROUND_CONTACT_WETTED: _ClassVar[GroundContact]
     GROUND_CONTACT_DRY: _ClassVar[GroundContact]
 
+class Effect(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    EFFECT_UNSPECIFIED: _ClassVar[Effect]
+    EFFECT_ADDED_MASS: _ClassVar[Effect]
+    EFFECT_LINEAR_DAMPING: _ClassVar[Effect]
+    EFFECT_DRAG_COEFFICIENT_ERROR: _ClassVar[Effect]
+    EFFECT_ROTATION: _ClassVar[Effect]
+    EFFECT_CURRENT: _ClassVar[Effect]
+    EFFECT_WATER_LEVEL_OFFSET: _ClassVar[Effect]
+    EFFECT_DENSITY_ERROR: _ClassVar[Effect]
+    EFFECT_HULL_FLOODING: _ClassVar[Effect]
+    EFFECT_WATER_ENTRY_SLAMMING: _ClassVar[Effect]
+    EFFECT_WAVE_MEMORY: _ClassVar[Effect]
+    EFFECT_CHANNEL_BLOCKAGE: _ClassVar[Effect]
+    EFFECT_SQUAT: _ClassVar[Effect]
+    EFFECT_WHEEL_PADDLE_THRUST: _ClassVar[Effect]
+    EFFECT_BED_MOTION: _ClassVar[Effect]
+
+class LeftOut(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    LEFT_OUT_UNSPECIFIED: _ClassVar[LeftOut]
+    LEFT_OUT_NO_SESSION: _ClassVar[LeftOut]
+    LEFT_OUT_NO_HEADING: _ClassVar[LeftOut]
+    LEFT_OUT_NO_WHEEL_SPEEDS: _ClassVar[LeftOut]
+    LEFT_OUT_NO_DEPTH_RATE: _ClassVar[LeftOut]
+    LEFT_OUT_CURRENT_STATED: _ClassVar[LeftOut]
+
+class BoxQuantity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    BOX_QUANTITY_UNSPECIFIED: _ClassVar[BoxQuantity]
+    BOX_QUANTITY_DEPTH: _ClassVar[BoxQuantity]
+    BOX_QUANTITY_SPEED: _ClassVar[BoxQuantity]
+    BOX_QUANTITY_ACCELERATION: _ClassVar[BoxQuantity]
+    BOX_QUANTITY_ANGULAR_SPEED: _ClassVar[BoxQuantity]
+    BOX_QUANTITY_DENSITY: _ClassVar[BoxQuantity]
+
 class Quantity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     QUANTITY_UNSPECIFIED: _ClassVar[Quantity]
@@ -27,6 +63,33 @@ class Quantity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
 GROUND_CONTACT_UNSPECIFIED: GroundContact
 GROUND_CONTACT_WETTED: GroundContact
 GROUND_CONTACT_DRY: GroundContact
+EFFECT_UNSPECIFIED: Effect
+EFFECT_ADDED_MASS: Effect
+EFFECT_LINEAR_DAMPING: Effect
+EFFECT_DRAG_COEFFICIENT_ERROR: Effect
+EFFECT_ROTATION: Effect
+EFFECT_CURRENT: Effect
+EFFECT_WATER_LEVEL_OFFSET: Effect
+EFFECT_DENSITY_ERROR: Effect
+EFFECT_HULL_FLOODING: Effect
+EFFECT_WATER_ENTRY_SLAMMING: Effect
+EFFECT_WAVE_MEMORY: Effect
+EFFECT_CHANNEL_BLOCKAGE: Effect
+EFFECT_SQUAT: Effect
+EFFECT_WHEEL_PADDLE_THRUST: Effect
+EFFECT_BED_MOTION: Effect
+LEFT_OUT_UNSPECIFIED: LeftOut
+LEFT_OUT_NO_SESSION: LeftOut
+LEFT_OUT_NO_HEADING: LeftOut
+LEFT_OUT_NO_WHEEL_SPEEDS: LeftOut
+LEFT_OUT_NO_DEPTH_RATE: LeftOut
+LEFT_OUT_CURRENT_STATED: LeftOut
+BOX_QUANTITY_UNSPECIFIED: BoxQuantity
+BOX_QUANTITY_DEPTH: BoxQuantity
+BOX_QUANTITY_SPEED: BoxQuantity
+BOX_QUANTITY_ACCELERATION: BoxQuantity
+BOX_QUANTITY_ANGULAR_SPEED: BoxQuantity
+BOX_QUANTITY_DENSITY: BoxQuantity
 QUANTITY_UNSPECIFIED: Quantity
 QUANTITY_SPEED: Quantity
 QUANTITY_ANGLE: Quantity
@@ -68,7 +131,7 @@ class RollPitch(_message.Message):
     def __init__(self, roll_rad: _Optional[float] = ..., pitch_rad: _Optional[float] = ...) -> None: ...
 
 class State(_message.Message):
-    __slots__ = ("velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "world_from_body", "roll_pitch", "ground_contact")
+    __slots__ = ("velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "world_from_body", "roll_pitch", "ground_contact", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "time_step_s", "implicit_added_mass")
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
     CURRENT_MPS_FIELD_NUMBER: _ClassVar[int]
     ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
@@ -80,6 +143,11 @@ class State(_message.Message):
     WORLD_FROM_BODY_FIELD_NUMBER: _ClassVar[int]
     ROLL_PITCH_FIELD_NUMBER: _ClassVar[int]
     GROUND_CONTACT_FIELD_NUMBER: _ClassVar[int]
+    HEADING_RAD_FIELD_NUMBER: _ClassVar[int]
+    DEPTH_RATE_MPS_FIELD_NUMBER: _ClassVar[int]
+    WHEEL_SPEED_RADPS_FIELD_NUMBER: _ClassVar[int]
+    TIME_STEP_S_FIELD_NUMBER: _ClassVar[int]
+    IMPLICIT_ADDED_MASS_FIELD_NUMBER: _ClassVar[int]
     velocity_mps: Vector3
     current_mps: Vector3
     angular_velocity_radps: Vector3
@@ -91,7 +159,12 @@ class State(_message.Message):
     world_from_body: Quaternion
     roll_pitch: RollPitch
     ground_contact: GroundContact
-    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ...) -> None: ...
+    heading_rad: float
+    depth_rate_mps: float
+    wheel_speed_radps: _containers.RepeatedScalarFieldContainer[float]
+    time_step_s: float
+    implicit_added_mass: bool
+    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., heading_rad: _Optional[float] = ..., depth_rate_mps: _Optional[float] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., time_step_s: _Optional[float] = ..., implicit_added_mass: bool = ...) -> None: ...
 
 class EvaluateRequest(_message.Message):
     __slots__ = ("vehicle", "state")
@@ -102,7 +175,7 @@ class EvaluateRequest(_message.Message):
     def __init__(self, vehicle: _Optional[str] = ..., state: _Optional[_Union[State, _Mapping]] = ...) -> None: ...
 
 class EvaluateResponse(_message.Message):
-    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "wrench", "uncertainty_n", "in_domain", "outside", "bundle_version", "provenance", "compute_ns")
+    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "wrench", "uncertainty_n", "in_domain", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_surface_force_n", "effects_outside", "added_mass")
     SURFACE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     SURFACE_POINT_M_FIELD_NUMBER: _ClassVar[int]
     WETTED_FRACTION_FIELD_NUMBER: _ClassVar[int]
@@ -113,6 +186,10 @@ class EvaluateResponse(_message.Message):
     BUNDLE_VERSION_FIELD_NUMBER: _ClassVar[int]
     PROVENANCE_FIELD_NUMBER: _ClassVar[int]
     COMPUTE_NS_FIELD_NUMBER: _ClassVar[int]
+    EFFECTS_FIELD_NUMBER: _ClassVar[int]
+    EFFECT_SURFACE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    EFFECTS_OUTSIDE_FIELD_NUMBER: _ClassVar[int]
+    ADDED_MASS_FIELD_NUMBER: _ClassVar[int]
     surface_force_n: _containers.RepeatedScalarFieldContainer[float]
     surface_point_m: _containers.RepeatedScalarFieldContainer[float]
     wetted_fraction: _containers.RepeatedScalarFieldContainer[float]
@@ -123,7 +200,33 @@ class EvaluateResponse(_message.Message):
     bundle_version: int
     provenance: str
     compute_ns: int
-    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., wrench: _Optional[_Union[Wrench, _Mapping]] = ..., uncertainty_n: _Optional[_Union[Vector3, _Mapping]] = ..., in_domain: bool = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ...) -> None: ...
+    effects: _containers.RepeatedCompositeFieldContainer[EffectLoad]
+    effect_surface_force_n: _containers.RepeatedScalarFieldContainer[float]
+    effects_outside: _containers.RepeatedCompositeFieldContainer[EffectOutside]
+    added_mass: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., wrench: _Optional[_Union[Wrench, _Mapping]] = ..., uncertainty_n: _Optional[_Union[Vector3, _Mapping]] = ..., in_domain: bool = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[EffectLoad, _Mapping]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class EffectLoad(_message.Message):
+    __slots__ = ("effect", "force_n", "moment_nm", "left_out")
+    EFFECT_FIELD_NUMBER: _ClassVar[int]
+    FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    MOMENT_NM_FIELD_NUMBER: _ClassVar[int]
+    LEFT_OUT_FIELD_NUMBER: _ClassVar[int]
+    effect: Effect
+    force_n: Vector3
+    moment_nm: Vector3
+    left_out: LeftOut
+    def __init__(self, effect: _Optional[_Union[Effect, str]] = ..., force_n: _Optional[_Union[Vector3, _Mapping]] = ..., moment_nm: _Optional[_Union[Vector3, _Mapping]] = ..., left_out: _Optional[_Union[LeftOut, str]] = ...) -> None: ...
+
+class EffectOutside(_message.Message):
+    __slots__ = ("quantity", "excess", "index")
+    QUANTITY_FIELD_NUMBER: _ClassVar[int]
+    EXCESS_FIELD_NUMBER: _ClassVar[int]
+    INDEX_FIELD_NUMBER: _ClassVar[int]
+    quantity: BoxQuantity
+    excess: float
+    index: int
+    def __init__(self, quantity: _Optional[_Union[BoxQuantity, str]] = ..., excess: _Optional[float] = ..., index: _Optional[int] = ...) -> None: ...
 
 class Wrench(_message.Message):
     __slots__ = ("force_n", "moment_nm", "about_m")
@@ -146,7 +249,7 @@ class Outside(_message.Message):
     def __init__(self, quantity: _Optional[_Union[Quantity, str]] = ..., excess: _Optional[float] = ..., index: _Optional[int] = ...) -> None: ...
 
 class EvaluateBatchRequest(_message.Message):
-    __slots__ = ("vehicle", "velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "ground_contact", "omit_surfaces")
+    __slots__ = ("vehicle", "velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "ground_contact", "omit_surfaces", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "implicit_added_mass")
     VEHICLE_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
     CURRENT_MPS_FIELD_NUMBER: _ClassVar[int]
@@ -158,6 +261,10 @@ class EvaluateBatchRequest(_message.Message):
     GRAVITY_DIRECTION_FIELD_NUMBER: _ClassVar[int]
     GROUND_CONTACT_FIELD_NUMBER: _ClassVar[int]
     OMIT_SURFACES_FIELD_NUMBER: _ClassVar[int]
+    HEADING_RAD_FIELD_NUMBER: _ClassVar[int]
+    DEPTH_RATE_MPS_FIELD_NUMBER: _ClassVar[int]
+    WHEEL_SPEED_RADPS_FIELD_NUMBER: _ClassVar[int]
+    IMPLICIT_ADDED_MASS_FIELD_NUMBER: _ClassVar[int]
     vehicle: str
     velocity_mps: _containers.RepeatedScalarFieldContainer[float]
     current_mps: _containers.RepeatedScalarFieldContainer[float]
@@ -169,10 +276,14 @@ class EvaluateBatchRequest(_message.Message):
     gravity_direction: _containers.RepeatedScalarFieldContainer[float]
     ground_contact: GroundContact
     omit_surfaces: bool
-    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: bool = ...) -> None: ...
+    heading_rad: _containers.RepeatedScalarFieldContainer[float]
+    depth_rate_mps: _containers.RepeatedScalarFieldContainer[float]
+    wheel_speed_radps: _containers.RepeatedScalarFieldContainer[float]
+    implicit_added_mass: bool
+    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: bool = ..., heading_rad: _Optional[_Iterable[float]] = ..., depth_rate_mps: _Optional[_Iterable[float]] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., implicit_added_mass: bool = ...) -> None: ...
 
 class EvaluateBatchResponse(_message.Message):
-    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "force_n", "moment_nm", "about_m", "uncertainty_n", "outside", "bundle_version", "provenance", "compute_ns")
+    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "force_n", "moment_nm", "about_m", "uncertainty_n", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_force_n", "effect_moment_nm", "effect_left_out", "effect_surface_force_n", "effects_outside", "added_mass")
     SURFACE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     SURFACE_POINT_M_FIELD_NUMBER: _ClassVar[int]
     WETTED_FRACTION_FIELD_NUMBER: _ClassVar[int]
@@ -184,6 +295,13 @@ class EvaluateBatchResponse(_message.Message):
     BUNDLE_VERSION_FIELD_NUMBER: _ClassVar[int]
     PROVENANCE_FIELD_NUMBER: _ClassVar[int]
     COMPUTE_NS_FIELD_NUMBER: _ClassVar[int]
+    EFFECTS_FIELD_NUMBER: _ClassVar[int]
+    EFFECT_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    EFFECT_MOMENT_NM_FIELD_NUMBER: _ClassVar[int]
+    EFFECT_LEFT_OUT_FIELD_NUMBER: _ClassVar[int]
+    EFFECT_SURFACE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    EFFECTS_OUTSIDE_FIELD_NUMBER: _ClassVar[int]
+    ADDED_MASS_FIELD_NUMBER: _ClassVar[int]
     surface_force_n: _containers.RepeatedScalarFieldContainer[float]
     surface_point_m: _containers.RepeatedScalarFieldContainer[float]
     wetted_fraction: _containers.RepeatedScalarFieldContainer[float]
@@ -195,7 +313,14 @@ class EvaluateBatchResponse(_message.Message):
     bundle_version: int
     provenance: str
     compute_ns: int
-    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., force_n: _Optional[_Iterable[float]] = ..., moment_nm: _Optional[_Iterable[float]] = ..., about_m: _Optional[_Union[Vector3, _Mapping]] = ..., uncertainty_n: _Optional[_Iterable[float]] = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ...) -> None: ...
+    effects: _containers.RepeatedScalarFieldContainer[Effect]
+    effect_force_n: _containers.RepeatedScalarFieldContainer[float]
+    effect_moment_nm: _containers.RepeatedScalarFieldContainer[float]
+    effect_left_out: _containers.RepeatedScalarFieldContainer[LeftOut]
+    effect_surface_force_n: _containers.RepeatedScalarFieldContainer[float]
+    effects_outside: _containers.RepeatedCompositeFieldContainer[EffectOutside]
+    added_mass: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., force_n: _Optional[_Iterable[float]] = ..., moment_nm: _Optional[_Iterable[float]] = ..., about_m: _Optional[_Union[Vector3, _Mapping]] = ..., uncertainty_n: _Optional[_Iterable[float]] = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[Effect, str]]] = ..., effect_force_n: _Optional[_Iterable[float]] = ..., effect_moment_nm: _Optional[_Iterable[float]] = ..., effect_left_out: _Optional[_Iterable[_Union[LeftOut, str]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class ListVehiclesRequest(_message.Message):
     __slots__ = ()
@@ -228,7 +353,7 @@ class GetVehicleRequest(_message.Message):
     def __init__(self, vehicle: _Optional[str] = ..., include_mesh: bool = ...) -> None: ...
 
 class GetVehicleResponse(_message.Message):
-    __slots__ = ("summary", "length_m", "width_m", "height_m", "z0_m", "mass_kg", "center_of_mass_m", "inertia_kgm2", "surfaces", "domain", "mesh_stl", "face_surface")
+    __slots__ = ("summary", "length_m", "width_m", "height_m", "z0_m", "mass_kg", "center_of_mass_m", "inertia_kgm2", "surfaces", "domain", "mesh_stl", "face_surface", "effects", "effects_validity")
     SUMMARY_FIELD_NUMBER: _ClassVar[int]
     LENGTH_M_FIELD_NUMBER: _ClassVar[int]
     WIDTH_M_FIELD_NUMBER: _ClassVar[int]
@@ -241,6 +366,8 @@ class GetVehicleResponse(_message.Message):
     DOMAIN_FIELD_NUMBER: _ClassVar[int]
     MESH_STL_FIELD_NUMBER: _ClassVar[int]
     FACE_SURFACE_FIELD_NUMBER: _ClassVar[int]
+    EFFECTS_FIELD_NUMBER: _ClassVar[int]
+    EFFECTS_VALIDITY_FIELD_NUMBER: _ClassVar[int]
     summary: VehicleSummary
     length_m: float
     width_m: float
@@ -253,7 +380,45 @@ class GetVehicleResponse(_message.Message):
     domain: _containers.RepeatedCompositeFieldContainer[Range]
     mesh_stl: bytes
     face_surface: _containers.RepeatedScalarFieldContainer[int]
-    def __init__(self, summary: _Optional[_Union[VehicleSummary, _Mapping]] = ..., length_m: _Optional[float] = ..., width_m: _Optional[float] = ..., height_m: _Optional[float] = ..., z0_m: _Optional[float] = ..., mass_kg: _Optional[float] = ..., center_of_mass_m: _Optional[_Union[Vector3, _Mapping]] = ..., inertia_kgm2: _Optional[_Iterable[float]] = ..., surfaces: _Optional[_Iterable[_Union[Surface, _Mapping]]] = ..., domain: _Optional[_Iterable[_Union[Range, _Mapping]]] = ..., mesh_stl: _Optional[bytes] = ..., face_surface: _Optional[_Iterable[int]] = ...) -> None: ...
+    effects: _containers.RepeatedCompositeFieldContainer[ActiveEffect]
+    effects_validity: _containers.RepeatedCompositeFieldContainer[BoxRange]
+    def __init__(self, summary: _Optional[_Union[VehicleSummary, _Mapping]] = ..., length_m: _Optional[float] = ..., width_m: _Optional[float] = ..., height_m: _Optional[float] = ..., z0_m: _Optional[float] = ..., mass_kg: _Optional[float] = ..., center_of_mass_m: _Optional[_Union[Vector3, _Mapping]] = ..., inertia_kgm2: _Optional[_Iterable[float]] = ..., surfaces: _Optional[_Iterable[_Union[Surface, _Mapping]]] = ..., domain: _Optional[_Iterable[_Union[Range, _Mapping]]] = ..., mesh_stl: _Optional[bytes] = ..., face_surface: _Optional[_Iterable[int]] = ..., effects: _Optional[_Iterable[_Union[ActiveEffect, _Mapping]]] = ..., effects_validity: _Optional[_Iterable[_Union[BoxRange, _Mapping]]] = ...) -> None: ...
+
+class ActiveEffect(_message.Message):
+    __slots__ = ("effect", "name", "equation", "parameters", "provisional")
+    EFFECT_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    EQUATION_FIELD_NUMBER: _ClassVar[int]
+    PARAMETERS_FIELD_NUMBER: _ClassVar[int]
+    PROVISIONAL_FIELD_NUMBER: _ClassVar[int]
+    effect: Effect
+    name: str
+    equation: str
+    parameters: _containers.RepeatedCompositeFieldContainer[EffectParameter]
+    provisional: bool
+    def __init__(self, effect: _Optional[_Union[Effect, str]] = ..., name: _Optional[str] = ..., equation: _Optional[str] = ..., parameters: _Optional[_Iterable[_Union[EffectParameter, _Mapping]]] = ..., provisional: bool = ...) -> None: ...
+
+class EffectParameter(_message.Message):
+    __slots__ = ("name", "value", "std", "unit")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    STD_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    value: float
+    std: float
+    unit: str
+    def __init__(self, name: _Optional[str] = ..., value: _Optional[float] = ..., std: _Optional[float] = ..., unit: _Optional[str] = ...) -> None: ...
+
+class BoxRange(_message.Message):
+    __slots__ = ("quantity", "minimum", "maximum")
+    QUANTITY_FIELD_NUMBER: _ClassVar[int]
+    MINIMUM_FIELD_NUMBER: _ClassVar[int]
+    MAXIMUM_FIELD_NUMBER: _ClassVar[int]
+    quantity: BoxQuantity
+    minimum: float
+    maximum: float
+    def __init__(self, quantity: _Optional[_Union[BoxQuantity, str]] = ..., minimum: _Optional[float] = ..., maximum: _Optional[float] = ...) -> None: ...
 
 class Surface(_message.Message):
     __slots__ = ("name", "kind", "centroid_m", "normal", "area_m2")

@@ -85,7 +85,8 @@ class HydrodynamicsServicer(object):
 
     def Stream(self, request_iterator, context):
         """One answer a request, in order. The vehicle may be named in the first request alone. A request that is refused
-        ends the stream with its error.
+        ends the stream with its error. Effects that remember (wave memory, flooding) live as long as the stream and its
+        vehicle: they start at rest and dry, and move on by `time_step_s` with each request. The other calls know no before.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -1,0 +1,120 @@
+//! Versions of a bundle that effects were added to or taken from: kept beside it in `<name>.versions/<version>/<name>`.
+//!
+//! A version that leaves its place is moved there, so that each can be put back, one after the other. What was put back keeps
+//! its number; the next version that is made gets a number that none had before.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{
+    Bundle, BundleError, FILES, Fault, VEHICLE_FILE, VehicleFile, at, checksums, exchange, read,
+    read_bounded, stage, staging_of, tensors,
+};
+use crate::effects::EffectsFile;
+
+/// A version that was kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kept {
+    /// Its number.
+    pub version: u32,
+    /// Names of the effects that it has switched on.
+    pub effects: Vec<&'static str>,
+}
+
+fn versions_of(directory: &Path) -> PathBuf {
+    let name = directory.file_name().unwrap_or_default().to_string_lossy();
+    directory.with_file_name(format!("{name}.versions"))
+}
+
+fn place_of(directory: &Path, version: u32) -> PathBuf {
+    versions_of(directory).join(version.to_string()).join(directory.file_name().unwrap_or_default())
+}
+
+/// Numbers of the versions that were kept, rising.
+fn numbers(directory: &Path) -> Result<Vec<u32>, BundleError> {
+    let versions = versions_of(directory);
+    let entries = match fs::read_dir(&versions) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries.map_err(|error| at(&versions)(error.into()))?,
+    };
+    let number = |entry: std::io::Result<fs::DirEntry>| entry.ok()?.file_name().to_str()?.parse().ok();
+    let mut numbers: Vec<u32> = entries.filter_map(number).collect();
+    numbers.sort_unstable();
+    Ok(numbers)
+}
+
+/// The versions that were kept of the bundle in a folder, rising.
+pub fn kept(directory: &Path) -> Result<Vec<Kept>, BundleError> {
+    let one = |version: u32| {
+        let effects = read(&place_of(directory, version))?.effects;
+        let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.name.name()).collect();
+        Ok(Kept { version, effects: effects.map(names).unwrap_or_default() })
+    };
+    numbers(directory)?.into_iter().map(one).collect()
+}
+
+/// Puts effects in the place of those of a bundle, as its next version, and keeps the version before. Gives the new version.
+///
+/// The bundle changes in one step of the file system at the end; an error before it leaves everything as it was.
+pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleError> {
+    let bundle = read(directory)?;
+    let Some((weights, _)) = &bundle.trained else { return Err(at(directory)(Fault::NoWeights)) };
+    effects.evidence.weights_sha256 = checksums::hexadecimal(&tensors::write_weights(weights));
+    let before = bundle.version;
+    let version = numbers(directory)?.last().copied().unwrap_or(0).max(before) + 1;
+    let staged = stage(directory, &Bundle { version, effects: Some(effects), ..bundle })?;
+    put(&staged, directory, before)?;
+    Ok(version)
+}
+
+/// Puts a kept version in its place again, by default the one before the version that is there, and keeps the latter.
+/// Gives the version that is in place now.
+pub fn roll_back(directory: &Path, to: Option<u32>) -> Result<u32, BundleError> {
+    let current = version_in(directory)?;
+    let kept = numbers(directory)?;
+    let found = match to {
+        Some(to) => kept.into_iter().find(|&version| version == to && version != current),
+        None => kept.into_iter().rfind(|&version| version < current),
+    };
+    let version = found.ok_or(Fault::NotKept { asked: to }).map_err(at(directory))?;
+    let place = place_of(directory, version);
+    // what is damaged must not come into service
+    let bundle = read(&place)?;
+    if bundle.version != version {
+        return Err(at(&place)(Fault::KeptVersion { found: bundle.version }));
+    }
+    let staged = staging_of(directory, &bundle.vehicle.name);
+    copy(&place, &staged).map_err(|error| at(&staged)(error.into()))?;
+    put(&staged, directory, current)?;
+    Ok(version)
+}
+
+/// Byte for byte: what goes back is what was there.
+fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    let _ = fs::remove_dir_all(to);
+    fs::create_dir_all(to)?;
+    for name in FILES.into_iter().filter(|name| from.join(name).exists()) {
+        fs::copy(from.join(name), to.join(name))?;
+    }
+    Ok(())
+}
+
+fn version_in(directory: &Path) -> Result<u32, BundleError> {
+    let path = directory.join(VEHICLE_FILE);
+    Ok(VehicleFile::parse(&read_bounded(&path)?, directory).map_err(at(&path))?.version)
+}
+
+/// Exchanges a staged bundle with the one in place, and moves the latter, of version `before`, to the others.
+fn put(staged: &Path, directory: &Path, before: u32) -> Result<(), BundleError> {
+    let kept = place_of(directory, before);
+    let folder = kept.parent().unwrap_or(&kept);
+    let prepare = || {
+        match fs::remove_dir_all(folder) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+            _ => fs::create_dir_all(folder)?,
+        }
+        exchange(staged, directory)?;
+        fs::rename(staged, &kept)
+    };
+    prepare().map_err(|error| at(&kept)(error.into()))
+}

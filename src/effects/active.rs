@@ -1,0 +1,273 @@
+//! Effects in the request path: the loads of a file's effects in one state, by the functions that they were fitted with.
+//!
+//! The surfaces of an answer keep the model's own loads. An effect's whole load about the center of mass stands beside them,
+//! so that surfaces and effects sum to the net wrench; what an effect puts on single surfaces is told as well.
+
+use nalgebra::Matrix6;
+
+use super::body::Body;
+use super::file::EffectsFile;
+use super::immersion::Immersion;
+use super::input::{BaseDrag, Input, Memory, Part};
+use super::library::{Effect, MAX_COEFFICIENTS, PHYSICS, Shape};
+use super::validity::OutsideBox;
+use super::{added_mass_matrix, advance, basis};
+use crate::condition::Condition;
+use crate::forces::Forces;
+use crate::frame::Vec3;
+use crate::vehicle::{MAX_SURFACES, Vehicle};
+use crate::wrench::Wrench;
+
+/// What effects need to know beside the state; absent where the caller did not say.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Circumstances {
+    /// Angle from the world's x to the body's x [rad], in the world of the trials.
+    pub heading: Option<f64>,
+    /// Rate at which the water rises at the body origin [m/s]; in a session, by default, that of the depth.
+    pub depth_rate: Option<f64>,
+    /// Wheel speeds front left, front right, rear left, rear right [rad/s].
+    pub wheel_speeds: Option<[f64; 4]>,
+    /// Time since the state before it in the session [s]; 0 leaves the session's memory as it is.
+    pub time_step: f64,
+    /// The caller integrates added mass himself with the matrix: forces leave `-M_A nu_dot` out.
+    pub implicit_added_mass: bool,
+}
+
+/// What lasts from state to state: the memory of waves and flooding. Starts at rest and dry.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Session {
+    flooding: Memory,
+    waves: Memory,
+    depth: Option<f64>,
+    depth_rate: Option<f64>,
+}
+
+impl Session {
+    fn memory(&mut self, effect: Effect) -> &mut Memory {
+        if effect == Effect::HullFlooding { &mut self.flooding } else { &mut self.waves }
+    }
+
+    /// Takes the rate of the depth from its change.
+    fn follow(&mut self, depth: f64, time_step: f64) {
+        if let Some(before) = self.depth.filter(|_| time_step > 0.0) {
+            self.depth_rate = Some((depth - before) / time_step);
+        }
+        self.depth = Some(depth);
+    }
+}
+
+/// Why an effect gave no load. The discriminants are the wire's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum LeftOut {
+    /// It remembers, and the state belongs to no session: as at rest and dry.
+    NoSession = 1,
+    /// The heading was not given.
+    NoHeading = 2,
+    /// The wheel speeds were not given.
+    NoWheelSpeeds = 3,
+    /// The rate of the depth was not given.
+    NoDepthRate = 4,
+    /// The caller stated a current himself.
+    CurrentStated = 5,
+}
+
+impl LeftOut {
+    /// Every reason, in the order of the wire.
+    pub const ALL: [Self; 5] =
+        [Self::NoSession, Self::NoHeading, Self::NoWheelSpeeds, Self::NoDepthRate, Self::CurrentStated];
+
+    /// The reason in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoSession => "no_session",
+            Self::NoHeading => "no_heading",
+            Self::NoWheelSpeeds => "no_wheel_speeds",
+            Self::NoDepthRate => "no_depth_rate",
+            Self::CurrentStated => "current_stated",
+        }
+    }
+
+    /// The reason of a code of the wire.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|&reason| reason as u32 == code)
+    }
+}
+
+/// The load of one effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectLoad {
+    /// Which.
+    pub effect: Effect,
+    /// About the center of mass, body frame [N, N m].
+    pub wrench: Wrench,
+    /// Why it is zero, where the effect could not be told.
+    pub left_out: Option<LeftOut>,
+}
+
+/// The loads of all effects. Reused from query to query without allocating.
+#[derive(Debug, Clone)]
+pub struct EffectLoads {
+    /// One load an effect, in the order of the file.
+    pub loads: Vec<EffectLoad>,
+    /// Share of the effects' forces that acts on each surface [N]: a part of `loads`, not to be added to them.
+    pub surface_forces: Vec<Vec3>,
+    /// How far the state lies outside the box in which the effects were seen.
+    pub outside: OutsideBox,
+    /// Added mass and inertia about the center of mass, forces first [kg, kg m, kg m2], where there is such an effect.
+    pub added_mass: Option<Matrix6<f64>>,
+    immersion: Immersion,
+}
+
+impl Default for EffectLoads {
+    fn default() -> Self {
+        let panels = Vec::with_capacity(MAX_SURFACES);
+        Self {
+            loads: Vec::with_capacity(PHYSICS),
+            surface_forces: Vec::with_capacity(MAX_SURFACES),
+            outside: OutsideBox::default(),
+            added_mass: None,
+            immersion: Immersion { panels, ..Immersion::default() },
+        }
+    }
+}
+
+impl EffectLoads {
+    /// Forgets the answer before.
+    pub fn clear(&mut self) {
+        self.loads.clear();
+        self.surface_forces.clear();
+        self.outside = OutsideBox::default();
+        self.added_mass = None;
+    }
+
+    /// Sum over the effects.
+    pub fn sum(&self) -> Wrench {
+        self.loads.iter().fold(Wrench::default(), |sum, load| sum + load.wrench)
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Entry {
+    effect: Effect,
+    shape: Shape,
+    values: [f64; MAX_COEFFICIENTS],
+    base_drag: BaseDrag,
+    channel_width: Option<f64>,
+}
+
+/// The effects of a vehicle, ready to be evaluated.
+#[derive(Debug, Clone)]
+pub struct ActiveEffects {
+    file: EffectsFile,
+    body: Body,
+    entries: Vec<Entry>,
+}
+
+impl ActiveEffects {
+    /// Prepares the hull, which takes a tenth of a second.
+    pub fn new(file: EffectsFile, vehicle: &Vehicle) -> Self {
+        let entries = file.effects.iter().map(|effect| Entry {
+            effect: effect.name,
+            shape: effect.shape,
+            values: effect.values(),
+            base_drag: effect.base_drag(),
+            channel_width: effect.channel_width,
+        });
+        Self { entries: entries.collect(), body: Body::of_vehicle(vehicle), file }
+    }
+
+    /// The file that they came from.
+    pub fn file(&self) -> &EffectsFile {
+        &self.file
+    }
+
+    /// The loads in a state for which the model gave `forces`, of which `wet_parts_known` says that wetted fractions and
+    /// points are those of the hull's samples. Allocates nothing.
+    ///
+    /// The memory of a session moves on by the time step with the state at its end, as it does along a trial in fitting.
+    pub fn evaluate(
+        &self,
+        condition: &Condition,
+        circumstances: &Circumstances,
+        (forces, wet_parts_known): (&Forces, bool),
+        mut session: Option<&mut Session>,
+        out: &mut EffectLoads,
+    ) {
+        out.clear();
+        out.outside = self.file.validity.outside(condition);
+        out.surface_forces.resize(forces.surfaces.len(), Vec3::zeros());
+        let state = self.file.validity.clamped(condition);
+        if wet_parts_known && state.depth == condition.depth {
+            self.body.immerse_as(&state, &forces.surfaces, &mut out.immersion);
+        } else {
+            self.body.immerse(&state, &mut out.immersion);
+        }
+        let mut rate = circumstances.depth_rate;
+        if let Some(session) = session.as_deref_mut() {
+            session.follow(condition.depth, circumstances.time_step);
+            rate = rate.or(session.depth_rate);
+        }
+        let without_rate = still(&state);
+        let current_stated = condition.velocity != condition.ground_velocity;
+        let EffectLoads { loads, surface_forces, immersion, added_mass, .. } = out;
+        for entry in &self.entries {
+            let implicit = entry.effect == Effect::AddedMass && circumstances.implicit_added_mass;
+            let input = Input {
+                body: &self.body,
+                condition: if implicit { &without_rate } else { &state },
+                immersion,
+                predicted: forces.wrench,
+                base_drag: entry.base_drag,
+                yaw: circumstances.heading.unwrap_or(0.0),
+                wetting_rate: rate.unwrap_or(0.0),
+                channel_width: entry.channel_width,
+                wheel_speeds: circumstances.wheel_speeds.map_or([None; 4], |speeds| speeds.map(Some)),
+            };
+            let left_out = match entry.effect {
+                Effect::HullFlooding | Effect::WaveMemory if session.is_none() => Some(LeftOut::NoSession),
+                Effect::Current if current_stated => Some(LeftOut::CurrentStated),
+                Effect::Current if circumstances.heading.is_none() => Some(LeftOut::NoHeading),
+                Effect::WheelPaddleThrust if circumstances.wheel_speeds.is_none() => {
+                    Some(LeftOut::NoWheelSpeeds)
+                }
+                Effect::WaterEntrySlamming if rate.is_none() => Some(LeftOut::NoDepthRate),
+                _ => None,
+            };
+            let memory = match session.as_deref_mut().filter(|_| entry.effect.has_memory()) {
+                Some(session) => {
+                    let memory = session.memory(entry.effect);
+                    if circumstances.time_step > 0.0 {
+                        advance(entry.effect, &entry.shape, memory, &input, circumstances.time_step);
+                    }
+                    *memory
+                }
+                None => Memory::default(),
+            };
+            let mut wrench = Wrench::default();
+            if left_out.is_none() {
+                basis(entry.effect, &entry.shape, &memory, &input, |coefficient, part, load| {
+                    let value = entry.values[coefficient];
+                    wrench += load * value;
+                    if let Part::Panel(panel) = part {
+                        surface_forces[panel] += load.force * value;
+                    }
+                });
+            }
+            if entry.effect == Effect::AddedMass {
+                let k = std::array::from_fn(|axis| entry.values[axis]);
+                *added_mass = Some(added_mass_matrix(&self.body, immersion, state.density, &k));
+            }
+            loads.push(EffectLoad { effect: entry.effect, wrench, left_out });
+        }
+    }
+}
+
+/// The same state with velocities that do not change in body axes.
+fn still(state: &Condition) -> Condition {
+    Condition {
+        acceleration: state.angular_velocity.cross(&state.ground_velocity),
+        angular_acceleration: Vec3::zeros(),
+        ..*state
+    }
+}

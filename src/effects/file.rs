@@ -1,0 +1,310 @@
+//! `effects.toml`: the effects that are switched on in a bundle, with what they rest on.
+//!
+//! Written by the gap workflow, read by whatever serves the bundle. A file is taken as a whole or refused as a whole.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use super::input::BaseDrag;
+use super::library::{Effect, Kind, MAX_COEFFICIENTS, Shape};
+use super::validity::Validity;
+use crate::frame::Vec3;
+
+/// Version of the file's format that this program writes, and the newest that it reads.
+pub const FORMAT: u32 = 1;
+
+/// The whole file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EffectsFile {
+    format: u32,
+    /// The vehicle that the effects were fitted for.
+    pub vehicle: String,
+    /// What the fit rests on.
+    pub evidence: Evidence,
+    /// Ranges of the state in which the effects were seen.
+    pub validity: Validity,
+    /// The effects; at least one, each once.
+    #[serde(rename = "effect")]
+    pub effects: Vec<ActiveEffect>,
+}
+
+/// What a fit rests on.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Evidence {
+    /// Names of the trials.
+    pub trials: Vec<String>,
+    /// Hash of the numbers in the trials.
+    pub trials_sha256: String,
+    /// How the trials were generated, where they were not measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub generated: Option<String>,
+    /// Samples used.
+    pub samples: usize,
+    /// Hash of the bundle that the effects were fitted to.
+    pub model_sha256: String,
+    /// Hash of the weights in that bundle: with other weights the effects mean nothing.
+    pub weights_sha256: String,
+    /// Version and commit of the program.
+    pub tool: String,
+    /// Share of the gap above the noise that the effects close on trials that took no part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closure: Option<f64>,
+}
+
+/// One effect with its numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActiveEffect {
+    /// Which of the library.
+    pub name: Effect,
+    /// Its equation, for the reader.
+    pub equation: String,
+    /// Seen in one condition only.
+    pub provisional: bool,
+    /// Share of the gap above the floor that goes when it is added to the others.
+    pub share_of_gap: f64,
+    /// Nonlinear parameters and the form, in the order of the effect's source.
+    pub shape: Shape,
+    /// Drag coefficients of the model that the effect scales with, along x, y, z [-].
+    pub base_drag: [f64; 3],
+    /// Width of the channel in which it was seen [m].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel_width: Option<f64>,
+    /// Names of the coefficients in the order of the covariance.
+    pub coefficients: Vec<String>,
+    /// Covariance of the coefficients, in the product of their units.
+    pub covariance: Vec<Vec<f64>>,
+    /// The coefficients and the nonlinear parameters by name.
+    pub parameters: BTreeMap<String, ParameterValue>,
+}
+
+/// A value with its standard error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterValue {
+    /// Best estimate.
+    pub value: f64,
+    /// Standard error.
+    pub std: f64,
+    /// Unit; 1 where it has none.
+    pub unit: String,
+}
+
+/// Why a file was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EffectsFileError {
+    /// Not TOML, or a key is missing, unknown or of the wrong type.
+    #[error("{0}")]
+    Toml(#[from] toml::de::Error),
+    /// Written by a newer program.
+    #[error("format {found} is newer than {FORMAT}, the newest that this program reads: update wade")]
+    NewerFormat {
+        /// The format of the file.
+        found: u32,
+    },
+    /// Fitted for another vehicle.
+    #[error("vehicle = \"{found}\", but the bundle is of \"{expected}\"")]
+    Vehicle {
+        /// In the file.
+        found: String,
+        /// Of the bundle.
+        expected: String,
+    },
+    /// Fitted to other weights.
+    #[error(
+        "evidence.weights_sha256 is not that of the bundle's weights: effects are fitted to a model and go with it"
+    )]
+    OtherWeights,
+    /// No effect.
+    #[error("no [[effect]]: without an effect there is no file")]
+    Empty,
+    /// The same effect twice.
+    #[error("effect {effect} is there twice")]
+    Twice {
+        /// Its name.
+        effect: &'static str,
+    },
+    /// Not a load of the water.
+    #[error("effect {effect} is a fault of the measuring chain or the drive, not a load of the water")]
+    NotPhysics {
+        /// Its name.
+        effect: &'static str,
+    },
+    /// A field that is not what it must be.
+    #[error("effect {effect}: {field} must be {expected}")]
+    Field {
+        /// Its name.
+        effect: &'static str,
+        /// The field, such as `parameters.surge.value`.
+        field: String,
+        /// What it must be.
+        expected: String,
+    },
+    /// A range whose ends are not finite and in order.
+    #[error("validity.{quantity} must be two finite numbers, the smaller first")]
+    Validity {
+        /// The quantity.
+        quantity: &'static str,
+    },
+}
+
+impl EffectsFile {
+    /// A file of this program's format.
+    pub fn new(vehicle: String, evidence: Evidence, validity: Validity, effects: Vec<ActiveEffect>) -> Self {
+        Self { format: FORMAT, vehicle, evidence, validity, effects }
+    }
+
+    /// Reads the file of a vehicle and checks everything in it.
+    pub fn parse(bytes: &[u8], vehicle: &str) -> Result<Self, EffectsFileError> {
+        #[derive(Deserialize)]
+        struct Format {
+            format: u32,
+        }
+        let text = String::from_utf8_lossy(bytes);
+        let Format { format } = toml::from_str(&text)?;
+        if format > FORMAT {
+            return Err(EffectsFileError::NewerFormat { found: format });
+        }
+        let file: Self = toml::from_str(&text)?;
+        file.check(vehicle)?;
+        Ok(file)
+    }
+
+    /// Checks what the types do not.
+    pub fn check(&self, vehicle: &str) -> Result<(), EffectsFileError> {
+        if self.vehicle != vehicle {
+            let (found, expected) = (self.vehicle.clone(), vehicle.to_owned());
+            return Err(EffectsFileError::Vehicle { found, expected });
+        }
+        if let Some(quantity) = self.validity.bad_range() {
+            return Err(EffectsFileError::Validity { quantity });
+        }
+        if self.effects.is_empty() {
+            return Err(EffectsFileError::Empty);
+        }
+        let mut seen = BTreeSet::new();
+        for effect in &self.effects {
+            if !seen.insert(effect.name) {
+                return Err(EffectsFileError::Twice { effect: effect.name.name() });
+            }
+            effect.check()?;
+        }
+        Ok(())
+    }
+
+    /// The text of the file.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("plain numbers, strings and tables are always TOML")
+    }
+}
+
+impl ActiveEffect {
+    /// Value of every coefficient of the library in its order; 0 for those that were not fitted.
+    pub(super) fn values(&self) -> [f64; MAX_COEFFICIENTS] {
+        let mut values = [0.0; MAX_COEFFICIENTS];
+        for (value, coefficient) in values.iter_mut().zip(self.name.coefficients()) {
+            if self.coefficients.iter().any(|name| name == coefficient.name) {
+                *value = self.parameters.get(coefficient.name).map_or(0.0, |parameter| parameter.value);
+            }
+        }
+        values
+    }
+
+    pub(super) fn base_drag(&self) -> BaseDrag {
+        Vec3::from(self.base_drag)
+    }
+
+    fn check(&self) -> Result<(), EffectsFileError> {
+        let effect = self.name.name();
+        if self.name.kind() != Kind::Physics {
+            return Err(EffectsFileError::NotPhysics { effect });
+        }
+        let must = |holds: bool, field: &str, expected: &str| match holds {
+            true => Ok(()),
+            false => Err(EffectsFileError::Field {
+                effect,
+                field: field.to_owned(),
+                expected: expected.to_owned(),
+            }),
+        };
+        must((0.0..=1.0).contains(&self.share_of_gap), "share_of_gap", "between 0 and 1")?;
+        must(self.shape.iter().all(|x| x.is_finite()), "shape", "three finite numbers")?;
+        must(self.base_drag.iter().all(|x| (0.0..=10.0).contains(x)), "base_drag", "between 0 and 10")?;
+        let width = self.channel_width.is_none_or(|width| width.is_finite() && width > 0.0);
+        must(width, "channel_width", "greater than 0")?;
+        let in_channel = self.name != Effect::ChannelBlockage || self.channel_width.is_some();
+        must(in_channel, "channel_width", "there: this effect depends on it")?;
+        self.check_coefficients(&must)?;
+        self.check_parameters(&must)
+    }
+
+    fn check_coefficients(
+        &self,
+        must: &impl Fn(bool, &str, &str) -> Result<(), EffectsFileError>,
+    ) -> Result<(), EffectsFileError> {
+        let specs = self.name.coefficients();
+        let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
+        let known = self.coefficients.iter().all(|name| names.contains(&name.as_str()));
+        must(
+            known && !self.coefficients.is_empty(),
+            "coefficients",
+            &format!("some of {}", names.join(", ")),
+        )?;
+        let distinct: BTreeSet<&String> = self.coefficients.iter().collect();
+        must(distinct.len() == self.coefficients.len(), "coefficients", "different from each other")?;
+        let count = self.coefficients.len();
+        let square = self.covariance.len() == count && self.covariance.iter().all(|row| row.len() == count);
+        must(square, "covariance", &format!("{count} rows of {count} numbers, one a coefficient"))?;
+        let sound = (0..count).all(|i| {
+            let symmetric = |j: usize| {
+                let (a, b) = (self.covariance[i][j], self.covariance[j][i]);
+                a.is_finite() && (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
+            };
+            self.covariance[i][i] >= 0.0 && (0..count).all(symmetric)
+        });
+        must(sound, "covariance", "finite, symmetric, and not negative on its diagonal")
+    }
+
+    fn check_parameters(
+        &self,
+        must: &impl Fn(bool, &str, &str) -> Result<(), EffectsFileError>,
+    ) -> Result<(), EffectsFileError> {
+        let shapes = self.name.shape_names();
+        let fitted =
+            self.name.coefficients().iter().filter(|spec| self.coefficients.iter().any(|c| c == spec.name));
+        let coefficients = fitted.map(|spec| (spec.name, spec.unit, spec.bounds));
+        let limit = f64::MAX;
+        let expected: Vec<(&str, &str, [f64; 2])> =
+            coefficients.chain(shapes.iter().map(|&(name, unit)| (name, unit, [0.0, limit]))).collect();
+        let names = expected.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ");
+        let unknown = self.parameters.keys().find(|key| !expected.iter().any(|(name, ..)| name == key));
+        must(
+            unknown.is_none(),
+            &format!("parameters.{}", unknown.map_or("", String::as_str)),
+            &format!("one of {names}"),
+        )?;
+        for (name, unit, [low, high]) in expected {
+            let field = |part: &str| format!("parameters.{name}{part}");
+            let Some(parameter) = self.parameters.get(name) else {
+                return must(false, &field(""), "there");
+            };
+            must(parameter.unit == unit, &field(".unit"), &format!("\"{unit}\""))?;
+            let physical = (low..=high).contains(&parameter.value);
+            must(
+                physical,
+                &field(".value"),
+                &format!("between {low} and {high}, what is physically possible"),
+            )?;
+            must(parameter.std.is_finite() && parameter.std >= 0.0, &field(".std"), "0 or greater")?;
+        }
+        for (axis, (name, _)) in shapes.iter().enumerate() {
+            let same =
+                self.parameters.get(*name).is_some_and(|parameter| parameter.value == self.shape[axis]);
+            must(same, &format!("shape[{axis}]"), &format!("parameters.{name}.value"))?;
+        }
+        Ok(())
+    }
+}

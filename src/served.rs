@@ -1,0 +1,63 @@
+//! A vehicle as it is served: its model and the effects that were added to it.
+
+use crate::condition::Condition;
+use crate::effects::{ActiveEffects, Circumstances, EffectLoads, EffectsFile, Session};
+use crate::forces::Forces;
+use crate::model::{Form, Model, Workspace};
+
+/// What a served vehicle answers. Reused from query to query.
+#[derive(Debug, Clone, Default)]
+pub struct Loads {
+    /// The model's forces on every surface; the net wrench is the sum of these and of the effects.
+    pub forces: Forces,
+    /// The loads of the effects.
+    pub effects: EffectLoads,
+}
+
+/// One version of a bundle, ready to answer.
+#[derive(Debug)]
+pub struct ServedVehicle {
+    model: Model,
+    effects: Option<ActiveEffects>,
+}
+
+impl ServedVehicle {
+    /// A model with the effects of its bundle, where it has any.
+    pub fn new(model: Model, effects: Option<EffectsFile>) -> Self {
+        let effects = effects.map(|file| ActiveEffects::new(file, model.vehicle()));
+        Self { model, effects }
+    }
+
+    /// The model without its effects.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// What was added to the model.
+    pub fn effects(&self) -> Option<&EffectsFile> {
+        self.effects.as_ref().map(ActiveEffects::file)
+    }
+
+    /// Forces and moments in a state. Allocates nothing. Effects with a memory live in `session`; without one they are left
+    /// out, and their loads say so.
+    pub fn evaluate(
+        &self,
+        condition: &Condition,
+        circumstances: &Circumstances,
+        session: Option<&mut Session>,
+        workspace: &mut Workspace,
+        loads: &mut Loads,
+    ) {
+        let Loads { forces, effects: added } = loads;
+        self.model.evaluate(condition, workspace, forces);
+        match &self.effects {
+            Some(effects) => {
+                // the wet parts of an anchored model are not those of the samples, with which effects are fitted
+                let known = matches!(self.model.weights().form, Form::Paper(_));
+                effects.evaluate(condition, circumstances, (forces, known), session, added);
+                forces.wrench += added.sum();
+            }
+            None => added.clear(),
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Promise: `wade gap --apply` adds what it named to the bundle and nothing else, a served answer changes by it, and one
+//! command takes it back; where there is nothing to trust, the bundle stays as it was.
+
+mod common;
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+use wade::condition::Condition;
+use wade::forces::Forces;
+use wade::frame::Vec3;
+use wade::geometry::hydrostatics::hydrostatics;
+use wade::model::Workspace;
+use wade::random::Random;
+
+/// Planted: water that moves with the hull ahead, over the water displaced.
+const SURGE: f64 = 0.6;
+/// Standard deviation of a measured force [N].
+const NOISE: f64 = 8.0;
+
+struct Place {
+    folder: TempDir,
+    vehicles: TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        Self { folder: TempDir::new().expect("a folder"), vehicles: common::copy_of_vehicles() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn wade(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+        command.args(arguments).env("WADE_VEHICLES", self.vehicles.path());
+        command.output().expect("the program runs")
+    }
+
+    fn gap(&self, trials: &str, more: &[&str]) -> Output {
+        let (trials, out) = (self.path(trials), self.path("gap"));
+        let (trials, out) = (trials.to_string_lossy(), out.to_string_lossy());
+        let nobody = format!("unix:{}", self.path("nobody.sock").display());
+        let mut arguments = vec!["gap", "--vehicle", "warthog", "--trials", &trials, "--out", &out];
+        arguments.extend(["--apply", "--server", &nobody]);
+        arguments.extend(more);
+        self.wade(&arguments)
+    }
+
+    fn query(&self) -> Value {
+        let output = self.wade(&[
+            "query",
+            "--vehicle",
+            "warthog",
+            "--speed",
+            "1",
+            "--depth",
+            "0.25",
+            "--acceleration",
+            "0.5,0,0",
+            "--json",
+        ]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).expect("JSON")
+    }
+
+    fn bundle(&self) -> Vec<(String, Vec<u8>)> {
+        let entries = std::fs::read_dir(self.vehicles.path().join("warthog")).expect("readable");
+        let mut files: Vec<_> = entries
+            .map(|entry| {
+                let entry = entry.expect("readable");
+                let bytes = std::fs::read(entry.path()).expect("readable");
+                (entry.file_name().to_string_lossy().into_owned(), bytes)
+            })
+            .collect();
+        files.sort();
+        files
+    }
+}
+
+fn gaussian(random: &mut Random) -> f64 {
+    (-2.0 * (1.0 - random.unit()).ln()).sqrt() * (std::f64::consts::TAU * random.unit()).cos()
+}
+
+/// Trials of the Warthog that speed up and slow down straight ahead in three depths: the model's force, the planted
+/// effect by a formula of its own, and noise.
+fn write_trials(folder: &Path, surge: f64) {
+    std::fs::create_dir_all(folder).expect("made");
+    let manifest = "vehicle = \"warthog\"\ngenerated = \"for a test\"\n[sensor_noise]\nfx = 8.0\nfz = 8.0\n";
+    std::fs::write(folder.join("trials.toml"), manifest).expect("written");
+    let model = common::model("warthog");
+    let vehicle = model.vehicle();
+    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    for trial in 0..10_u32 {
+        let mut random = Random::new(u64::from(trial) + 1);
+        let depth = [0.15, 0.22, 0.3][trial as usize % 3];
+        let (top, rate) = (0.8 + 0.15 * f64::from(trial), 0.9 + 0.1 * f64::from(trial % 4));
+        let plane = Condition::level(Vec3::zeros(), depth).water_plane(vehicle.z0);
+        let volume = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &Vec3::zeros()).displaced_volume;
+        let mut text = String::from("t,vx,vy,vz,wx,wy,wz,depth,ax,ay,az,fx,fz\n");
+        for sample in 0..400 {
+            let t = 0.02 * f64::from(sample);
+            let v = 0.5 * top * (1.0 - (rate * t).cos());
+            let a = 0.5 * top * rate * (rate * t).sin();
+            let state = Condition::level(Vec3::new(v, 0.0, 0.0), depth);
+            model.evaluate(&state, &mut workspace, &mut forces);
+            let fx = forces.wrench.force.x - surge * 1000.0 * volume * a + NOISE * gaussian(&mut random);
+            let fz = forces.wrench.force.z + NOISE * gaussian(&mut random);
+            writeln!(text, "{t},{v},0,0,0,0,0,{depth},{a},0,0,{fx},{fz}").expect("a string");
+        }
+        std::fs::write(folder.join(format!("run{trial:02}.csv")), text).expect("written");
+    }
+}
+
+#[test]
+fn what_is_named_is_added_and_taken_back() {
+    let place = Place::new();
+    write_trials(&place.path("trials"), SURGE);
+    let (before, bundle) = (place.query(), place.bundle());
+    assert_eq!(before["effects"], Value::Array(Vec::new()));
+    let output = place.gap("trials", &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stdout));
+    assert!(said.contains("rollback") && said.contains("no running server"), "{said}");
+
+    let after = place.query();
+    let version = |answer: &Value| answer["version"].as_u64().expect("a number");
+    assert_eq!(version(&after), version(&before) + 1);
+    assert_eq!(after["effects"].as_array().map(Vec::len), Some(1), "{after:#}");
+    let load = &after["effects"][0];
+    assert_eq!((load["name"].as_str(), &load["left_out"]), (Some("added_mass"), &Value::Null));
+    let model = common::model("warthog");
+    let plane = Condition::level(Vec3::zeros(), 0.25).water_plane(model.vehicle().z0);
+    let volume = hydrostatics(&model.vehicle().hull.mesh, &plane, 1000.0, &Vec3::zeros()).displaced_volume;
+    let (force, expected) = (load["force"][0].as_f64().expect("a number"), -SURGE * 1000.0 * volume * 0.5);
+    assert!((force / expected - 1.0).abs() < 0.1, "{force}, planted {expected}");
+    let fx = |answer: &Value| answer["wrench"]["force"][0].as_f64().expect("a number");
+    assert!((fx(&after) - fx(&before) - force).abs() < 1e-3);
+    let mass = after["added_mass"][0][0].as_f64().expect("a number");
+    assert!((mass * 0.5 + force).abs() < 1e-3);
+
+    // the same trials give the same effects, in the place of those before
+    assert!(place.gap("trials", &[]).status.success());
+    let again = place.query();
+    assert_eq!((version(&again), &again["effects"]), (version(&before) + 2, &after["effects"]));
+    let shown = place.wade(&["vehicle", "show", "warthog", "--json"]);
+    let shown: Value = serde_json::from_slice(&shown.stdout).expect("JSON");
+    assert_eq!(shown["effects"][0]["name"], "added_mass");
+    assert_eq!(shown["kept"].as_array().map(Vec::len), Some(2), "{shown:#}");
+
+    let nobody = format!("unix:{}", place.path("nobody.sock").display());
+    for back in [version(&before) + 1, version(&before)] {
+        let output = place.wade(&["vehicle", "rollback", "warthog", "--server", &nobody]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(version(&place.query()), back);
+    }
+    assert_eq!(place.bundle(), bundle, "bit for bit");
+    assert_eq!(place.query()["wrench"], before["wrench"]);
+    let output = place.wade(&["vehicle", "rollback", "warthog", "--server", &nobody]);
+    assert_eq!(output.status.code(), Some(1));
+}
+
+#[test]
+fn where_nothing_is_missing_nothing_is_added() {
+    let place = Place::new();
+    write_trials(&place.path("trials"), 0.0);
+    let bundle = place.bundle();
+    let output = place.gap("trials", &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("nothing applied: nothing is missing"), "{said}");
+    assert_eq!(place.bundle(), bundle);
+    assert!(!place.path("gap/effects.toml").exists());
+}
+
+#[test]
+fn bad_trials_leave_the_bundle_as_it_was() {
+    let place = Place::new();
+    write_trials(&place.path("trials"), SURGE);
+    let bundle = place.bundle();
+    let path = place.path("trials/run03.csv");
+    let text = std::fs::read_to_string(&path).expect("readable");
+    let lines: Vec<&str> = text.lines().collect();
+    let line = lines[40].rsplit_once(',').expect("columns").0.to_owned() + ",nan";
+    std::fs::write(&path, text.replacen(lines[40], &line, 1)).expect("written");
+    let output = place.gap("trials", &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("run03.csv") && said.contains("fz") && said.contains("41"), "{said}");
+    assert_eq!(place.bundle(), bundle);
+    assert!(!place.path("gap").exists());
+}
+
+#[test]
+fn effects_of_other_trials_are_not_lost_unasked() {
+    let place = Place::new();
+    write_trials(&place.path("trials"), SURGE);
+    let squat = common::effects_file("warthog", vec![common::effect(wade::effects::Effect::Squat, 0.4)]);
+    let directory = place.vehicles.path().join("warthog");
+    wade::bundle::apply(&directory, squat).expect("applied");
+    let bundle = place.bundle();
+    let output = place.gap("trials", &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("squat") && said.contains("run00") && said.contains("--replace"), "{said}");
+    assert_eq!(place.bundle(), bundle);
+    assert!(place.gap("trials", &["--replace"]).status.success());
+    assert_eq!(place.query()["effects"][0]["name"], "added_mass");
+}
