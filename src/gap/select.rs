@@ -74,6 +74,9 @@ pub enum Refusal {
     SharedNoise,
 }
 
+/// What the gates said of an effect beside a set of columns.
+type Verdicts = BTreeMap<(Vec<usize>, Effect), Option<Judged>>;
+
 /// The regression with what the gates need.
 pub(super) struct Judge<'a> {
     pub design: &'a Design,
@@ -82,7 +85,7 @@ pub(super) struct Judge<'a> {
     pub floors: &'a [Floor; 6],
     /// Loss that nothing explains.
     pub floor_loss: f64,
-    passed: RefCell<BTreeMap<(Vec<usize>, Effect), Option<Judged>>>,
+    passed: RefCell<Verdicts>,
 }
 
 impl<'a> Judge<'a> {
