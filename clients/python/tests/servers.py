@@ -57,10 +57,13 @@ class Server:
         command: list[str | Path] = [binary(), "serve", "--config", self.folder / "wade.toml", "--vehicles", vehicles]
         with (self.folder / "log").open("ab") as log:
             self.process = subprocess.Popen(command, env=environment(), stderr=log)
-        end = time.monotonic() + 30
+        # a loaded machine may take its time
+        end = time.monotonic() + 120
         while not self._is_healthy():
-            log_text = (self.folder / "log").read_text()
-            assert self.process.poll() is None and time.monotonic() < end, log_text
+            if self.process.poll() is not None or time.monotonic() > end:
+                self.process.kill()
+                self.process.wait()
+                raise AssertionError((self.folder / "log").read_text())
             time.sleep(0.05)
 
     def _is_healthy(self) -> bool:

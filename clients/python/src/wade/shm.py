@@ -229,7 +229,7 @@ def _write_batch(
 
 def _forces(answer: np.void) -> Forces:
     surfaces, flags = _surface_count(answer), int(answer["flags"])
-    effects = answer["effects"][: _effect_count(answer)]
+    effects, effect_force, effect_moment, left_out, effect_surface_force = _effects(answer, surfaces)
     return Forces(
         force_n=answer["force_n"],
         moment_nm=answer["moment_nm"],
@@ -239,18 +239,33 @@ def _forces(answer: np.void) -> Forces:
         surface_point_m=answer["surface_point_m"][:surfaces],
         wetted_fraction=answer["wetted_fraction"][:surfaces],
         outside=answer["outside"],
-        effects=_named(effects),
-        effect_force_n=effects["force_n"],
-        effect_moment_nm=effects["moment_nm"],
-        effect_left_out=effects["left_out"].astype(np.uint8),
-        effect_surface_force_n=answer["effect_surface_force_n"][: surfaces if len(effects) else 0],
+        effects=effects,
+        effect_force_n=effect_force,
+        effect_moment_nm=effect_moment,
+        effect_left_out=left_out,
+        effect_surface_force_n=effect_surface_force,
         effects_outside=answer["effects_outside"],
         added_mass=answer["added_mass"].reshape(6, 6) if flags & layout.HAS_ADDED_MASS else None,
-        session_begins=np.bool_(flags & layout.SESSION_BEGINS),
+        session_begins=_YES if flags & layout.SESSION_BEGINS else _NO,
         bundle_version=int(answer["bundle_version"]),
         provenance=answer["provenance"].decode(errors="ignore"),
         compute_ns=int(answer["compute_ns"]),
     )
+
+
+_YES, _NO = np.True_, np.False_
+_NO_VECTORS = np.empty((0, 3), np.float32)
+_NO_EFFECTS: tuple[Any, ...] = ((), _NO_VECTORS, _NO_VECTORS, np.empty(0, np.uint8), _NO_VECTORS)
+
+
+def _effects(answer: np.void, surfaces: int) -> tuple[Any, ...]:
+    """Names, forces, moments, why left out, shares on surfaces."""
+    effects = answer["effects"][: _effect_count(answer)]
+    if not len(effects):
+        return _NO_EFFECTS
+    left_out = effects["left_out"].astype(np.uint8)
+    on_surfaces = answer["effect_surface_force_n"][:surfaces]
+    return _named(effects), effects["force_n"], effects["moment_nm"], left_out, on_surfaces
 
 
 def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool) -> Forces:
@@ -267,15 +282,15 @@ def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, 
     for name in ("surface_force_n", "surface_point_m", "wetted_fraction") if surfaces else ():
         getattr(forces, name)[chunk] = answers[name][:, :surfaces]
     _read_effects(answers, forces, chunk)
-    forces.session_begins[chunk] = answers["flags"] & layout.SESSION_BEGINS != 0  # type: ignore[index]
+    np.asarray(forces.session_begins)[chunk] = answers["flags"] & layout.SESSION_BEGINS != 0
     forces.compute_ns += int(batch["compute_ns"])
     return forces
 
 
 def _read_effects(answers: Any, forces: Forces, chunk: slice) -> None:
-    effects = answers["effects"][:, : len(forces.effects)]
-    if not len(forces.effects):
+    if not forces.effects:
         return
+    effects = answers["effects"][:, : len(forces.effects)]
     forces.effect_force_n[chunk] = effects["force_n"]
     forces.effect_moment_nm[chunk] = effects["moment_nm"]
     forces.effect_left_out[chunk] = effects["left_out"]

@@ -116,7 +116,7 @@ class State:
                 for name, count in TOLD.items():
                     values += _told(getattr(self, name), count)
             name = "time_step_s"
-            values.append(float(self.time_step_s))  # type: ignore[arg-type]
+            values.append(float(getattr(self, name)))
         except (TypeError, ValueError):
             expected = "three numbers" if name in VECTORS else "four numbers" if TOLD.get(name) == 4 else "one number"
             raise _wrong(name, f"must be {expected}, got {_describe(getattr(self, name))}") from None
