@@ -78,7 +78,7 @@ def _file(vehicle: str, weights_sha256: str, effects: dict[str, dict[str, float]
         'trials = []\ntrials_sha256 = ""\nsamples = 0\nmodel_sha256 = ""\ntool = "by hand"',
         f'generated = "chosen, not measured"\nweights_sha256 = "{weights_sha256}"\n',
         "[validity]",
-        "depth_m = [0.0, 1.0]\nspeed_mps = [0.0, 10.0]\nacceleration_mps2 = [0.0, 50.0]",
+        "depth_m = [0.0, 1.0]\nspeed_mps = [0.0, 10.0]\nacceleration_mps2 = [0.0, 1000.0]",
         "angular_speed_radps = [0.0, 20.0]\ndensity_kgpm3 = [900.0, 2000.0]\n",
     ]
     for name, values in effects.items():

@@ -6,8 +6,8 @@
 
 MuJoCo has no free surface. Here each step of 1 ms asks the server for the net wrench at the present depth, attitude
 and velocity, over shared memory, and puts it on the body that carries the wheels. Where the server has an added mass,
-its matrix goes into MuJoCo's own before the accelerations are solved for: as a force it would follow the acceleration of
-the step before, which diverges when the water that moves along weighs as much as the body (`--heave` draws both).
+its matrix goes into MuJoCo's own before the accelerations are solved for: as a force it would follow the acceleration
+of the step before, which diverges when the water that moves along weighs as much as the body (`--heave` draws both).
 A depth below zero cannot be asked for: the water begins when it reaches the ground under the body's origin.
 """
 
@@ -175,8 +175,8 @@ class Water:
         return state
 
     def _add_mass(self, data: mujoco.MjData, matrix: Any, world_from_body: Any, center: Any) -> Any:
-        """Adds `J^T M_A J` to the mass matrix; J takes the body's rates to `nu`, the velocity of the center of mass and the
-        angular velocity in body axes. What `nu_dot` has beside `J q_ddot`, `-omega x v`, becomes a load.
+        """Adds `J^T M_A J` to the mass matrix; J takes the body's rates to `nu`, the velocity of the center of mass and
+        the angular velocity in body axes. What `nu_dot` has beside `J q_ddot`, `-omega x v`, becomes a load.
         """
         jacobian = self._jacobian
         mujoco.mj_jac(self._model, data, jacobian[:3], jacobian[3:], center, self._body)

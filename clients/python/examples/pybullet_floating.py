@@ -99,7 +99,8 @@ def main() -> None:
         vehicle = client.vehicle(VEHICLE)
     with wade.ShmClient(arguments.namespace) as client:
         depths = let_go(client, vehicle, 0.42, 6.0)
-    print(f"from {depths[0]:.3f} m to {depths[-500:].mean():.3f} m, at the end within {np.ptp(depths[-500:]) * 1e3:.1f} mm")
+    end = depths[-500:]
+    print(f"from {depths[0]:.3f} m to {end.mean():.3f} m, in the last second within {np.ptp(end) * 1e3:.1f} mm")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,8 @@ from pathlib import Path
 import grpc
 
 ROOT = Path(__file__).resolve().parents[3]
-VEHICLES = ROOT / "vehicles"
+#: The shipped ones, or those of other weights.
+VEHICLES = Path(os.environ.get("WADE_TEST_VEHICLES", ROOT / "vehicles")).resolve()
 
 
 def binary() -> Path:

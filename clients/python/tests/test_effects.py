@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import CLIENTS, connect
-from servers import Server, binary, environment
+from servers import VEHICLES, Server, binary, environment
 
 import wade
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from effects_by_hand import LIBRARY, add_effects, copy_with
 
-STATE = wade.State(depth_m=0.15, velocity_mps=(0.5, 0.1, 0), acceleration_mps2=(60.0, 0, 0))
+STATE = wade.State(depth_m=0.15, velocity_mps=(0.5, 0.1, 0), acceleration_mps2=(1010.0, 0, 0))
 #: What the effects need to be told, for three states.
 TOLD = {
     "heading_rad": np.array([0.5, -0.25, 3.0]),
@@ -39,7 +39,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """Whose vehicles have every effect."""
     folder = tmp_path_factory.mktemp("effects")
     server = Server(folder)
-    server.start(copy_with({name: {} for name in LIBRARY}, folder / "vehicles"))
+    server.start(copy_with({name: {} for name in LIBRARY}, folder / "vehicles", VEHICLES))
     yield server
     server.stop()
 
@@ -54,7 +54,7 @@ def client(request: pytest.FixtureRequest, server: Server, loop: asyncio.Abstrac
 def expected(server: Server) -> dict[str, Any]:
     """What the program itself says of `STATE`."""
     command: list[Any] = [binary(), "query", "--vehicle", "husky", "--vehicles", server.folder / "vehicles", "--json"]
-    command += ["--velocity=0.5,0.1,0", "--acceleration=60,0,0", "--depth=0.15"]
+    command += ["--velocity=0.5,0.1,0", "--acceleration=1010,0,0", "--depth=0.15"]
     return dict(json.loads(subprocess.run(command, capture_output=True, check=True, env=environment()).stdout))
 
 
@@ -84,7 +84,7 @@ def test_the_effects_are_those_of_the_query_command(client: Any, expected: dict[
         "added_mass": expected["added_mass"],
     }.items():
         np.testing.assert_array_equal(getattr(forces, array), np.array(value, np.float32), err_msg=array)
-    # seen up to 50 m/s2
+    # seen up to 1000 m/s2
     assert forces.effects_outside[wade.BoxQuantity.ACCELERATION] == pytest.approx(10.0)
     assert np.count_nonzero(forces.effects_outside) == len(expected["effects_outside"]) == 1
 
@@ -231,13 +231,13 @@ def test_a_server_says_what_was_added(server: Server) -> None:
     assert [effect.name for effect in vehicle.effects] == [*LIBRARY]
     surge = next(p for p in vehicle.effects[0].parameters if p.name == "surge")
     assert (surge.value, surge.std, surge.unit) == (0.3, 0.0, "1")
-    assert vehicle.effects_validity[wade.BoxQuantity.ACCELERATION] == (0.0, 50.0)
+    assert vehicle.effects_validity[wade.BoxQuantity.ACCELERATION] == (0.0, 1000.0)
 
 
 def test_effects_come_with_a_reload(
     kind: str, mortal_server: Server, loop: asyncio.AbstractEventLoop, tmp_path: Path
 ) -> None:
-    vehicles = copy_with({}, tmp_path / "vehicles")
+    vehicles = copy_with({}, tmp_path / "vehicles", VEHICLES)
     mortal_server.start(vehicles)
     with (
         connect(kind, mortal_server, loop, timeout_s=20.0) as client,

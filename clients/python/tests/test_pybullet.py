@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hydrostatics import DENSITY, GRAVITY, MASS, floating_depth, waterplane_area
-from servers import Server
+from servers import VEHICLES, Server
 
 import wade
 
@@ -21,7 +21,7 @@ floating = pytest.importorskip("pybullet_floating", exc_type=ImportError, reason
 
 def test_it_floats_where_hydrostatics_says_and_heaves_with_the_water(mortal_server: Server) -> None:
     effects = {"added_mass": {"heave": 1.5}, "linear_damping": {}}
-    mortal_server.start(copy_with(effects, mortal_server.folder / "vehicles"))
+    mortal_server.start(copy_with(effects, mortal_server.folder / "vehicles", VEHICLES))
     with wade.GrpcClient(mortal_server.address, timeout_s=20.0) as rpc:
         vehicle = rpc.vehicle("warthog")
     with wade.ShmClient(mortal_server.namespace, timeout_s=20.0) as client:

@@ -89,9 +89,14 @@ class ShmClient:
                     return _read_batch(address, forces, length, chunk, surfaces)
 
                 answered = self._exchange(vehicle, True, write, read, end, timeout_s)
-                # a bundle that was exchanged on the way would mix two versions in one answer: from the start again
-                changed = forces is not None and answered is not forces
-                forces, start = (None, 0) if changed else (answered, chunk.stop)
+                if forces is not None and answered is not forces:
+                    # a bundle that was exchanged on the way would mix two versions in one answer: from the start again,
+                    # without moving on those runs that have moved
+                    moved = np.arange(length) < chunk.stop
+                    rows["time_step_s"] = np.where(moved, np.float32(0.0), rows["time_step_s"])
+                    forces, start = None, 0
+                else:
+                    forces, start = answered, chunk.stop
         assert forces is not None, "rows() refuses an empty batch"
         return forces
 

@@ -85,8 +85,8 @@ class State:
     #: rest. One for the whole batch.
     implicit_added_mass: bool = False
     #: Over shared memory, the number of a run of states that follow each other, for effects that remember (waves,
-    #: flooding): one an environment, `[N]` in a batch. A run in batches is another than one of the same number in single
-    #: calls. 0: none. A stream is a run without a number; over gRPC there is no other.
+    #: flooding): one an environment, `[N]` in a batch. A run in batches is another than that of the same number in
+    #: single calls. 0: none. A stream is a run without a number; over gRPC there is no other.
     session: ArrayLike = 0
 
     def is_default(self, name: str) -> bool:
