@@ -14,6 +14,7 @@ A depth below zero cannot be asked for: the water begins when it reaches the gro
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ BODY = """
 WHEEL = """
 <body name="wheel_{name}" pos="{x} {y} -0.108">
   <joint name="wheel_{name}" type="hinge" axis="0 1 0" damping="0.5"/>
-  <geom type="cylinder" size="0.305 0.127" euler="90 0 0" mass="15" friction="1 0.01 0.001" rgba="0.1 0.1 0.1 1"/>
+  <geom type="cylinder" size="0.305 0.127" euler="90 0 0" mass="15" friction="1 0.01 0.001" rgba="0.2 0.2 0.2 1"/>
 </body>
 """
 WHEELS = {"fl": (0.457, 0.5685), "fr": (0.457, -0.5685), "rl": (-0.457, 0.5685), "rr": (-0.457, -0.5685)}
@@ -71,7 +72,10 @@ def build(
     return mujoco.MjModel.from_xml_string(f"""
         <mujoco>
           <option timestep="{timestep_s}" integrator="implicitfast" {fluid}/>
-          <visual><global offwidth="800" offheight="400"/></visual>
+          <visual><headlight ambient="0.5 0.5 0.5" diffuse="0.5 0.5 0.5"/></visual>
+          <asset>
+            <texture type="skybox" builtin="gradient" rgb1="0.8 0.9 1" rgb2="0.5 0.6 0.8" width="64" height="64"/>
+          </asset>
           <worldbody>
             <light pos="4 -3 6" dir="0 0.4 -1"/>
             <geom name="water" type="plane" size="60 60 1" contype="0" conaffinity="0" rgba="0.2 0.4 0.8 0.4"/>
@@ -109,8 +113,10 @@ class Water:
         self._wheels = model.jnt_dofadr[[model.joint(f"wheel_{name}").id for name in WHEELS]]
         # the body's own degrees of freedom come first: six, or one on a guide
         self._dofs = int(self._wheels.min())
-        self._rows = [slice(at, at + i + 1) for i, at in enumerate(model.M_rowadr[: self._dofs])]
-        self._jacobian = np.zeros((6, model.nv))
+        # of the mass matrix there is the lower triangle, by rows
+        self._triangle = np.tril_indices(self._dofs)
+        self._places = model.M_rowadr[self._triangle[0]] + self._triangle[1]
+        self._jacobian, self._product = np.zeros((6, model.nv)), np.zeros(3)
         # angular and linear, body axes; and the same with the linear one in the world, of the step before
         self._velocity, self._before = np.zeros(6), np.zeros(6)
         #: CPU time within the calls [s].
@@ -146,7 +152,8 @@ class Water:
             load += self._add_mass(data, forces.added_mass.astype(float), world_from_body, center)
         # MuJoCo takes the wrench about the center of mass of this one body
         wrench[:3] = world_from_body @ load[:3]
-        wrench[3:] = world_from_body @ load[3:] + np.cross(center - data.xipos[body], wrench[:3])
+        mujoco.mju_cross(self._product, center - data.xipos[body], wrench[:3])
+        wrench[3:] = world_from_body @ load[3:] + self._product
         return forces
 
     def _state(self, data: mujoco.MjData, depth: float, world_from_body: Any) -> wade.State:
@@ -157,7 +164,7 @@ class Water:
             velocity_mps=self._velocity[3:],
             angular_velocity_radps=self._velocity[:3],
             gravity_direction=-world_from_body[2],
-            heading_rad=np.arctan2(world_from_body[1, 0], world_from_body[0, 0]),
+            heading_rad=math.atan2(world_from_body[1, 0], world_from_body[0, 0]),
             depth_rate_mps=-in_world[2],
             wheel_speed_radps=data.qvel[self._wheels],
             time_step_s=self._model.opt.timestep,
@@ -165,13 +172,14 @@ class Water:
         )
         if self._current.any():
             state.current_mps = world_from_body.T @ self._current
-        now = np.concatenate((self._velocity[:3], in_world))
-        if self._explicit and data.time > 0.0:
-            # that of the step before: there is no other yet
-            rates = (now - self._before) / self._model.opt.timestep
-            state.acceleration_mps2 = world_from_body.T @ rates[3:]
-            state.angular_acceleration_radps2 = rates[:3]
-        self._before = now
+        if self._explicit:
+            now = np.concatenate((self._velocity[:3], in_world))
+            if data.time > 0.0:
+                # that of the step before: there is no other yet
+                rates = (now - self._before) / self._model.opt.timestep
+                state.acceleration_mps2 = world_from_body.T @ rates[3:]
+                state.angular_acceleration_radps2 = rates[:3]
+            self._before = now
         return state
 
     def _add_mass(self, data: mujoco.MjData, matrix: Any, world_from_body: Any, center: Any) -> Any:
@@ -181,11 +189,10 @@ class Water:
         jacobian = self._jacobian
         mujoco.mj_jac(self._model, data, jacobian[:3], jacobian[3:], center, self._body)
         own = np.concatenate((world_from_body.T @ jacobian[:3], world_from_body.T @ jacobian[3:]))[:, : self._dofs]
-        block = own.T @ matrix @ own
-        for i, row in enumerate(self._rows):
-            data.M[row] += block[i, : i + 1]
+        data.M[self._places] += (own.T @ matrix @ own)[self._triangle]
         mujoco.mj_factorM(self._model, data)
-        return matrix[:, :3] @ np.cross(self._velocity[:3], self._velocity[3:])
+        mujoco.mju_cross(self._product, self._velocity[:3], self._velocity[3:])
+        return matrix[:, :3] @ self._product
 
 
 @dataclass
@@ -242,7 +249,7 @@ def run(
         stepped_s += time.thread_time() - start
         forces = water.apply(data)
         force = (0.0, 0.0, 0.0) if forces is None else forces.force_n
-        rows.append((data.time, *data.xpos[body], -np.arcsin(data.xmat[body, 6]), water.depth(data), *force))
+        rows.append((data.time, *data.xpos[body], -math.asin(data.xmat[body, 6]), water.depth(data), *force))
         if look is not None:
             look(data)
         start = time.thread_time()
@@ -313,16 +320,24 @@ def plot(track: Track, path: str) -> None:
     figure.savefig(path, dpi=100)
 
 
+def acceleration(track: Track) -> Any:
+    """Of the depth [m/s2], a row less at each end."""
+    return np.diff(track.depth, 2) / (track.time[1] - track.time[0]) ** 2
+
+
 def plot_heave(implicit: Track, explicit: Track, path: str) -> None:
-    """The same hull let go twice."""
-    figure, axis = _figure(1)
-    axis.plot(implicit.time, implicit.depth, label="added mass in the mass matrix")
-    axis.plot(explicit.time, explicit.depth, label="added mass as a force, of the acceleration before")
+    """The same hull let go twice: with a force it swings from step to step, up to the edge of the effect's box."""
+    figure, axes = _figure(2)
+    for track, label in ((explicit, "added mass as a force, of the step before"), (implicit, "in the mass matrix")):
+        axes[0].plot(track.time, track.depth, label=label)
+        axes[1].plot(track.time[1:-1], acceleration(track), label=label, linewidth=0.5)
     middle = implicit.depth.mean()
-    axis.set_ylim(middle - 0.06, middle + 0.06)
-    axis.set_ylabel("water depth [m]")
-    axis.set_xlabel("time [s]")
-    axis.legend()
+    axes[0].set_ylim(middle - 0.06, middle + 0.06)
+    axes[0].set_ylabel("water depth [m]")
+    axes[1].set_yscale("symlog")
+    axes[1].set_ylabel("its acceleration [m/s2]")
+    axes[1].set_xlabel("time [s]")
+    axes[0].legend()
     figure.savefig(path, dpi=100)
 
 
@@ -332,7 +347,8 @@ def _figure(rows: int) -> tuple[Any, Any]:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    return pyplot.subplots(rows, sharex=True, figsize=(7, 1 + 2.2 * rows), layout="constrained")
+    figure, axes = pyplot.subplots(rows, sharex=True, figsize=(7, 1 + 2.2 * rows), layout="constrained")
+    return figure, axes
 
 
 def main() -> None:

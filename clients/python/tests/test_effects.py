@@ -22,7 +22,7 @@ from effects_by_hand import LIBRARY, add_effects, copy_with
 
 STATE = wade.State(depth_m=0.15, velocity_mps=(0.5, 0.1, 0), acceleration_mps2=(1010.0, 0, 0))
 #: What the effects need to be told, for three states.
-TOLD = {
+TOLD: dict[str, Any] = {
     "heading_rad": np.array([0.5, -0.25, 3.0]),
     "depth_rate_mps": 0.125,
     "wheel_speed_radps": [(3.0, 3.0, 2.0, 2.0), (0, 0, 0, 0), (-1, -1, 4, 4)],
@@ -66,7 +66,9 @@ def row(states: wade.State, i: int) -> wade.State:
     """One state of a batch."""
     names = ("depth_m", *TOLD)
     values = {name: getattr(states, name) for name in names}
-    picked = {name: value if np.ndim(value) == 0 else np.asarray(value)[i] for name, value in values.items()}
+    picked: dict[str, Any] = {
+        name: value if np.ndim(value) == 0 else np.asarray(value)[i] for name, value in values.items()
+    }
     return wade.State(**picked, velocity_mps=states.velocity_mps, implicit_added_mass=states.implicit_added_mass)
 
 
@@ -142,6 +144,10 @@ def test_a_batch_has_the_effects_of_its_states_alone(client: Any, server: Server
     np.testing.assert_array_equal(net.effect_force_n, batch.effect_force_n)
 
 
+def column(states: list[wade.State], name: str) -> Any:
+    return [getattr(state, name) for state in states]
+
+
 def run_in_time(phase: float) -> list[wade.State]:
     """A hull that heaves and surges."""
     times = phase + 0.05 * np.arange(20)
@@ -183,10 +189,11 @@ def test_a_batch_over_shared_memory_steps_many_runs_at_once(server: Server) -> N
     with over_shm(server) as client, client.stream("husky") as stream:
         expected = [stream.evaluate(state) for state in runs[-1]]
         for step in range(3):
+            now = [run[step] for run in runs]
             states = wade.State(
-                depth_m=[run[step].depth_m for run in runs],
-                velocity_mps=[run[step].velocity_mps for run in runs],
-                acceleration_mps2=[run[step].acceleration_mps2 for run in runs],
+                depth_m=column(now, "depth_m"),
+                velocity_mps=column(now, "velocity_mps"),
+                acceleration_mps2=column(now, "acceleration_mps2"),
                 time_step_s=0.05,
                 session=np.arange(1, count + 1),
             )

@@ -22,7 +22,7 @@ import mujoco_wading as wading
 from effects_by_hand import copy_with
 
 WEIGHTS = (VEHICLES / "warthog" / "network.safetensors").read_bytes()
-#: The paper's network knows a vehicle that drives: it pushes one that rests, and its lift changes with the least motion.
+#: The paper's network knows a vehicle that drives: it pushes one at rest, and its lift changes with the least motion.
 knows_rest = pytest.mark.skipif(b"anchored" not in WEIGHTS[:1000], reason="the weights know no rest")
 #: Steps of a hull that touches nothing: a hundredth of its period.
 AFLOAT_S = 0.01
@@ -84,7 +84,7 @@ def afloat() -> Any:
 
 
 def speed(track: wading.Track) -> NDArray[np.float64]:
-    return np.gradient(track.position[:, 0], track.time)
+    return np.asarray(np.gradient(track.position[:, 0], track.time))
 
 
 def test_it_floats_where_hydrostatics_says(damped: wade.ShmClient) -> None:
@@ -116,9 +116,11 @@ def test_it_heaves_at_the_period_of_its_waterplane_and_its_inertia(
 def test_added_mass_as_a_force_flies_apart_and_in_the_mass_matrix_does_not(
     inertial: wade.ShmClient, heaving: wading.Track
 ) -> None:
-    assert np.abs(heaving.depth - floating_depth()).max() < 0.06
+    # let go 2 cm off its depth a hull of this period is never faster than some 0.5 m/s2
+    assert np.abs(wading.acceleration(heaving)).max() < 2.0
     explicit = wading.heave(inertial, floating_depth(), explicit=True, timestep_s=AFLOAT_S)
-    assert len(explicit.time) < len(heaving.time) and explicit.time[-1] < 1.0
+    # it grows from step to step until the edge of the effect's box holds it
+    assert np.abs(wading.acceleration(explicit)).max() > 500.0
 
 
 @knows_rest
