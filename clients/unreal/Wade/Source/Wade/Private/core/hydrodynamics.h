@@ -4,8 +4,9 @@
 // steps and velocities those of their middles, and the load that a step wants is the mean over the time from half a step before
 // its beginning to half a step after. That is what `step` gives: it goes back half a step along the reported velocity and
 // integrates forward over the whole one, in substeps, each of which is a question. With a step no longer than a substep this is
-// one question about the very state that the engine reports. With a longer one the load is not frozen over it: a float that
-// leaves the water in the middle of the step gets half of the impulse.
+// one question about the very state that the engine reports, and a float without drag keeps its swing. With a longer one the
+// load is not frozen over it: a float that leaves the water in the middle of the step gets half of the impulse. What such a
+// step adds is a damping ratio of (w dt)^3 / 48 of a swing of frequency w: 0.0008 for a small rover at 30 frames a second.
 
 #pragma once
 
