@@ -122,6 +122,27 @@ TEST(a_float_bobs_with_the_period_of_its_waterplane) {
   }
 }
 
+// A box that is led up and forward, each answer a step late: buoyancy must be that of where it is, drag that of the question
+// which was answered.
+TEST(a_late_answer_finds_its_question) {
+  Box box;
+  box.drag = 100.0;
+  const double frame = 1.0 / 120.0, rise = 0.5, speed = std::sqrt(1.25);
+  Run run(box, frame, 0.3);
+  run.server.mode = Planted::Mode::Late;
+  run.water.set_rest_table(run.server.table());
+  run.motion.velocity = {1.0, 0.0, rise};
+  for (int i = 0; i < 5; ++i) {
+    const Motion led = drifted(run.motion, frame);
+    const double depth = run.depth(), wet_then = (depth + rise * frame) / box.height;
+    run.step();
+    run.motion = led;
+    if (i == 0) continue;
+    EXPECT_NEAR(run.last.force.x, -box.drag * wet_then * speed, 0.05);
+    EXPECT_NEAR(run.last.force.z, water_weight * box.area() * depth - box.drag * wet_then * speed * rise, 0.05);
+  }
+}
+
 TEST(answers_a_step_late_give_a_float_no_energy) {
   for (const double rate : {60.0, 30.0}) {
     Run run(Box{}, 1.0 / rate, 0.13);

@@ -1,5 +1,5 @@
 // Stand-ins for the declarations of the engine that the plugin uses, written from the public API documentation (the pages are
-// listed in clients/unreal/README.md). They have no definitions and are no engine: that the plugin parses against them proves
+// listed in clients/unreal/README.md). They do nothing and are no engine: that the plugin parses against them proves
 // its syntax and its agreement with these signatures, nothing else.
 
 #pragma once
@@ -22,8 +22,9 @@ using ANSICHAR = char;
 #define UPROPERTY(...)
 #define UFUNCTION(...)
 // the header tool's own: a function that calls a Blueprint's
-#define GENERATED_BODY()                \
-  template <typename... Arguments>      \
+#define GENERATED_BODY()           \
+ public:                           \
+  template <typename... Arguments> \
   static bool Execute_SampleWater(Arguments&&...);
 #define WADE_API
 #define PLATFORM_WINDOWS 0
@@ -142,7 +143,10 @@ class TUniquePtr {
   explicit operator bool() const;
 };
 template <typename T, typename... Arguments>
-TUniquePtr<T> MakeUnique(Arguments&&...);
+TUniquePtr<T> MakeUnique(Arguments&&... arguments) {
+  T made(static_cast<Arguments&&>(arguments)...);
+  return {};
+}
 
 template <typename T>
 class TFuture {
@@ -155,7 +159,9 @@ class TFuture {
 };
 enum class EAsyncExecution { ThreadPool };
 template <typename Callable>
-auto Async(EAsyncExecution execution, Callable&& callable) -> TFuture<decltype(callable())>;
+auto Async(EAsyncExecution, Callable&& callable) -> TFuture<decltype(callable())> {
+  return {};
+}
 
 class UObject {
  public:

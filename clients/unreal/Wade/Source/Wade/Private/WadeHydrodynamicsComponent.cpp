@@ -109,7 +109,7 @@ void UWadeHydrodynamicsComponent::TickComponent(float DeltaTime, ELevelTick Tick
 	}
 }
 
-void UWadeHydrodynamicsComponent::OnPhysicsStateChanged(UPrimitiveComponent* Changed, EComponentPhysicsStateChange Change)
+void UWadeHydrodynamicsComponent::OnPhysicsStateChanged(UPrimitiveComponent* /*Changed*/, EComponentPhysicsStateChange Change)
 {
 	if (Callback != nullptr && Change == EComponentPhysicsStateChange::Destroyed)
 	{

@@ -57,8 +57,12 @@ void FWadeSimCallback::OnPreSimulate_Internal()
 	}
 	Chaos::FRigidBodyHandle_Internal* Handle = Scene.Proxy->GetPhysicsThreadAPI();
 	const double Time = GetDeltaTime_Internal();
-	if (Handle == nullptr || Handle->ObjectState() != Chaos::EObjectStateType::Dynamic || Time <= 0.0)
+	// a sleeping body is asked about too: a load wakes it up, and a body in moving water must not sleep
+	const bool bMoves = Handle != nullptr
+		&& (Handle->ObjectState() == Chaos::EObjectStateType::Dynamic || Handle->ObjectState() == Chaos::EObjectStateType::Sleeping);
+	if (!bMoves || Time <= 0.0)
 	{
+		Hydrodynamics->begin_anew();
 		return;
 	}
 	if (Beginnings != Scene.Beginnings || !Scene.bWater)
@@ -73,11 +77,11 @@ void FWadeSimCallback::OnPreSimulate_Internal()
 	{
 		Hydrodynamics->set_rest_table(Scene.Table);
 		Load = Hydrodynamics->step(Body, Motion, Scene.Water, Scene.Surroundings, Time);
-		// a body that the water does not touch may go to sleep
+		// no load on a body that the water does not touch, so that it may go to sleep
 		if (wade::norm(Load.force) + wade::norm(Load.moment) > 0.0)
 		{
-			Handle->AddForce(Unreal(wade::axes::force_to_unreal(Load.force)), false);
-			Handle->AddTorque(Unreal(wade::axes::moment_to_unreal(Load.moment)), false);
+			Handle->AddForce(Unreal(wade::axes::force_to_unreal(Load.force)), true);
+			Handle->AddTorque(Unreal(wade::axes::moment_to_unreal(Load.moment)), true);
 		}
 	}
 	ReportStep(Body, Motion, Load);

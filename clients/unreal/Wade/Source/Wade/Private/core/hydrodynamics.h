@@ -11,10 +11,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "added_mass.h"
 #include "held_answer.h"
@@ -68,7 +70,7 @@ class Hydrodynamics {
   Hydrodynamics(Ask ask, Clock clock, Pacing pacing)
       : ask_(std::move(ask)), clock_(std::move(clock)), pacing_(pacing) {}
 
-  // Loads for a step of `time` [s]. Not to be called in a step that the body sleeps through.
+  // Loads for a step of `time` [s].
   StepLoad step(const Body& body, const Motion& motion, const Water& water, const Surroundings& surroundings,
                 double time);
 

@@ -7,7 +7,6 @@
 namespace wade {
 
 enum class LinkState {
-  Disconnected,    // no client, or no library
   Connecting,      // not answered yet
   Serving,         // answers come in time
   Stale,           // answers come late, or not for a moment
