@@ -29,6 +29,18 @@ TEST(a_light_sphere_rises_with_the_textbook_acceleration) {
   EXPECT_NEAR((response.load.linear.z - 9.81) / body.mass, 9.81 / 2.0, 1e-12);
 }
 
+// The matrix goes with the rate of the components in hull axes. A body of 1 kg that turns to the left with 1 rad/s while it goes
+// forward with 1 m/s, on which nothing acts but 2 kg of water that lie on its y axis: (1 + 2) nu_dot_y = -1 (omega x v)_y.
+TEST(a_turning_body_leaves_the_water_behind) {
+  Body body;
+  body.inertia.rows = {Vec3{1.0, 0.0, 0.0}, Vec3{0.0, 1.0, 0.0}, Vec3{0.0, 0.0, 1.0}};
+  Mat6 added{};
+  added[1][1] = 2.0;
+  const Response response = respond(body, added, {}, {}, {{1.0, 0.0, 0.0}, {0.0, 0.0, 1.0}});
+  EXPECT_NEAR(response.acceleration.linear.y, 2.0 / 3.0, 1e-12);
+  EXPECT_NEAR(response.load.linear.y, 2.0 / 3.0, 1e-12);
+}
+
 // An engine step by step: from the second step on the other forces are measured, and gravity is exact from the first.
 TEST(a_box_with_added_mass_sinks_as_the_heavier_body) {
   Box box;

@@ -215,6 +215,10 @@ TEST(a_held_drag_never_does_work) {
     const Vec6 load = held.load(body, immersion, 1000.0, twist, table.get());
     EXPECT(dot(load - rest, twist) <= 1e-9);
   }
+  // an answer that pushed forward, such as a wave did, pushes no more
+  HeldAnswer pushed;
+  pushed.renew({immersion, 1000.0, {{2.0, 0.0, 0.0}, {}}, {{300.0, 0.0, rest.linear.z}, {}}, {}});
+  EXPECT(pushed.load(body, immersion, 1000.0, {{1.5, 0.2, 0.0}, {}}, table.get()).linear.x == 0.0);
   // at the very state that was asked, the answer; at half the speed, a quarter of the drag
   EXPECT_NEAR(held.load(body, immersion, 1000.0, {{2.0, 0.0, 0.0}, {}}, table.get()).linear.x, forces.force_n[0], 1e-9);
   EXPECT_NEAR(held.load(body, immersion, 1000.0, {{1.0, 0.0, 0.0}, {}}, table.get()).linear.x, 0.25 * forces.force_n[0], 1e-9);
@@ -234,6 +238,27 @@ TEST(a_tilted_float_rights_itself_with_a_server_and_without) {
     const double volume = box.area() * 0.1, waterplane = box.length * std::pow(box.width, 3) / 12.0;
     const double righting = water_weight * (waterplane - volume * (0.2 - 0.05)) * 0.1;
     EXPECT_NEAR(run.last.moment.x, -righting, 0.05 * righting);
+  }
+}
+
+// Rolling and pitching at once, let go, for most of a minute: no swing grows, whether answers come in time or a step late.
+TEST(a_tilted_float_does_not_swing_further_than_it_was_let_go) {
+  for (const auto mode : {Planted::Mode::InTime, Planted::Mode::Late}) {
+    for (const double rate : {120.0, 60.0, 30.0}) {
+      Run run(Box{}, 1.0 / rate, 0.1);
+      run.water.set_rest_table(run.server.table());
+      run.server.mode = mode;
+      run.motion.attitude = turn(Vec3{0.15, 0.08, 0.0});
+      double first = 0.0, last = 0.0;
+      for (int i = 0; i < static_cast<int>(40.0 * rate); ++i) {
+        run.step();
+        const double tilt = std::acos(rotate(run.motion.attitude, Vec3{0.0, 0.0, 1.0}).z);
+        double& largest = i < 5.0 * rate ? first : last;
+        if (i < 5.0 * rate || i > 35.0 * rate) largest = std::max(largest, tilt);
+        EXPECT(run.depth() > 0.05 && run.depth() < 0.15);
+      }
+      EXPECT(first < 1.05 * norm(Vec3{0.15, 0.08, 0.0}) && last < 1.05 * first);
+    }
   }
 }
 

@@ -34,10 +34,10 @@ Vec6 HeldAnswer::load(const Body& body, const Immersion& immersion, double densi
   if (then <= 0.0 || immersion.depth <= 0.0) return rest_now;
   const double left = std::clamp(energy(body, twist, asked.twist) / then, 0.0, 1.0);
   const double faded = std::exp(-std::max(0.0, age_ - grace) / fade);
-  Vec6 moving = (left * left * faded) * (asked.load - rest_then);
-  const double power = dot(moving, twist);
-  if (power > 0.0) moving = moving - (power / energy(body, twist, twist)) * momentum(body, twist);
-  return rest_now + moving;
+  const Vec6 moving = (left * left * faded) * (asked.load - rest_then);
+  // left out as a whole where it would push: to take away only the part along the motion leaves work of second order in the
+  // step, which let a rolling box grow by 0.3 % a second at 30 frames a second
+  return dot(moving, twist) > 0.0 ? rest_now : rest_now + moving;
 }
 
 Mat6 HeldAnswer::added(const Immersion& immersion) const {
