@@ -37,4 +37,24 @@ TEST(the_table_rights_a_pitched_box) {
   EXPECT_NEAR(Planted(box).table()->load(immersion, 1000.0).angular.y, -righting, 0.03 * righting);
 }
 
+// A server that knows depths from 0.1 to 0.3 m and answers nonsense elsewhere, as a network may.
+TEST(the_table_goes_straight_where_the_server_does_not_know) {
+  Box box;
+  box.height = 2.0;
+  std::vector<wade_forces> answers;
+  for (const wade_state& state : RestTable::questions()) {
+    answers.push_back(box.answer(state));
+    if (state.depth_m >= 0.1F && state.depth_m <= 0.3F) continue;
+    answers.back().outside[WADE_QUANTITY_DEPTH] = state.depth_m < 0.1F ? -0.01F : 0.01F;
+    answers.back().force_n[2] = 5e5F;
+    answers.back().moment_nm[0] = -7e4F;
+  }
+  const RestTable table(answers, {});
+  for (const double depth : {0.0, 0.01, 0.09, 0.2, 0.31, 0.9}) {
+    const Vec6 load = table.load(level(depth), 1000.0);
+    EXPECT_NEAR(load.linear.z, 9810.0 * box.area() * depth, 1.0);
+    EXPECT_NEAR(load.angular.x, 0.0, 0.1);
+  }
+}
+
 TEST(a_table_fits_one_batch_over_shared_memory) { EXPECT(RestTable::questions().size() <= 256); }

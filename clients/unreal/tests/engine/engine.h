@@ -105,7 +105,7 @@ struct FPlane {
 };
 struct FColor {
   FColor(uint8 r, uint8 g, uint8 b, uint8 a = 255);
-  static const FColor Cyan, Yellow, White;
+  static const FColor Cyan, Red, Yellow, White;
 };
 
 template <typename T>

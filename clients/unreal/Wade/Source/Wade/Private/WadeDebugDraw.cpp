@@ -25,6 +25,8 @@ void DrawWadeForces(const UWorld* World, const FWadeReport& Report, float Scale)
 		DrawDebugSolidPlane(World, Plane, Report.Place, PlaneSize, FColor(40, 90, 200, 60), false, -1.0f, 0);
 	}
 	const FString Text = FString::Printf(TEXT("%.0f cm  %.0f N"), Report.DepthCm, Report.Force.Size());
-	DrawDebugString(World, Report.Place, Text, nullptr, FColor::White, 0.0f);
+	// red where the server has to guess
+	const FColor Color = Report.DepthOutsideCm == 0.0 ? FColor::White : FColor::Red;
+	DrawDebugString(World, Report.Place, Text, nullptr, Color, 0.0f);
 #endif
 }

@@ -233,6 +233,11 @@ double UWadeHydrodynamicsComponent::GetWaterDepth() const
 	return Latest.IsValid() ? Latest->DepthCm : 0.0;
 }
 
+double UWadeHydrodynamicsComponent::GetDepthOutsideDomain() const
+{
+	return Latest.IsValid() ? Latest->DepthOutsideCm : 0.0;
+}
+
 void UWadeHydrodynamicsComponent::ReadFromServer()
 {
 	const FString& Endpoint = GetDefault<UWadeSettings>()->Endpoint;

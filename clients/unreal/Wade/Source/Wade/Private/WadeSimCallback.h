@@ -32,6 +32,8 @@ struct FWadeReport
 	FVector Place = FVector::ZeroVector;
 	FVector Force = FVector::ZeroVector;
 	double DepthCm = 0.0;
+	/** How far the depth lies outside the server's training domain: negative below, positive above. */
+	double DepthOutsideCm = 0.0;
 	bool bWater = false;
 	FVector WaterPoint = FVector::ZeroVector;
 	FVector WaterNormal = FVector(0.0, 0.0, 1.0);

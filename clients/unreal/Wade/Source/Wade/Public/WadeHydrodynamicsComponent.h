@@ -124,6 +124,11 @@ public:
 	UFUNCTION(BlueprintPure, Category = "Wade")
 	double GetWaterDepth() const;
 
+	/** How far the depth lies outside the server's training domain [cm]: negative below, positive above, 0 within. Forces there
+	 *  are a guess, which in deep water may be far too large. */
+	UFUNCTION(BlueprintPure, Category = "Wade")
+	double GetDepthOutsideDomain() const;
+
 	/** Fills in GroundContactZ from the running server, over gRPC. */
 	UFUNCTION(CallInEditor, Category = "Wade")
 	void ReadFromServer();

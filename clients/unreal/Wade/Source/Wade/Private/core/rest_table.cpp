@@ -6,7 +6,7 @@
 namespace wade {
 namespace {
 
-constexpr double tilt = 0.02;            // [rad]
+constexpr double asked_tilt = 0.02;      // [rad]
 constexpr double largest_tilt = 0.5;     // the stiffness is that of small angles [rad]
 constexpr double asked_density = 1000.0; // [kg/m3]
 
@@ -35,21 +35,41 @@ std::vector<wade_state> RestTable::questions() {
   for (int row = 0; row < rows; ++row) {
     const double depth = deepest * row / (rows - 1);
     states.push_back(at_rest(depth, 0.0F, 0.0F));
-    states.push_back(at_rest(depth, static_cast<float>(tilt), 0.0F));
-    states.push_back(at_rest(depth, 0.0F, static_cast<float>(tilt)));
+    states.push_back(at_rest(depth, static_cast<float>(asked_tilt), 0.0F));
+    states.push_back(at_rest(depth, 0.0F, static_cast<float>(asked_tilt)));
   }
   return states;
 }
 
 RestTable::RestTable(const std::vector<wade_forces>& answers, const Vec3& center_of_mass) {
+  std::vector<bool> within;
   for (std::size_t i = 0; i + 2 < answers.size(); i += 3) {
     Row row;
+    within.push_back(!(std::fabs(answers[i].outside[WADE_QUANTITY_DEPTH]) > 0.0F));
     row.lift = std::max(0.0, static_cast<double>(answers[i].force_n[2]));
     row.moment = moment_about(answers[i], center_of_mass);
-    row.moment_per_roll = (1.0 / tilt) * (moment_about(answers[i + 1], center_of_mass) - row.moment);
-    row.moment_per_pitch = (1.0 / tilt) * (moment_about(answers[i + 2], center_of_mass) - row.moment);
+    row.moment_per_roll = (1.0 / asked_tilt) * (moment_about(answers[i + 1], center_of_mass) - row.moment);
+    row.moment_per_pitch = (1.0 / asked_tilt) * (moment_about(answers[i + 2], center_of_mass) - row.moment);
     rows_.push_back(row);
     bundle_version_ = answers[i].bundle_version;
+  }
+  go_straight_outside(within);
+}
+
+void RestTable::go_straight_outside(const std::vector<bool>& within) {
+  const auto first = static_cast<std::size_t>(std::find(within.begin(), within.end(), true) - within.begin());
+  if (first == within.size()) return;
+  for (std::size_t i = 0; i < first; ++i) {
+    const double share = static_cast<double>(i) / static_cast<double>(first);
+    const Row& edge = rows_[first];
+    rows_[i] = {share * edge.lift, share * edge.moment, share * edge.moment_per_roll, share * edge.moment_per_pitch};
+  }
+  std::size_t last = within.size() - 1;
+  while (!within[last]) --last;
+  const double rise = last > first ? std::max(0.0, rows_[last].lift - rows_[last - 1].lift) : 0.0;
+  for (std::size_t i = last + 1; i < rows_.size(); ++i) {
+    rows_[i] = rows_[last];
+    rows_[i].lift += rise * static_cast<double>(i - last);
   }
 }
 

@@ -18,7 +18,8 @@ class RestTable {
   // States at rest: per row level, rolled and pitched by a little.
   static std::vector<wade_state> questions();
 
-  // From the answers to `questions()`, in their order; `center_of_mass` as in `Body`.
+  // From the answers to `questions()`, in their order; `center_of_mass` as in `Body`. Answers from outside the depths of the
+  // training domain are not believed: from no water to the first depth within, and from the last one on, the table goes straight.
   RestTable(const std::vector<wade_forces>& answers, const Vec3& center_of_mass);
 
   // The bundle that answered.
@@ -35,6 +36,8 @@ class RestTable {
     Vec3 moment_per_roll;      // [N m/rad]
     Vec3 moment_per_pitch;     // [N m/rad]
   };
+
+  void go_straight_outside(const std::vector<bool>& within);
 
   std::vector<Row> rows_;
   std::uint32_t bundle_version_ = 0;
