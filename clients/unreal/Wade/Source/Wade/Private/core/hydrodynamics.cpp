@@ -81,9 +81,8 @@ Hydrodynamics::WaterLoad Hydrodynamics::water_load(Step& step, const Motion& mot
   const Immersion immersion = immerse(step.body, motion, step.water, step.surroundings.z0);
   held_.pass(time);
   unasked_time_ += time;
-  const bool upright = immersion.up.z >= least_up_z;
-  if (upright && immersion.depth < 0.0) return {};
-  if (upright && answered(step, motion, immersion, out)) {
+  if (immersion.up.z >= least_up_z && immersion.depth < 0.0) return {};
+  if (askable(immersion) && answered(step, motion, immersion, out)) {
     return {load_about(forces_, step.body.center_of_mass), added_mass(forces_, step.body.center_of_mass)};
   }
   const Vec6 twist = twist_through_water(motion, step.water);

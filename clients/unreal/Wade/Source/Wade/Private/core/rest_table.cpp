@@ -6,9 +6,9 @@
 namespace wade {
 namespace {
 
-constexpr double asked_tilt = 0.02;      // [rad]
-constexpr double largest_tilt = 0.5;     // the stiffness is that of small angles [rad]
-constexpr double asked_density = 1000.0; // [kg/m3]
+constexpr double asked_tilt = 0.02;       // [rad]
+constexpr double largest_tilt = 0.5;      // the stiffness is that of small angles [rad]
+constexpr double asked_density = 1000.0;  // [kg/m3]
 
 wade_state at_rest(double depth, float roll, float pitch) {
   wade_state state = wade_default_state();
