@@ -12,7 +12,7 @@ use iceoryx2::port::client::{Client, RequestSendError};
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::port_name::PortName;
-use iceoryx2::prelude::{CallbackProgression, ZeroCopySend, ipc_threadsafe};
+use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ZeroCopySend, ipc_threadsafe};
 use iceoryx2::service::Service as _;
 use tonic::Code;
 

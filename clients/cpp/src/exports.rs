@@ -1,5 +1,8 @@
 //! The functions of the header. Each checks its pointers, and none lets a panic out.
-#![allow(unsafe_code, reason = "a C ABI")]
+//!
+//! # Safety
+//! Of all of them: a pointer is null or valid for what its type and name say, a text has its end, and a client is null or open.
+#![allow(unsafe_code, clippy::missing_safety_doc, reason = "a C ABI, whose contract is said once")]
 
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,8 +10,9 @@ use std::slice;
 use std::sync::LazyLock;
 use std::time::Duration;
 
+use nalgebra::{Quaternion, UnitQuaternion};
 use wade::effects::Effect;
-use wade::frame::{up_from_roll_pitch, Vec3};
+use wade::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
 use wade::service::shm::Wait;
 use wade::service::wire::Field;
 
@@ -35,9 +39,6 @@ unsafe fn text<'t>(pointer: *const c_char) -> Option<&'t str> {
 
 /// Opens a client and begins to look for the server; does not wait for it. On WADE_STATUS_OK `*client` must be closed.
 /// Otherwise (WADE_STATUS_ABI_MISMATCH, WADE_STATUS_INVALID_ARGUMENT, WADE_STATUS_INTERNAL) it is null.
-///
-/// # Safety
-/// The pointers are null or valid, and the options' texts have their ends.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_client_open(
     options: *const WadeOptions,
@@ -81,9 +82,6 @@ pub unsafe extern "C" fn wade_client_open(
 }
 
 /// Waits until the client is connected to its server, or the time is over: then says why it is not.
-///
-/// # Safety
-/// The client is null or open.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_client_wait(client: *const WadeClient, timeout_ns: u64) -> WadeStatus {
     guarded(|| {
@@ -94,9 +92,6 @@ pub unsafe extern "C" fn wade_client_wait(client: *const WadeClient, timeout_ns:
 }
 
 /// Closes a client; null is none. No call may be under way in it. May take as long as opening a connection takes.
-///
-/// # Safety
-/// The client is null or open, and not used any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_client_close(client: *mut WadeClient) {
     guarded(|| {
@@ -110,9 +105,6 @@ pub unsafe extern "C" fn wade_client_close(client: *mut WadeClient) {
 
 /// Why the client is not connected, in a sentence with its end: returns its length, and writes what fits. Empty where it is
 /// connected.
-///
-/// # Safety
-/// The client is null or open; `buffer` is null or has room for `size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_client_reason(
     client: *const WadeClient,
@@ -140,9 +132,6 @@ pub unsafe extern "C" fn wade_client_reason(
 /// state `forces` gets the last answer that this client had, with its age. The question stays open: an answer that comes late
 /// becomes the last one. So a budget of 0 never waits: it asks, and gives the answer to an earlier call.
 /// Allocates nothing and holds no lock for longer than its budget.
-///
-/// # Safety
-/// The client is null or open, the other pointers are null or valid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_evaluate(
     client: *mut WadeClient,
@@ -164,9 +153,6 @@ pub unsafe extern "C" fn wade_evaluate(
 /// used again holds the last answer, and `batch->age_ns` says how old that is. `batch` may be null. A batch that is not
 /// answered within its budget is not kept: a budget of 0 gets none. Over gRPC its states must agree in their flags.
 /// Allocates nothing.
-///
-/// # Safety
-/// The client is null or open, the other pointers are null or valid for `count` values.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_evaluate_batch(
     client: *mut WadeClient,
@@ -198,9 +184,6 @@ pub unsafe extern "C" fn wade_evaluate_batch(
 
 /// Asks a server over gRPC, at most as long as the timeout, what it serves under a name. `address` as in `wade_options`, but not
 /// shared memory, which does not carry it.
-///
-/// # Safety
-/// The pointers are null or valid, and the texts have their ends.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_get_vehicle(
     address: *const c_char,
@@ -227,9 +210,6 @@ pub unsafe extern "C" fn wade_get_vehicle(
 
 /// Unit vector along gravity of a body with this roll and pitch [rad]: positive roll lowers the right side, positive pitch the
 /// nose (REP-103).
-///
-/// # Safety
-/// `gravity_direction` is null or has room for three numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_gravity_from_roll_pitch(
     roll_rad: f32,
@@ -242,9 +222,6 @@ pub unsafe extern "C" fn wade_gravity_from_roll_pitch(
 }
 
 /// Unit vector along gravity of a body with this attitude: unit quaternion w, x, y, z that takes body vectors to the world, z up.
-///
-/// # Safety
-/// `world_from_body` is null or that of four numbers, `gravity_direction` null or with room for three.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_gravity_from_quaternion(
     world_from_body: *const f32,
@@ -253,10 +230,9 @@ pub unsafe extern "C" fn wade_gravity_from_quaternion(
     // SAFETY: null or four numbers.
     let Some(quaternion) = (unsafe { world_from_body.cast::<[f32; 4]>().as_ref() }) else { return };
     let [w, x, y, z] = quaternion.map(f64::from);
-    // the third row of the rotation is where the body's axes see the world's z
-    let up = Vec3::new(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z);
+    let up = up_from_quaternion(&UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)));
     // SAFETY: null or room for three.
-    unsafe { write_vector(gravity_direction, -up) };
+    unsafe { write_vector(gravity_direction, -up.into_inner()) };
 }
 
 /// # Safety
