@@ -44,7 +44,9 @@ pub enum ClientError {
         served: Vec<String>,
     },
     /// The server's shared memory has another layout.
-    #[error("shared memory of layout {expected} expected, found {found}; client and server must be of one version")]
+    #[error(
+        "shared memory of layout {expected} expected, found {found}; client and server must be of one version"
+    )]
     Layout {
         /// The client's.
         expected: String,

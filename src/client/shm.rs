@@ -105,9 +105,7 @@ impl ShmClient {
         let result = match call(link, deadline) {
             Ok(Some(taken)) => return Ok(taken),
             Ok(None) => Err(ClientError::Timeout(self.timeout)),
-            Err(lost) => {
-                Err(ClientError::NoServer { at: "shared memory".into(), reason: lost.to_string() })
-            }
+            Err(lost) => Err(ClientError::NoServer { at: "shared memory".into(), reason: lost.to_string() }),
         };
         self.link = None;
         result

@@ -87,7 +87,9 @@ impl ShmLink {
         }
         let no_place = |error: &dyn std::fmt::Display| ClientError::Refused {
             code: Code::ResourceExhausted,
-            message: format!("no place for another client of {vehicle}: {error}; the limit is shm.max_clients"),
+            message: format!(
+                "no place for another client of {vehicle}: {error}; the limit is shm.max_clients"
+            ),
         };
         let single = single.client_builder().create().map_err(|error| no_place(&error))?;
         let batch = batch.client_builder().create().map_err(|error| no_place(&error))?;

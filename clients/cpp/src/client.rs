@@ -60,9 +60,7 @@ impl WadeClient {
         }
         let max_batch = max_batch as usize;
         let transport = match address {
-            Address::Shm(namespace) => {
-                Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch).ok()?)
-            }
+            Address::Shm(namespace) => Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch).ok()?),
             Address::Grpc(url) => Transport::Grpc(Grpc::open(url.clone(), vehicle, max_batch).ok()?),
         };
         Some(Self { transport, max_batch, batch_asked: std::sync::Mutex::default() })
@@ -115,7 +113,8 @@ impl WadeClient {
         if states.is_empty() || states.len() > self.max_batch {
             return WadeStatus::InvalidArgument;
         }
-        let invalid = states.iter().enumerate().find_map(|(index, state)| Some((index, checked(state).err()?)));
+        let invalid =
+            states.iter().enumerate().find_map(|(index, state)| Some((index, checked(state).err()?)));
         let status = match (invalid, &self.transport) {
             (Some((index, invalid)), _) => batch.blame(index, invalid),
             (None, Transport::Shm(client)) => client.evaluate_batch(states, start, deadline, forces),

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tokio::io::unix::AsyncFd;
 use tokio::io::Interest;
+use tokio::io::unix::AsyncFd;
 use wade::client::{ClientError, GrpcLink, Reply, replies};
 use wade::service::wire::State;
 
@@ -58,7 +58,10 @@ struct Question {
 
 #[derive(Clone, Copy)]
 enum What {
-    State { state: State, session: u64 },
+    State {
+        state: State,
+        session: u64,
+    },
     /// The states lie in [`Shared::batch`].
     Batch,
 }
@@ -252,14 +255,11 @@ impl Shared {
             match self.connect().await {
                 Ok(link) => {
                     self.connection.opened();
-                    if let Some(error) = self.serve(link, &asked).await? {
-                        self.connection.failed(&error);
-                    }
+                    self.serve(link, &asked).await?;
                 }
                 Err(error) => {
                     self.connection.failed(&error);
-                    // a question that came in between is answered late, or the client is to end
-                    let _ = tokio::time::timeout(RETRY, asked.readable()).await;
+                    tokio::time::sleep(RETRY).await;
                 }
             }
         }
@@ -273,12 +273,8 @@ impl Shared {
         Ok(link)
     }
 
-    /// Answers until the server is lost, and says how; none where the client is to end.
-    async fn serve(
-        &self,
-        mut link: GrpcLink,
-        asked: &AsyncFd<&Event>,
-    ) -> std::io::Result<Option<ClientError>> {
+    /// Answers until the server is lost or the client is to end.
+    async fn serve(&self, mut link: GrpcLink, asked: &AsyncFd<&Event>) -> std::io::Result<()> {
         let mut session = 0;
         loop {
             let question = lock(&self.question).take();
@@ -287,7 +283,7 @@ impl Shared {
                 self.asked.clear();
                 ready.clear_ready();
                 if self.connection.is_stopped() {
-                    return Ok(None);
+                    return Ok(());
                 }
                 continue;
             };
@@ -303,13 +299,14 @@ impl Shared {
                 use WadeStatus::{LayoutMismatch, NoServer, Timeout, UnknownVehicle};
                 matches!(status, Timeout | NoServer | UnknownVehicle | LayoutMismatch)
             });
+            // told before the caller goes on
             if let Some(error) = &lost {
                 self.connection.failed(error);
             }
             *lock(&self.done) = Done { number: question.number, status };
             self.answered.set();
             if lost.is_some() {
-                return Ok(lost);
+                return Ok(());
             }
         }
     }

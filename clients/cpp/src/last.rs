@@ -109,7 +109,10 @@ mod tests {
                         last.get(&mut got);
                         assert!(got.answer >= before, "an older answer after a newer one");
                         before = got.answer;
-                        assert!(got.added_mass.iter().all(|&value| value == got.force_n[0]), "two answers in one");
+                        assert!(
+                            got.added_mass.iter().all(|&value| value == got.force_n[0]),
+                            "two answers in one"
+                        );
                     }
                 });
             }

@@ -5,7 +5,7 @@
 //! the client's own. Over shared memory the calling thread asks by itself (`shm`); over gRPC it hands the question to that
 //! thread (`grpc`). Nothing allocates in a call, and no panic leaves the library.
 
-mod abi;
+pub mod abi;
 mod bounded;
 mod client;
 mod connection;

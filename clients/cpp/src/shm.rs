@@ -192,8 +192,9 @@ impl Turn {
         while batch.len() < states.len() {
             let chunk = &states[batch.len()..];
             let chunk = &chunk[..chunk.len().min(MAX_BATCH)];
-            let queries =
-                chunk.iter().map(|state| Query { session: state.session, ..Query::from(&State::from(state)) });
+            let queries = chunk
+                .iter()
+                .map(|state| Query { session: state.session, ..Query::from(&State::from(state)) });
             let since = *batch_asked.get_or_insert_with(Instant::now);
             let taken = link.ask_batch(queries).and_then(|asked| {
                 link.answer_batch(&asked, deadline, |answer| take(answer, chunk.len(), batch))
@@ -249,7 +250,8 @@ impl Shared {
     fn keep_watched(&self) {
         let kept = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.keep()));
         if kept.is_err() {
-            self.connection.tell(WadeStatus::Internal, "the thread that keeps the connection broke down".into());
+            self.connection
+                .tell(WadeStatus::Internal, "the thread that keeps the connection broke down".into());
         }
     }
 

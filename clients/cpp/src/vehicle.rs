@@ -6,9 +6,7 @@ use wade::client::{ClientError, GrpcClient, Method};
 use wade::effects::Effect;
 use wade::service::proto;
 
-use crate::abi::{
-    WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE, WadeRange, WadeSurface, WadeVehicle,
-};
+use crate::abi::{WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE, WadeRange, WadeSurface, WadeVehicle};
 use crate::convert::write_text;
 
 /// Asks the server at a URL.
@@ -47,7 +45,8 @@ impl From<&proto::GetVehicleResponse> for WadeVehicle {
         }
         for range in &response.domain {
             // the numbers of the wire begin at 1
-            let place = usize::try_from(range.quantity - 1).ok().and_then(|place| vehicle.domain.get_mut(place));
+            let place =
+                usize::try_from(range.quantity - 1).ok().and_then(|place| vehicle.domain.get_mut(place));
             if let Some(place) = place {
                 *place = WadeRange { minimum: range.minimum, maximum: range.maximum };
             }
