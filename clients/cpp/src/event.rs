@@ -3,7 +3,11 @@
 
 use std::io;
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd, RawFd};
+use std::sync::Arc;
 use std::time::Instant;
+
+use tokio::io::Interest;
+use tokio::io::unix::AsyncFd;
 
 /// An eventfd.
 pub struct Event(OwnedFd);
@@ -18,6 +22,13 @@ impl Event {
         }
         // SAFETY: the descriptor is new and nobody else's.
         Ok(Self(unsafe { OwnedFd::from_raw_fd(fd) }))
+    }
+
+    /// Registers it with the runtime of this thread, to be waited for there.
+    pub fn register(self: &Arc<Self>) -> io::Result<AsyncFd<Arc<Self>>> {
+        // SAFETY: the descriptor is open for as long as the event is there, which the registration keeps.
+        let registered = unsafe { AsyncFd::register_with_interest(Arc::clone(self), Interest::READABLE) };
+        registered.map_err(|error| error.into_parts().1)
     }
 
     /// Sets it. It stays set until it is cleared.

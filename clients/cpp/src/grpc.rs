@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tokio::io::Interest;
 use tokio::io::unix::AsyncFd;
 use wade::client::{ClientError, GrpcLink, Reply, replies};
 use wade::service::wire::State;
@@ -33,7 +32,7 @@ struct Shared {
     turn: Mutex<Turn>,
     /// The question for the worker, of which `asked` tells it.
     question: Mutex<Option<Question>>,
-    asked: Event,
+    asked: Arc<Event>,
     /// What the worker did last, of which `answered` tells.
     done: Mutex<Done>,
     answered: Event,
@@ -89,7 +88,7 @@ impl Grpc {
             last: Last::new(),
             turn: Mutex::default(),
             question: Mutex::default(),
-            asked: Event::new()?,
+            asked: Arc::new(Event::new()?),
             done: Mutex::new(Done { number: 0, status: WadeStatus::Ok }),
             answered: Event::new()?,
             batch: Mutex::new(batch),
@@ -250,7 +249,7 @@ impl Shared {
 
     /// Connects, answers until the server is lost, and connects again.
     async fn work(&self) -> std::io::Result<()> {
-        let asked = AsyncFd::with_interest(&self.asked, Interest::READABLE)?;
+        let asked = self.asked.register()?;
         while !self.connection.is_stopped() {
             match self.connect().await {
                 Ok(link) => {
@@ -274,7 +273,7 @@ impl Shared {
     }
 
     /// Answers until the server is lost or the client is to end.
-    async fn serve(&self, mut link: GrpcLink, asked: &AsyncFd<&Event>) -> std::io::Result<()> {
+    async fn serve(&self, mut link: GrpcLink, asked: &AsyncFd<Arc<Event>>) -> std::io::Result<()> {
         let mut session = 0;
         loop {
             let question = lock(&self.question).take();

@@ -120,7 +120,7 @@ impl Shm {
         let Some(mut turn) = lock_until(&self.shared.turn, deadline) else {
             return WadeStatus::Timeout;
         };
-        let status = turn.evaluate_batch(&self.shared, states, start, deadline);
+        let status = turn.evaluate_batch(&self.shared, states, deadline);
         self.wake_keeper(&turn);
         if status == WadeStatus::Ok {
             let age_ns = nanoseconds_since(start);
@@ -179,13 +179,7 @@ impl Turn {
         }
     }
 
-    fn evaluate_batch(
-        &mut self,
-        shared: &Shared,
-        states: &[WadeState],
-        start: Instant,
-        deadline: Instant,
-    ) -> WadeStatus {
+    fn evaluate_batch(&mut self, shared: &Shared, states: &[WadeState], deadline: Instant) -> WadeStatus {
         let Self { link, batch, batch_asked, .. } = self;
         let Some(link) = link else { return shared.why_not() };
         batch.clear();
