@@ -173,6 +173,8 @@ typedef struct wade_forces {
   uint32_t surface_count;
   // Entries of `effects` that hold a load.
   uint32_t effect_count;
+  // 0
+  uint32_t reserved;
   // Net force [N].
   float force_n[3];
   // Net moment about `about_m` [N m].

@@ -191,6 +191,8 @@ pub struct WadeForces {
     pub surface_count: u32,
     /// Entries of `effects` that hold a load.
     pub effect_count: u32,
+    /// 0
+    pub reserved: u32,
     /// Net force [N].
     pub force_n: [f32; 3],
     /// Net moment about `about_m` [N m].
@@ -318,3 +320,6 @@ pub struct WadeVehicle {
     /// In the order of the answers.
     pub surfaces: [WadeSurface; WADE_MAX_SURFACES],
 }
+
+// nothing lies between the fields, so that equal values are equal bytes
+const _: () = assert!(size_of::<WadeState>() == 120 && size_of::<WadeForces>() == 3368);

@@ -57,6 +57,7 @@ impl WadeForces {
         bundle_version: 0,
         surface_count: 0,
         effect_count: 0,
+        reserved: 0,
         force_n: [0.0; 3],
         moment_nm: [0.0; 3],
         about_m: [0.0; 3],

@@ -23,6 +23,9 @@ std::vector<wade::State> states(std::size_t count) {
   return states;
 }
 
+static_assert(sizeof(wade_state) == 120, "no padding");
+static_assert(sizeof(wade_forces) == 3368, "no padding");
+
 // What does not depend on the call: bit by bit.
 bool same(wade::Forces left, wade::Forces right) {
   left.age_ns = right.age_ns = left.answer = right.answer = left.compute_ns = right.compute_ns = 0;
