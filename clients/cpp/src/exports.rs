@@ -21,6 +21,7 @@ use crate::abi::{
 };
 use crate::client::{Address, WadeClient};
 use crate::connection::status_of;
+use crate::pool::InCall;
 use crate::vehicle;
 
 /// Runs what a function does; a panic becomes a status.
@@ -143,6 +144,7 @@ pub unsafe extern "C" fn wade_evaluate(
         // SAFETY: null or valid; what `forces` holds are numbers, for which every bit pattern is a value.
         let given = unsafe { (client.as_ref(), state.as_ref(), forces.as_mut()) };
         let (Some(client), Some(state), Some(forces)) = given else { return WadeStatus::InvalidArgument };
+        let _in_call = InCall::begin();
         client.evaluate(state, budget_ns, forces)
     })
 }
@@ -173,6 +175,7 @@ pub unsafe extern "C" fn wade_evaluate_batch(
         let (states, forces) =
             unsafe { (slice::from_raw_parts(states, count), slice::from_raw_parts_mut(forces, count)) };
         let mut told = WadeBatch::default();
+        let _in_call = InCall::begin();
         let status = client.evaluate_batch(states, budget_ns, forces, &mut told);
         // SAFETY: null or valid.
         if let Some(batch) = unsafe { batch.as_mut() } {
