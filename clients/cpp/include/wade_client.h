@@ -156,9 +156,10 @@ typedef struct wade_effect_load {
 typedef struct wade_forces {
   // Time from the call whose state these answer to the end of this call [ns]; WADE_NEVER where there was no answer yet.
   uint64_t age_ns;
-  // Counts the answers of this client from 1 on, so that one that was seen before is known; 0 where there was none yet.
+  // Counts the answers of this client from 1 on, so that one that was seen before is known; 0 where there was none yet, and in
+  // a batch.
   uint64_t answer;
-  // The server's own time [ns].
+  // The server's own time [ns]; in a batch over gRPC that of the whole.
   uint64_t compute_ns;
   // WADE_IN_DOMAIN, WADE_SESSION_BEGINS, WADE_HAS_ADDED_MASS
   uint32_t flags;
@@ -172,6 +173,8 @@ typedef struct wade_forces {
   uint32_t surface_count;
   // Entries of `effects` that hold a load.
   uint32_t effect_count;
+  // 0
+  uint32_t reserved;
   // Net force [N].
   float force_n[3];
   // Net moment about `about_m` [N m].
@@ -275,7 +278,7 @@ typedef struct wade_vehicle {
   float center_of_mass_m[3];
   // About the center of mass, by rows.
   double inertia_kgm2[9];
-  // By `wade_quantity`.
+  // By `wade_quantity`; infinite where there is no range.
   wade_range domain[8];
   wade_surface surfaces[WADE_MAX_SURFACES];
 } wade_vehicle;
@@ -309,7 +312,9 @@ wade_status wade_evaluate(wade_client *client, const wade_state *state, uint64_t
 // The forces in `count` states, within a budget [ns]; `forces` has room for as many.
 //
 // On WADE_STATUS_OK all of them answer this call, from one bundle. Otherwise `forces` is as it was, so that an array that is
-// used again holds the last answer, and `batch->age_ns` says how old that is. `batch` may be null. Allocates nothing.
+// used again holds the last answer, and `batch->age_ns` says how old that is. `batch` may be null. A batch that is not
+// answered within its budget is not kept: a budget of 0 gets none. Over gRPC its states must agree in their flags.
+// Allocates nothing.
 wade_status wade_evaluate_batch(wade_client *client, const wade_state *states, size_t count, uint64_t budget_ns,
                                 wade_forces *forces, wade_batch *batch);
 
@@ -325,7 +330,7 @@ void wade_gravity_from_roll_pitch(float roll_rad, float pitch_rad, float gravity
 void wade_gravity_from_quaternion(const float world_from_body[4], float gravity_direction[3]);
 
 // A sentence for a status. Never null.
-const char *wade_status_message(wade_status status);
+const char *wade_status_message(int32_t status);
 
 // Name of a field of `wade_state`, from `invalid_field`. Never null.
 const char *wade_field_name(uint32_t field);
