@@ -1,10 +1,9 @@
 // wade from C: the forces of water on a wading vehicle. C11 and C++17. See clients/cpp/README.md.
 //
 // Body frame: x forward, y left, z up, origin at the center of the hull's bounding box. SI units, radians, single precision.
-// Names are those of the wire (proto/wade/v1/hydrodynamics.proto).
+// Names are those of the wire (proto/wade/v1/hydrodynamics.proto). Made from src/ by tests/header.rs; not to be edited.
 
-#ifndef WADE_CLIENT_H
-#define WADE_CLIENT_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -30,25 +29,31 @@
 
 // Flag of a state: no water pressure under the contact patches.
 #define WADE_DRY_CONTACT 1
+
 // Flag of a state: the caller adds `added_mass` to his own mass matrix, so that forces leave -M_A nu_dot out.
 #define WADE_IMPLICIT_ADDED_MASS 2
+
 // Flag of a state: `heading_rad` holds a value.
 #define WADE_HAS_HEADING 4
+
 // Flag of a state: `depth_rate_mps` holds a value.
 #define WADE_HAS_DEPTH_RATE 8
+
 // Flag of a state: `wheel_speed_radps` holds values.
 #define WADE_HAS_WHEEL_SPEEDS 16
 
 // Flag of forces: no quantity lies outside the training domain.
 #define WADE_IN_DOMAIN 1
+
 // Flag of forces: the session begins with the state that these answer, at rest and dry. In the middle of a run it says that
 // the server has forgotten the session.
 #define WADE_SESSION_BEGINS 2
+
 // Flag of forces: `added_mass` holds a matrix.
 #define WADE_HAS_ADDED_MASS 4
 
 // What came of a call.
-typedef enum wade_status {
+typedef enum {
   // The forces answer the state of this call.
   WADE_STATUS_OK = 0,
   // No answer within the budget: the forces are the last ones, `age_ns` old.
@@ -75,18 +80,38 @@ typedef enum wade_status {
 } wade_status;
 
 // How a call over shared memory waits for its answer.
-typedef enum wade_wait {
+typedef enum {
   // Sleeps until the server wakes it.
   WADE_WAIT_BLOCK = 0,
   // Polls without pause: faster by the time it takes to wake up, for the price of a core.
   WADE_WAIT_SPIN = 1,
 } wade_wait;
 
+// A quantity of which the training domain states a range; the places of `wade_forces.outside`.
+typedef enum {
+  // Horizontal speed through the water [m/s].
+  WADE_QUANTITY_SPEED = 0,
+  // Flow angle [rad]: pi/2 head-on or from behind, 0 from the side.
+  WADE_QUANTITY_ANGLE = 1,
+  // [kg/m3]
+  WADE_QUANTITY_DENSITY = 2,
+  // [m]
+  WADE_QUANTITY_DEPTH = 3,
+  // Angle between body z and up [rad].
+  WADE_QUANTITY_TILT = 4,
+  // Speed along body z [m/s].
+  WADE_QUANTITY_VERTICAL_SPEED = 5,
+  // [rad/s]
+  WADE_QUANTITY_ANGULAR_SPEED = 6,
+  // Distance to the nearest state that was learnt from, over what is usual among these [-].
+  WADE_QUANTITY_DISTANCE = 7,
+} wade_quantity;
+
 // A client of one vehicle of one server. Any number of threads may call it; their calls are answered one at a time.
 typedef struct wade_client wade_client;
 
 // Where the server is and whom it is asked about. Begin with `wade_default_options()`.
-typedef struct wade_options {
+typedef struct {
   // WADE_ABI_VERSION
   uint32_t abi_version;
   // sizeof(wade_state)
@@ -107,7 +132,7 @@ typedef struct wade_options {
 } wade_options;
 
 // The state of a vehicle in the water. Begin with `wade_default_state()`.
-typedef struct wade_state {
+typedef struct {
   // Number of a run of states that follow each other, for effects that remember; 0 for none. Over shared memory a client may
   // run many at a time; over gRPC another number begins another run, and batches have none.
   uint64_t session;
@@ -141,7 +166,7 @@ typedef struct wade_state {
 } wade_state;
 
 // The load of one effect that was added to the model.
-typedef struct wade_effect_load {
+typedef struct {
   // Number of `Effect` on the wire; see `wade_effect_name`.
   uint32_t effect;
   // Why it is zero: number of `LeftOut` on the wire; 0 where it is not left out.
@@ -153,7 +178,7 @@ typedef struct wade_effect_load {
 } wade_effect_load;
 
 // What the water does to the vehicle, body frame. All zero, with an age of WADE_NEVER, where there was no answer yet.
-typedef struct wade_forces {
+typedef struct {
   // Time from the call whose state these answer to the end of this call [ns]; WADE_NEVER where there was no answer yet.
   uint64_t age_ns;
   // Counts the answers of this client from 1 on, so that one that was seen before is known; 0 where there was none yet, and in
@@ -204,7 +229,7 @@ typedef struct wade_forces {
 } wade_forces;
 
 // What came of a batch beside its forces.
-typedef struct wade_batch {
+typedef struct {
   // Time from the call that the forces answer to the end of this call [ns]; WADE_NEVER where no batch was answered yet.
   uint64_t age_ns;
   // Which state is wrong, where the status says so.
@@ -217,28 +242,17 @@ typedef struct wade_batch {
   uint32_t reserved;
 } wade_batch;
 
-// A quantity of which the training domain states a range; the places of `wade_forces.outside`.
-typedef enum wade_quantity {
-  // Horizontal speed through the water [m/s].
-  WADE_QUANTITY_SPEED = 0,
-  // Flow angle [rad]: pi/2 head-on or from behind, 0 from the side.
-  WADE_QUANTITY_ANGLE = 1,
-  // [kg/m3]
-  WADE_QUANTITY_DENSITY = 2,
-  // [m]
-  WADE_QUANTITY_DEPTH = 3,
-  // Angle between body z and up [rad].
-  WADE_QUANTITY_TILT = 4,
-  // Speed along body z [m/s].
-  WADE_QUANTITY_VERTICAL_SPEED = 5,
-  // [rad/s]
-  WADE_QUANTITY_ANGULAR_SPEED = 6,
-  // Distance to the nearest state that was learnt from, over what is usual among these [-].
-  WADE_QUANTITY_DISTANCE = 7,
-} wade_quantity;
+// A range of the training domain.
+typedef struct {
+  // Smallest value.
+  double minimum;
+  // Largest value.
+  double maximum;
+} wade_range;
 
 // A named region of the hull.
-typedef struct wade_surface {
+typedef struct {
+  // As in vehicle.toml.
   char name[WADE_NAME_SIZE];
   // bottom, front, rear, side or wheel.
   char kind[16];
@@ -250,17 +264,13 @@ typedef struct wade_surface {
   double area_m2;
 } wade_surface;
 
-// A range of the training domain.
-typedef struct wade_range {
-  double minimum;
-  double maximum;
-} wade_range;
-
 // What the server says of a vehicle.
-typedef struct wade_vehicle {
+typedef struct {
+  // Its name.
   char name[WADE_NAME_SIZE];
   // Where the weights come from, such as "analytic".
   char provenance[WADE_NAME_SIZE];
+  // Version of the bundle.
   uint32_t bundle_version;
   // Entries of `surfaces` that hold one.
   uint32_t surface_count;
@@ -270,22 +280,27 @@ typedef struct wade_vehicle {
   uint32_t effects[WADE_MAX_EFFECTS];
   // [m]
   double length_m;
+  // [m]
   double width_m;
+  // [m]
   double height_m;
   // z of the ground-contact plane [m].
   double z0_m;
+  // [kg]
   double mass_kg;
+  // [m]
   float center_of_mass_m[3];
   // About the center of mass, by rows.
   double inertia_kgm2[9];
   // By `wade_quantity`; infinite where there is no range.
   wade_range domain[8];
+  // In the order of the answers.
   wade_surface surfaces[WADE_MAX_SURFACES];
 } wade_vehicle;
 
 #ifdef __cplusplus
 extern "C" {
-#endif
+#endif // __cplusplus
 
 // Opens a client and begins to look for the server; does not wait for it. On WADE_STATUS_OK `*client` must be closed.
 // Otherwise (WADE_STATUS_ABI_MISMATCH, WADE_STATUS_INVALID_ARGUMENT, WADE_STATUS_INTERNAL) it is null.
@@ -315,8 +330,12 @@ wade_status wade_evaluate(wade_client *client, const wade_state *state, uint64_t
 // used again holds the last answer, and `batch->age_ns` says how old that is. `batch` may be null. A batch that is not
 // answered within its budget is not kept: a budget of 0 gets none. Over gRPC its states must agree in their flags.
 // Allocates nothing.
-wade_status wade_evaluate_batch(wade_client *client, const wade_state *states, size_t count, uint64_t budget_ns,
-                                wade_forces *forces, wade_batch *batch);
+wade_status wade_evaluate_batch(wade_client *client,
+                                const wade_state *states,
+                                size_t count,
+                                uint64_t budget_ns,
+                                wade_forces *forces,
+                                wade_batch *batch);
 
 // Asks a server over gRPC, at most as long as the timeout, what it serves under a name. `address` as in `wade_options`, but not
 // shared memory, which does not carry it.
@@ -324,10 +343,11 @@ wade_status wade_get_vehicle(const char *address, const char *vehicle, uint64_t 
 
 // Unit vector along gravity of a body with this roll and pitch [rad]: positive roll lowers the right side, positive pitch the
 // nose (REP-103).
-void wade_gravity_from_roll_pitch(float roll_rad, float pitch_rad, float gravity_direction[3]);
+void wade_gravity_from_roll_pitch(float roll_rad, float pitch_rad, float *gravity_direction);
 
 // Unit vector along gravity of a body with this attitude: unit quaternion w, x, y, z that takes body vectors to the world, z up.
-void wade_gravity_from_quaternion(const float world_from_body[4], float gravity_direction[3]);
+void wade_gravity_from_quaternion(const float *world_from_body,
+                                  float *gravity_direction);
 
 // A sentence for a status. Never null.
 const char *wade_status_message(int32_t status);
@@ -345,8 +365,8 @@ const char *wade_effect_name(uint32_t effect);
 uint32_t wade_abi_version(void);
 
 #ifdef __cplusplus
-} // extern "C"
-#endif
+}  // extern "C"
+#endif  // __cplusplus
 
 // Options that are complete but for `address` and `vehicle`.
 static inline wade_options wade_default_options(void) {
@@ -367,5 +387,3 @@ static inline wade_state wade_default_state(void) {
   state.gravity_direction[2] = -1.0F;
   return state;
 }
-
-#endif // WADE_CLIENT_H
