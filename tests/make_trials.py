@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Generates the trials of README's story, tests/data/wading, from the weights that are shipped with the Husky.
+"""Generates the trials of README's story, tests/data/wading, and its figure from the weights that are shipped with the Husky.
 
     python3 tests/make_trials.py target/release/wade
 
@@ -12,6 +12,7 @@ import csv
 import hashlib
 import math
 import random
+import re
 import struct
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 BUNDLE = ROOT / "vehicles" / "husky"
 FOLDER = ROOT / "tests" / "data" / "wading"
+FIGURE = ROOT / "tests" / "data" / "wading.svg"
 
 SEED = 7
 TRIALS = 12
@@ -93,6 +95,16 @@ def predicted(wade, states):
             return [{name: float(row[name]) for name in FORCE_NOISE_N} for row in csv.DictReader(file)]
 
 
+def figure(wade):
+    """The first trace of the page: a trial that took no part, before and after."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [wade, "gap", "--vehicle", "husky", "--vehicles", BUNDLE.parent, "--trials", FOLDER, "--out", folder]
+        subprocess.run(command, check=True)
+        page = (Path(folder) / "index.html").read_text()
+    traces = page[page.index("The trials with the largest gap") :]
+    return re.search(r"<svg.*?</svg>", traces, re.DOTALL).group()
+
+
 def main():
     wade = sys.argv[1] if len(sys.argv) == 2 else sys.exit(__doc__)
     if (BUNDLE / "effects.toml").exists():
@@ -132,6 +144,7 @@ method = "load_cell"
 {noise}
 """
     )
+    FIGURE.write_text(figure(wade) + "\n")
     print(f"{FOLDER.relative_to(ROOT)}: {TRIALS} trials, generated")
 
 
