@@ -8,8 +8,8 @@ use crate::service::wire::State;
 
 /// Columns that describe a state.
 const STATE: [&str; 25] = [
-    "t", "vx", "vy", "vz", "cx", "cy", "cz", "wx", "wy", "wz", "roll", "pitch", "yaw", "depth", "ax", "ay", "az",
-    "alx", "aly", "alz", "rho", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr",
+    "t", "vx", "vy", "vz", "cx", "cy", "cz", "wx", "wy", "wz", "roll", "pitch", "yaw", "depth", "ax", "ay",
+    "az", "alx", "aly", "alz", "rho", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr",
 ];
 /// Columns of a trial that say nothing about the state.
 const NOT_STATE: [&str; 12] =

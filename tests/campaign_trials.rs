@@ -102,9 +102,8 @@ fn campaign(folder: &Path, model: &Model, added: f64, flutter: f64) {
         notes: [].into(),
     };
     let sections = |case: &Case| if case.is_unsteady() { (10.0 * (2.5 + case.ramp_s)) as u32 } else { 20 };
-    let of = |case: &Case| {
-        (0..sections(case)).map(|i| sample(model, case, i, added, flutter)).collect::<Vec<_>>()
-    };
+    let of =
+        |case: &Case| (0..sections(case)).map(|i| sample(model, case, i, added, flutter)).collect::<Vec<_>>();
     let dataset = Dataset { meta, samples: plan.cases.iter().flat_map(of).collect() };
     dataset::write(&folder.join("sections.parquet"), &dataset).expect("written");
 }
@@ -112,7 +111,9 @@ fn campaign(folder: &Path, model: &Model, added: f64, flutter: f64) {
 fn wade(campaign: &Path, sets: &[&str], out: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
     command.args(["campaign", "trials"]).arg(campaign).env("WADE_VEHICLES", common::vehicles());
-    sets.iter().for_each(|set| drop(command.args(["--set", set])));
+    for set in sets {
+        command.args(["--set", set]);
+    }
     command.arg("--out").arg(out).output().expect("wade runs")
 }
 
@@ -128,7 +129,8 @@ fn trials(model: &Model, added: f64, flutter: f64, sets: &[&str]) -> Trials {
 #[test]
 fn an_accelerating_hull_is_held_back_by_the_water_that_moves_with_it() {
     let model = common::model("warthog");
-    let (with, without) = (trials(&model, ADDED_KG, 0.0, &["unsteady"]), trials(&model, 0.0, 0.0, &["unsteady"]));
+    let (with, without) =
+        (trials(&model, ADDED_KG, 0.0, &["unsteady"]), trials(&model, 0.0, 0.0, &["unsteady"]));
     assert_eq!((with.trials.len(), with.manifest.measured.method), (15, Some(Method::Cfd)));
     assert!(with.manifest.generated.as_ref().is_some_and(|how| how.contains("nothing of it was measured")));
     let arm = Vec3::from(POINT) - model.vehicle().center_of_mass;

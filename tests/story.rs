@@ -84,7 +84,7 @@ fn three_commands_name_the_effect_and_serve_it() {
     let effects = report["effects"].as_array().expect("a list");
     let name = effects[0]["name"].as_str().expect("a name");
     let interval = &effects[0]["parameters"]["surge"]["interval"];
-    let [low, high] = [0, 1].map(|i| interval[i].as_f64().expect("a number"));
+    let [low, high] = [0_usize, 1].map(|i| interval[i].as_f64().expect("a number"));
     assert!((name, effects.len()) == ("added_mass", 1) && low < 0.8 && high > 0.8, "{effects:#?}");
 
     let added = line(&after, &format!("+ {name}")).expect("a line of its own");

@@ -120,7 +120,8 @@ fn columns(
     wrenches: &[[f64; 6]],
     wheels: &[(&'static str, f64)],
 ) -> Vec<(&'static str, Vec<f64>)> {
-    let of = |value: &dyn Fn(&Sample) -> f64| samples.iter().map(|sample| value(sample)).collect::<Vec<f64>>();
+    let of =
+        |value: &dyn Fn(&Sample) -> f64| samples.iter().map(|sample| value(sample)).collect::<Vec<f64>>();
     let mut columns = vec![
         ("t", of(&|s| 0.5 * (s.start_s + s.end_s))),
         ("depth", of(&|s| s.condition.depth)),
@@ -141,7 +142,8 @@ fn columns(
         columns.extend((0..3).map(|axis| (names[axis], of(&|s| vector(&s.condition)[axis]))));
     }
     // wheels roll on a bed that moves, and stand on one that is parked
-    columns.extend(wheels.iter().map(|&(name, radius)| (name, of(&|s| s.condition.ground_velocity.x / radius))));
+    columns
+        .extend(wheels.iter().map(|&(name, radius)| (name, of(&|s| s.condition.ground_velocity.x / radius))));
     columns.extend((0..6).map(|c| (WRENCH[c], wrenches.iter().map(|w| w[c]).collect())));
     columns
 }
@@ -169,7 +171,8 @@ impl Noise {
         }
         let half = wrenches.len() / 2;
         if half > 0 && samples.iter().all(|sample| sample.condition == samples[0].condition) {
-            let mean = |part: &[[f64; 6]], c: usize| part.iter().map(|w| w[c]).sum::<f64>() / part.len() as f64;
+            let mean =
+                |part: &[[f64; 6]], c: usize| part.iter().map(|w| w[c]).sum::<f64>() / part.len() as f64;
             for c in 0..6 {
                 self.mean[c] += (0.5 * (mean(&wrenches[half..], c) - mean(&wrenches[..half], c))).powi(2);
             }

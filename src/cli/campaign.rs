@@ -306,7 +306,10 @@ impl Trials {
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
         let (manifest, trials) = trials::trials(&plan, &dataset, &bundle.vehicle, &sets)?;
         if self.out.join(MANIFEST_FILE).exists() {
-            bail!("{} holds trials already, which would be mixed with these: name another folder", self.out.display());
+            bail!(
+                "{} holds trials already, which would be mixed with these: name another folder",
+                self.out.display()
+            );
         }
         write(&self.out, &manifest, &trials)?;
         super::emit(&format!("{}: {} trials\n", self.out.display(), trials.len()))?;

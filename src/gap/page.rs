@@ -145,8 +145,12 @@ fn effects(report: &Report) -> String {
     for effect in report.effects.iter().filter(|effect| effect.surfaces.keys().any(|name| name != "hull")) {
         let of = |(name, share): (&String, &f64)| format!("{} {}", escape(name), percent(*share));
         let surfaces: Vec<String> = effect.surfaces.iter().map(of).collect();
-        let _ =
-            writeln!(text, "<p class=\"small\">{}, by surface: {}.</p>", plain(effect.name), surfaces.join(", "));
+        let _ = writeln!(
+            text,
+            "<p class=\"small\">{}, by surface: {}.</p>",
+            plain(effect.name),
+            surfaces.join(", ")
+        );
     }
     text
 }

@@ -20,7 +20,8 @@ pub fn write(folder: &Path, manifest: &Manifest, trials: &[Columns]) -> Result<(
         let still = vec![0.0; columns.first().map_or(0, |(_, values)| values.len())];
         let mut all: Vec<(&str, &[f64])> =
             columns.iter().map(|(name, values)| (*name, values.as_slice())).collect();
-        let absent = REQUIRED.into_iter().filter(|required| !columns.iter().any(|(name, _)| name == required));
+        let absent =
+            REQUIRED.into_iter().filter(|required| !columns.iter().any(|(name, _)| name == required));
         all.extend(absent.map(|name| (name, still.as_slice())));
         put(&folder.join(format!("{name}.csv")), csv_text(&all))?;
     }
