@@ -32,7 +32,7 @@ impl Report {
         };
         body += &verdict(class, &format!("<b>{}</b>", escape(&self.summary)));
         if let Some(experiment) = &self.separating_experiment {
-            body += &verdict("notice", &format!("<b>To tell them apart:</b> {}.", escape(experiment)));
+            body += &verdict("notice", &format!("<b>To tell them apart:</b> {}.", escape(&plain(experiment))));
         }
         body += &shares(self);
         body += &effects(self);
@@ -222,7 +222,7 @@ fn held_out(report: &Report) -> String {
             "notice",
             &format!(
                 "Worse where {}: {} before, {} after, in noise floors.",
-                escape(&worse.place),
+                escape(&plain(&worse.place)),
                 number(worse.before),
                 number(worse.after)
             ),
@@ -300,7 +300,7 @@ fn regions(report: &Report) -> String {
     }
     let rows = report.regions.iter().map(|region| {
         vec![
-            prose(&region.place),
+            prose(&plain(&region.place)),
             percent(region.share_of_gap),
             percent(region.share_of_samples),
             region.trials.to_string(),
