@@ -32,7 +32,8 @@ impl Report {
         };
         body += &verdict(class, &format!("<b>{}</b>", escape(&self.summary)));
         if let Some(experiment) = &self.separating_experiment {
-            body += &verdict("notice", &format!("<b>To tell them apart:</b> {}.", escape(&plain(experiment))));
+            body +=
+                &verdict("notice", &format!("<b>To tell them apart:</b> {}.", escape(&plain(experiment))));
         }
         body += &shares(self);
         body += &effects(self);
