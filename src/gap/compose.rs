@@ -300,7 +300,7 @@ fn hash(trials: &Trials) -> String {
         for column in columns.into_iter().chain(measured).chain(trial.other_forces.values()) {
             column.iter().for_each(|value| digest.update(value.to_le_bytes()));
         }
-        for vectors in [&trial.velocity, &trial.angular_velocity, &trial.acceleration] {
+        for vectors in [&trial.velocity, &trial.current, &trial.angular_velocity, &trial.acceleration] {
             vectors.iter().flat_map(|v| v.iter()).for_each(|value| digest.update(value.to_le_bytes()));
         }
     }

@@ -176,6 +176,7 @@ fn trial(name: &str, motion: &[State], added: &[[f64; 6]], noise: &Noise, random
         rows: (2..).take(count).collect(),
         t: column(&|s| s.t),
         velocity: seen.iter().map(|s| s.v).collect(),
+        current: vec![Vec3::zeros(); count],
         angular_velocity: seen.iter().map(|s| s.w).collect(),
         roll: vec![0.0; count],
         pitch: vec![0.0; count],
