@@ -71,7 +71,7 @@ pub fn basis(
         Effect::WaveMemory => wave_memory::basis(shape, memory, input, &mut emit),
         Effect::ChannelBlockage => channel_blockage::basis(input, &mut emit),
         Effect::Squat => squat::basis(shape, input, &mut emit),
-        Effect::WheelPaddleThrust => wheel_paddle_thrust::basis(input, &mut emit),
+        Effect::WheelPaddleThrust => wheel_paddle_thrust::basis(shape, input, &mut emit),
         Effect::BedMotion => bed_motion::basis(shape, input, &mut emit),
         Effect::SensorDelay
         | Effect::SensorBias

@@ -8,6 +8,7 @@ use super::candidates::Setting;
 use super::design::Design;
 use super::detect::{self, Excitation};
 use super::experiment::separating;
+use super::features::{ACCELERATION, of_bins};
 use super::fit::{Fit, Parameter, fit};
 use super::holdout::{closures, explained, worse};
 use super::noise::{Floor, floors_of};
@@ -73,7 +74,8 @@ pub(super) fn compose(
         let effects = |set: &[Member]| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
         separating(&effects(&found.members), &effects(rival))
     });
-    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
+    let left: Vec<Vec<[f64; 6]>> = held.iter().map(|&trial| left(&named, &all[trial], trial, setting)).collect();
+    let held_floors = floors_of(all, &held, &left, judge.floors, &setting.components);
     let unexplained = unexplained(judge, &found);
     let gap = GapReport {
         held_out: closures(&named, all, &held, setting, &held_floors, config),
@@ -108,6 +110,12 @@ pub(super) fn compose(
     };
     report.summary = summary(&report);
     report
+}
+
+/// What the named effects leave of a trial's gap.
+fn left(named: &[Named], series: &Series, trial: usize, setting: &Setting) -> Vec<[f64; 6]> {
+    let added = explained(named, series, trial, setting);
+    series.gap.iter().zip(added).map(|(gap, added)| std::array::from_fn(|c| gap[c] - added[c])).collect()
 }
 
 fn names(judge: &Judge, set: &[Member]) -> Vec<&'static str> {
@@ -272,19 +280,20 @@ fn excess(all: &[Series], design: &Design, setting: &Setting, trial: usize) -> V
 
 fn validity(all: &[Series]) -> BTreeMap<&'static str, [f64; 2]> {
     type Quantity = fn(&Condition) -> f64;
-    let quantities: [(&'static str, Quantity); 5] = [
+    let quantities: [(&'static str, Quantity); 4] = [
         ("depth_m", |c| c.depth),
         ("speed_mps", |c| c.velocity.norm()),
-        ("acceleration_mps2", |c| c.acceleration.norm()),
         ("angular_speed_radps", |c| c.angular_velocity.norm()),
         ("density_kgpm3", |c| c.density),
     ];
-    let range = |of: Quantity| {
-        let mut values: Vec<f64> = all.iter().flat_map(|s| s.conditions.iter().map(of)).collect();
-        // single samples of noise do not widen what was tested
-        [quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995)]
-    };
-    quantities.into_iter().map(|(name, of)| (name, range(of))).collect()
+    // single samples of noise do not widen what was tested
+    let range = |mut values: Vec<f64>| [quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995)];
+    let of = |of: Quantity| range(all.iter().flat_map(|s| s.conditions.iter().map(of)).collect());
+    let mut ranges: BTreeMap<&'static str, [f64; 2]> =
+        quantities.into_iter().map(|(name, quantity)| (name, of(quantity))).collect();
+    let accelerations = all.iter().flat_map(of_bins).map(|bin| bin[ACCELERATION]).collect();
+    ranges.insert("acceleration_mps2", range(accelerations));
+    ranges
 }
 
 /// Hash over all numbers, whatever the order of the trials.
