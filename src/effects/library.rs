@@ -267,7 +267,9 @@ impl Effect {
             }
             Self::ChannelBlockage => const { &[l("strength", 0.0, 5.0, [0.5, 1.5])] },
             Self::Squat => const { &[l("sinkage", 0.0, 4.0, [0.1, 1.5]), c("trim", "1", -2.0, 2.0)] },
-            Self::WheelPaddleThrust => const { &[l("thrust", 0.0, 6.0, [0.1, 2.0]), c("torque", "1", -12.0, 12.0)] },
+            Self::WheelPaddleThrust => {
+                const { &[l("thrust", 0.0, 6.0, [0.1, 2.0]), c("torque", "1", -12.0, 12.0)] }
+            }
             Self::BedMotion => const { &[c("drag", "1", -4.0, 4.0), c("lift", "1", -4.0, 4.0)] },
             Self::SensorDelay => const { &[c("delay", "s", 0.0, 1.0)] },
             Self::SensorBias | Self::SensorBiasStep => {

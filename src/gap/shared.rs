@@ -13,7 +13,7 @@ use super::design::Design;
 /// Share of the coefficient that must be left without the noise.
 const LASTS: f64 = 0.5;
 /// Share of a column's square that must hang together beyond its noise.
-const SIGNAL: f64 = 0.05;
+const SIGNAL: f64 = 0.02;
 /// Distances in bins over which products are taken, from the first beyond the noise on.
 const WINDOW: usize = 8;
 
@@ -33,7 +33,7 @@ pub(super) fn outlasts_noise(design: &Design, sum: &DVector<f64>, target: &DVect
 /// Bins beyond which noise has forgotten itself: that of a bin reaches the next one, since rates are differences, and each
 /// pass of smoothing adds one to the variance of its autocovariance.
 fn reach(smoothing: usize) -> usize {
-    2 + (1.5 * (smoothing as f64).sqrt()).ceil() as usize
+    1 + ((1.5 * (smoothing as f64).sqrt()).ceil() as usize).max(1)
 }
 
 /// Sum of the products of two rows of a component that are so many bins apart, either way.
