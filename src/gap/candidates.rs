@@ -87,7 +87,7 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::Squat => {
             let in_channel = [0.7, 1.0].map(|faded| [faded, 0.0, 0.0]);
             let walls = if setting.channel_width.is_some() { &in_channel[..] } else { &[] };
-            [&[[0.0; 3], [0.0, 1.0, 0.0]], walls].concat()
+            [&[[0.0; 3], [0.0, 1.0, 0.0]][..], walls].concat()
         }
         Effect::WaterEntrySlamming => {
             // a bottom without deadrise, and of 10, 20 and 30 degrees
