@@ -24,6 +24,6 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
         let facing = if shape[0] > 0.5 { panel.facing_minus.z } else { panel.windward(&ground).x };
         let load = input.half_density() * facing * part.fraction * speed;
         emit(0, Part::Panel(index), input.at(ground * -load, &at_bed(part.point)));
-        emit(1, Part::Hull, input.at(up * (load * speed), &middle));
+        emit(1, Part::Panel(index), input.at(up * (load * speed), &middle));
     }
 }

@@ -53,7 +53,12 @@ pub(super) fn gated(all: &[Series], judge: &Judge, library: &[Effect]) -> Option
         }
         Gated { effect: candidate.effect, limits: found.0, share: found.1 / whole }
     };
-    let candidates = design.candidates.iter().filter(|candidate| library.contains(&candidate.effect));
+    // what remembers, or begins in the middle of the trials, has a border of its own
+    let bordered = |effect: Effect| effect.has_memory() || effect == Effect::SensorBiasStep;
+    let candidates = design
+        .candidates
+        .iter()
+        .filter(|candidate| library.contains(&candidate.effect) && !bordered(candidate.effect));
     let best =
         candidates.map(one).max_by(|a, b| a.share.total_cmp(&b.share).then(b.effect.cmp(&a.effect)))?;
     (best.limits != OPEN && best.share > EXPLAINED).then_some(best)
