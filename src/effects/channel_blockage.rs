@@ -1,6 +1,6 @@
 //! E10, the walls of a channel: the flow past the hull is faster than the hull.
 //!
-//! `W = k D ((1 - m)^-2 - 1)` with the drag `D` of the model and the blockage `m = A_wet,front / (w d)`: by continuity the
+//! `W = k D ((1 - m)^-2 - 1)` with the drag `D` of the model and the blockage `m = (V / L) / (w d)`, of its mean section: by continuity the
 //! flow beside the hull is `1 / (1 - m)` times as fast. No hull stands deeper in the water than the water is, so `m` is at
 //! most `b / w`, also where a bow reaches into deeper water than the origin does. Qi, Eames, Johnson (JFM 2014) have
 //! `(1 + Cd0 b / 2w)^2` instead, which agrees to a few per cent for b/w of 0.1 to 0.4, where both are meant to hold; `k` is
@@ -29,8 +29,6 @@ pub(super) fn blockage(input: &Input) -> Option<f64> {
     const MOST: f64 = 0.8;
     let immersion = input.immersion;
     let width = input.channel_width.filter(|_| immersion.depth > 1e-3)?;
-    let wet = input.body.panels.iter().zip(&immersion.panels);
-    let velocity = input.condition.velocity;
-    let front: f64 = wet.map(|(panel, wet)| panel.windward(&velocity).x * wet.fraction).sum();
-    Some((front / (width * immersion.depth)).min(input.body.width / width).min(MOST))
+    let section = immersion.volume / input.body.length;
+    Some((section / (width * immersion.depth)).min(input.body.width / width).min(MOST))
 }

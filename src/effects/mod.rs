@@ -59,7 +59,7 @@ pub fn basis(
     mut emit: impl FnMut(usize, Part, Wrench),
 ) {
     match effect {
-        Effect::AddedMass => added_mass::basis(input, &mut emit),
+        Effect::AddedMass => added_mass::basis(shape, input, &mut emit),
         Effect::LinearDamping => linear_damping::basis(input, &mut emit),
         Effect::DragCoefficientError => drag_coefficient_error::basis(shape, input, &mut emit),
         Effect::Rotation => rotation::basis(shape, input, &mut emit),

@@ -83,7 +83,8 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::Rotation => vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
         Effect::Current => vec![[0.0; 3], [0.0, 0.0, 1.0]],
         Effect::DragCoefficientError => [0.0, 1.0, 2.0].map(|law| [law, 0.0, 0.0]).into(),
-        Effect::BedMotion | Effect::WheelPaddleThrust => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::AddedMass | Effect::WheelPaddleThrust => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::BedMotion => [0.0, 1.0, 2.0].map(|area| [area, 0.0, 0.0]).into(),
         Effect::Squat => {
             let in_channel = [0.7, 1.0].map(|faded| [faded, 0.0, 0.0]);
             let walls = if setting.channel_width.is_some() { &in_channel[..] } else { &[] };
@@ -199,7 +200,8 @@ fn chain(
             }
             Effect::DriveGain => columns[0][sample] = series.other[sample],
             Effect::MassError => {
-                let inertia = (state.acceleration + up * GRAVITY) * -setting.mass;
+                // the acceleration that the wrench was inferred with
+                let inertia = (series.recorded_acceleration[sample] + up * GRAVITY) * -setting.mass;
                 (0..3).for_each(|axis| columns[0][sample][axis] = inertia[axis]);
             }
             _ => {}

@@ -55,16 +55,21 @@ fn products(t: &[f64], values: &[f64], lag: usize) -> (f64, f64) {
 /// bin is the change of the velocity over the bin, whatever happens in between: the integral form of a law in the
 /// acceleration. A filter would take off the peaks of a column, but not those of the gap.
 pub(super) fn acceleration(t: &[f64], velocity: &[Vec3], angular_velocity: &[Vec3]) -> Vec<Vec3> {
+    let turning = angular_velocity.iter().zip(velocity);
+    rates(t, velocity).into_iter().zip(turning).map(|(rate, (omega, v))| rate + omega.cross(v)).collect()
+}
+
+/// Rate of each sample from its neighbors.
+pub(super) fn rates(t: &[f64], values: &[Vec3]) -> Vec<Vec3> {
     let mut rates = Vec::with_capacity(t.len());
     for piece in pieces(t) {
         let last = piece.end - 1;
         rates.extend(piece.clone().map(|i| {
             let (before, after) = (i.max(piece.start + 1) - 1, (i + 1).min(last));
-            (velocity[after] - velocity[before]) / (t[after] - t[before]).max(1e-9)
+            (values[after] - values[before]) / (t[after] - t[before]).max(1e-9)
         }));
     }
-    let turning = angular_velocity.iter().zip(velocity);
-    rates.into_iter().zip(turning).map(|(rate, (omega, v))| rate + omega.cross(v)).collect()
+    rates
 }
 
 /// Rate of the depth [m/s], smoothed over at most a third of a second: noise must not look like entry, nor smoothing take

@@ -29,6 +29,8 @@ const MOST_FOLDS: f64 = 0.75;
 /// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
 /// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
 const MOST_SCATTER: f64 = 0.75;
+/// Share of what a law of the water explains that it may miss where it is the right one, on a hull that it was not made for.
+const LAW: f64 = 0.05;
 /// A shifted column that still points the same way is no placebo.
 const SAME_DIRECTION: f64 = 0.9;
 
@@ -210,8 +212,10 @@ impl<'a> Judge<'a> {
                 continue;
             }
             let noisy = |i: usize| {
-                let own_part = self.design.x.column(own[i].0) * beta[at + i];
-                !outlasts_noise(self.design, &own_part, &(&residual + &own_part))
+                let mut others = columns.clone();
+                others.remove(at + i);
+                let part = contribution(self.design, &others, &[own[i].0], &[beta[at + i]]);
+                part.is_none_or(|part| !outlasts_noise(self.design, &part, &(&residual + &part)))
             };
             // a channel that shares but noise with the gap would make a fault of it
             if let Some(drop) = (0..own.len()).find(|&i| noisy(i)).filter(|_| own.len() > 1) {
@@ -250,6 +254,10 @@ impl<'a> Judge<'a> {
         fitted: &Fitted,
     ) -> Option<Refusal> {
         let effect = self.effect(member);
+        // what comes with an effect does not come without it
+        if effect.needs_its_first() && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
+            return Some(Refusal::NotSignificant);
+        }
         // a moving bed changes drag and lift; drag alone is the drag coefficient's
         let held = &self.design.candidates[member.candidate].columns;
         if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
@@ -601,7 +609,8 @@ impl<'a> Judge<'a> {
                     }
                     let mut rival = others.clone();
                     rival.push(judged.member);
-                    let (difference, open) = self.difference(&rival, set, explained, misfit)?;
+                    let outline = if effect.kind() == Kind::Physics { LAW * explained } else { misfit };
+                    let (difference, open) = self.difference(&rival, set, explained, outline)?;
                     (difference <= open).then_some((difference, rival))
                 });
                 let best = rivals.min_by(|a, b| a.0.total_cmp(&b.0));
@@ -697,10 +706,10 @@ impl<'a> Judge<'a> {
     }
 
     /// Cross-validated loss of one set over another, and how much of it two standard errors and the formulas' own
-    /// uncertainty leave open, for a member that explains `explained` and leaves `misfit`.
+    /// uncertainty leave open, for a member that explains `explained`.
     ///
-    /// No law holds exactly, so a rival may leave as much again as the winner does, but not less than a hundredth nor more
-    /// than a twentieth of what is explained. Beside it the scatter from trial to trial; where few trials tell the two
+    /// No law holds exactly: a rival of the water may miss a twentieth of what is explained, another as much again as the
+    /// winner leaves, `misfit`, but not less than a hundredth nor more than a twentieth. Beside it the scatter from trial to trial; where few trials tell the two
     /// apart that scatter says nothing: there the noise counts, through what the two predict differently.
     fn difference(
         &self,

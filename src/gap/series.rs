@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::measurement::{measured, other_force};
-use super::rates::{Coherence, acceleration, wetting_rate};
+use super::rates::{Coherence, acceleration, rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
@@ -31,6 +31,8 @@ pub(super) struct Series {
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one.
     pub other: Vec<[f64; 6]>,
+    /// Acceleration as the trial has it, measured or filtered [m/s2].
+    pub recorded_acceleration: Vec<Vec3>,
     /// True where the acceleration was measured, not differentiated.
     pub acceleration_is_measured: bool,
     /// Accelerations, angular accelerations, wetting rate and angular velocities: how far each hangs together.
@@ -149,8 +151,11 @@ fn of_trial(
         coherence[axis + 7] = Coherence::of(&trial.t, |i| conditions[i].angular_velocity[axis]);
     }
     if !trial.acceleration_is_measured {
-        let rates = acceleration(&trial.t, &trial.velocity, &trial.angular_velocity);
-        conditions.iter_mut().zip(rates).for_each(|(condition, rate)| condition.acceleration = rate);
+        let linear = acceleration(&trial.t, &trial.velocity, &trial.angular_velocity);
+        let angular = rates(&trial.t, &trial.angular_velocity);
+        for (condition, (linear, angular)) in conditions.iter_mut().zip(linear.into_iter().zip(angular)) {
+            (condition.acceleration, condition.angular_acceleration) = (linear, angular);
+        }
     }
     let wetting_rate = wetting_rate(&trial.t, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
@@ -167,6 +172,7 @@ fn of_trial(
         gap: gap.collect(),
         other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
         wetting_rate,
+        recorded_acceleration: trial.acceleration.clone(),
         acceleration_is_measured: trial.acceleration_is_measured,
         coherence,
         wheels: (0..count)

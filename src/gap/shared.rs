@@ -12,22 +12,23 @@ use super::design::Design;
 
 /// Share of the coefficient that must be left without the noise.
 const LASTS: f64 = 0.5;
-/// Share of a column's square that must hang together beyond its noise.
-const SIGNAL: f64 = 0.02;
+/// Share of a column's square that must hang together beyond its noise; blows of entry keep a fifth.
+const SIGNAL: f64 = 0.1;
 /// Distances in bins over which products are taken, from the first beyond the noise on.
 const WINDOW: usize = 8;
 
 /// True where what a sum of columns says of a target, which has the rows of the design, outlasts the noise of a bin.
 pub(super) fn outlasts_noise(design: &Design, sum: &DVector<f64>, target: &DVector<f64>) -> bool {
     let first = reach(design.noise.smoothing);
-    let (mut own, mut both, mut largest) = (0.0, 0.0, 0.0_f64);
-    for lag in first..first + WINDOW {
-        let power = common(design, sum, sum, lag);
-        own += power * power;
-        both += power * common(design, sum, target, lag);
-        largest = largest.max(power.abs());
+    let at = |lag: usize| common(design, sum, sum, lag);
+    let (near, far) = (at(first), at(2 * first));
+    // a parabola back to no lag, as for a rate
+    if near + (near - far) / 3.0 < SIGNAL * at(0) {
+        return false;
     }
-    largest > SIGNAL * common(design, sum, sum, 0) && both > LASTS * own
+    let products = (first..first + WINDOW).map(|lag| (at(lag), common(design, sum, target, lag)));
+    let (own, both) = products.fold((0.0, 0.0), |(own, both), (a, b)| (own + a * a, both + a * b));
+    both > LASTS * own
 }
 
 /// Bins beyond which noise has forgotten itself: that of a bin reaches the next one, since rates are differences, and each

@@ -21,6 +21,9 @@ const ENERGY: [f64; 2] = [4.5, 0.8];
 /// normal numbers have heavier tails than they.
 const LASTS: f64 = 7.0;
 
+/// The same for structure where nothing is named; in nulls it reaches 3.
+const SHOWS: f64 = 6.0;
+
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
 
@@ -102,7 +105,7 @@ impl Found {
         let kept = lasting(design, &design.y);
         structure.deviate > STRUCTURE && size > least
             || deviate > bar && energy > 2.0 * least.max(0.5)
-            || kept.deviate > LASTS && kept.size > least
+            || kept.deviate > SHOWS && kept.size > least
     }
 }
 
