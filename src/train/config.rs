@@ -67,9 +67,10 @@ impl Default for AnchoredConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
-    /// Those of the last epoch: the held-out cases set the pace of the learning rate but choose no weights.
+    /// Those of the last epoch: the held-out cases set the pace of the paper's learning rate but choose no weights.
     Last,
-    /// Those with the least held-out loss: the errors on the held-out cases are then those of a choice among epochs.
+    /// Those with the least loss of those that set the pace: where these are held-out ones, the errors on the held-out cases
+    /// are then those of a choice among epochs.
     Best,
 }
 
