@@ -125,7 +125,9 @@ def test_the_codes_and_limits_are_the_servers() -> None:
 
 
 def test_the_names_are_the_servers() -> None:
-    names = re.findall(r'format!\("\{\}/(.*)", self\.namespace\)', LAYOUT)
+    version = re.search(r'pub const VERSION: &str = "(.*)";', LAYOUT)
+    assert version and version.group(1) == shm_layout.VERSION
+    names = re.findall(r'format!\("\{\}/(.*)", self\.namespace\)', LAYOUT.replace("{VERSION}", shm_layout.VERSION))
     ours = (
         shm_layout.evaluate_name("", "{vehicle}"),
         shm_layout.evaluate_batch_name("", "{vehicle}"),
