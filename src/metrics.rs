@@ -21,7 +21,7 @@ const BUCKETS_S: [f64; 22] = [
     500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3,
 ];
 
-/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, or shared memory.
+/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, shared memory, or JSON over HTTP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EncodeLabelValue)]
 #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
 pub enum Transport {
@@ -33,10 +33,11 @@ pub enum Transport {
     uds_stream,
     shm,
     shm_batch,
+    http,
 }
 
 impl Transport {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::grpc_unary,
         Self::grpc_batch,
         Self::grpc_stream,
@@ -45,6 +46,7 @@ impl Transport {
         Self::uds_stream,
         Self::shm,
         Self::shm_batch,
+        Self::http,
     ];
 
     /// The value of the label.
@@ -58,6 +60,7 @@ impl Transport {
             Self::uds_stream => "uds_stream",
             Self::shm => "shm",
             Self::shm_batch => "shm_batch",
+            Self::http => "http",
         }
     }
 }

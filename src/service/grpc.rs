@@ -5,6 +5,8 @@ mod handlers;
 mod stream;
 
 pub use convert::{added_mass, single};
+pub(super) use convert::{latency, summary, vehicle};
+pub(super) use handlers::{Call, answer_state};
 
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -206,6 +208,11 @@ impl Server {
         // the crate registers the empty name as SERVING
         server.set_health(tonic_health::ServingStatus::NotServing).await;
         server
+    }
+
+    /// Counts the requests that are being answered, for doors beside gRPC.
+    pub fn requests(&self) -> &Arc<Admission> {
+        &self.requests
     }
 
     /// Says SERVING to those who ask for our health.

@@ -407,7 +407,8 @@ impl Refusal {
         }
     }
 
-    fn details(&self) -> ErrorDetails {
+    /// What a program can read of it: the field, or when to try again.
+    pub(super) fn details(&self) -> ErrorDetails {
         let message = self.to_string();
         match self {
             Self::UnknownVehicle(unknown) => {

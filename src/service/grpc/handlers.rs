@@ -101,7 +101,7 @@ impl Hydrodynamics for Handlers {
                 );
                 Ok(Response::new(answers))
             }
-            Err(refusal) => Err(call.refuse(refusal)),
+            Err(refusal) => Err(call.refuse(refusal).into()),
         }
     }
 
@@ -167,13 +167,13 @@ impl Handlers {
 
 /// What the metrics need to know of an answer.
 #[derive(Debug)]
-pub(super) struct Answered {
+pub(in crate::service) struct Answered {
     vehicle: Arc<ServedVehicle>,
     out_of_domain: u64,
 }
 
 /// Answers one state on the thread that read it.
-pub(super) fn answer_state(
+pub(in crate::service) fn answer_state(
     vehicle: &Arc<ServedVehicle>,
     state: Option<&proto::State>,
     session: Option<&mut Session>,
@@ -188,7 +188,7 @@ pub(super) fn answer_state(
 }
 
 /// One request from its arrival to its answer: deadline, metrics and, where asked for, a line in the log.
-pub(super) struct Call<'s> {
+pub(in crate::service) struct Call<'s> {
     shared: &'s Shared,
     transport: Transport,
     arrived: Instant,
@@ -203,12 +203,20 @@ impl<'s> Call<'s> {
         Self { shared, transport, arrived, deadline }
     }
 
-    /// A request within a stream, whose deadline is the stream's.
-    pub(super) fn in_stream(shared: &'s Shared, transport: Transport, deadline: Option<Instant>) -> Self {
+    /// A request that arrives now.
+    pub(in crate::service) fn arriving(
+        shared: &'s Shared,
+        transport: Transport,
+        deadline: Option<Instant>,
+    ) -> Self {
         Self { shared, transport, arrived: Instant::now(), deadline }
     }
 
-    fn admit(&self, requests: &Arc<Admission>) -> Result<crate::engine::Permit, Refusal> {
+    /// A place among the requests that are being answered, over whichever transport they came.
+    pub(in crate::service) fn admit(
+        &self,
+        requests: &Arc<Admission>,
+    ) -> Result<crate::engine::Permit, Refusal> {
         requests.admit().map_err(|overloaded| Refusal::Overloaded { what: "requests", overloaded })
     }
 
@@ -219,25 +227,29 @@ impl<'s> Call<'s> {
         }
     }
 
-    /// Records the outcome.
     pub(super) fn end<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<Response<T>, Status> {
+        Ok(Response::new(self.record(outcome)?))
+    }
+
+    /// Records the outcome.
+    pub(in crate::service) fn record<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<T, Refusal> {
         match outcome {
             Ok((response, answered)) => {
                 let vehicle = &answered.vehicle.model().vehicle().name;
                 let elapsed = self.arrived.elapsed();
                 self.shared.metrics.recorder(self.transport, vehicle).record(elapsed, answered.out_of_domain);
                 tracing::debug!(target: "wade::request", transport = self.transport.name(), vehicle, ?elapsed);
-                Ok(Response::new(response))
+                Ok(response)
             }
             Err(refusal) => Err(self.refuse(refusal)),
         }
     }
 
-    fn refuse(self, refusal: Refusal) -> Status {
+    fn refuse(self, refusal: Refusal) -> Refusal {
         self.shared.metrics.refuse(self.transport, refusal.reason());
         let elapsed_ns = nanoseconds_since(self.arrived);
         tracing::debug!(target: "wade::request", transport = self.transport.name(), %refusal, elapsed_ns);
-        refusal.into()
+        refusal
     }
 }
 
