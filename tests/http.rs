@@ -167,7 +167,10 @@ fn bad_queries_are_refused_by_field_and_the_next_good_one_is_answered() {
         (r#"{"vehicle": "husky", "state": {"depth_m": "NaN"}}"#, invalid("state.depth_m")),
         (r#"{"vehicle": "husky", "state": {"depth_m": -0.1}}"#, invalid("state.depth_m")),
         (r#"{"vehicle": "husky", "state": {"velocity_mps": [1, 2, 3]}}"#, invalid("state.velocity_mps")),
-        (r#"{"vehicle": "husky", "state": {"velocity_mps": {"x": "Infinity"}}}"#, invalid("state.velocity_mps")),
+        (
+            r#"{"vehicle": "husky", "state": {"velocity_mps": {"x": "Infinity"}}}"#,
+            invalid("state.velocity_mps"),
+        ),
         (r#"{"vehicle": "husky", "state": {"wheel_speed_radps": [1]}}"#, invalid("state.wheel_speed_radps")),
         (r#"{"vehicle": "husky", "state": {"ground_contact": "WET"}}"#, invalid("state.ground_contact")),
         (r#"{"vehicle": "tank", "state": {}}"#, (404, "NOT_FOUND".into(), String::new())),
@@ -179,9 +182,9 @@ fn bad_queries_are_refused_by_field_and_the_next_good_one_is_answered() {
     let parameters = [
         ("vehicle=husky&depth_m=0.1", invalid("depth_m")),
         ("vehicle=husky&state=1", invalid("state")),
-        ("vehicle=husky&state.velocity_mps=1", invalid("velocity_mps")),
-        ("vehicle=husky&state.depth_m.x=1", invalid("depth_m.x")),
-        ("vehicle=husky&state.depth_m=1&state.depth_m=2", invalid("depth_m")),
+        ("vehicle=husky&state.velocity_mps=1", invalid("state.velocity_mps")),
+        ("vehicle=husky&state.depth_m.x=1", invalid("state.depth_m.x")),
+        ("vehicle=husky&state.depth_m=1&state.depth_m=2", invalid("state.depth_m")),
         ("vehicle=husky&state.depth_m=deep", invalid("state.depth_m")),
         ("vehicle=husky&vehicle=warthog", invalid("vehicle")),
         ("", (404, "NOT_FOUND".into(), String::new())),
@@ -210,7 +213,9 @@ fn json_is_refused_while_grpc_takes_every_place() {
     });
     let address = address(&served);
     let mut client = served.tcp("husky", Method::Unary);
-    let long = std::thread::spawn(move || client.evaluate_batch(&vec![State { depth: 0.1, ..State::default() }; 1 << 14]));
+    let long = std::thread::spawn(move || {
+        client.evaluate_batch(&vec![State { depth: 0.1, ..State::default() }; 1 << 14])
+    });
     let start = Instant::now();
     let refused = loop {
         let answer = post(address, "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
@@ -231,7 +236,12 @@ fn a_hull_has_the_areas_that_the_vehicle_states_and_is_sent_once() {
         let answer = get(address(&served), &format!("/v1/vehicles/{vehicle}/hull"));
         let hull = answer.json();
         let numbers = |key: &str| -> Vec<f64> {
-            hull[key].as_array().expect("an array").iter().map(|value| value.as_f64().expect("a number")).collect()
+            hull[key]
+                .as_array()
+                .expect("an array")
+                .iter()
+                .map(|value| value.as_f64().expect("a number"))
+                .collect()
         };
         let (vertices, triangles, surface) =
             (numbers("vertices_m"), numbers("triangles"), numbers("triangle_surface"));
@@ -276,12 +286,21 @@ fn only_those_who_call_the_server_by_a_known_name_and_from_its_own_page_are_answ
     let served = Served::with(|config| config.http.hosts = vec!["rig.lab".into()]);
     let address = address(&served);
     let port = address.port();
-    let ask = |path: &str, headers: &[(&str, &str)]| send(address, &format!("GET {path}"), headers, "").status;
-    for host in ["127.0.0.1", "[::1]:80", "localhost", &format!("LOCALHOST:{port}"), "rig.lab:1", "10.1.2.3"] {
+    let ask =
+        |path: &str, headers: &[(&str, &str)]| send(address, &format!("GET {path}"), headers, "").status;
+    for host in ["127.0.0.1", "[::1]:80", "localhost", &format!("LOCALHOST:{port}"), "rig.lab:1", "10.1.2.3"]
+    {
         assert_eq!(ask("/", &[("Host", host)]), 200, "{host}");
         assert_eq!(ask("/v1/vehicles", &[("Host", host)]), 200, "{host}");
     }
-    for host in ["evil.example", "127.0.0.1.evil.example", "localhost.evil.example", "rig.lab@evil.example", "", "a b"] {
+    for host in [
+        "evil.example",
+        "127.0.0.1.evil.example",
+        "localhost.evil.example",
+        "rig.lab@evil.example",
+        "",
+        "a b",
+    ] {
         assert_eq!(ask("/", &[("Host", host)]), 403, "{host:?}");
         assert_eq!(ask("/v1/vehicles/husky/hull", &[("Host", host)]), 403, "{host:?}");
         assert_eq!(ask("/readyz", &[("Host", host)]), 200, "probes come by any name: {host:?}");
@@ -313,7 +332,10 @@ fn the_page_needs_nothing_from_elsewhere() {
     let served = Served::start();
     let page = get(address(&served), "/");
     let policy = page.header("content-security-policy").expect("a policy");
-    assert!(policy.contains("default-src 'none'") && !policy.contains("unsafe") && !policy.contains('*'), "{policy}");
+    assert!(
+        policy.contains("default-src 'none'") && !policy.contains("unsafe") && !policy.contains('*'),
+        "{policy}"
+    );
     assert!(page.header("access-control-allow-origin").is_none());
     let mut queue: Vec<String> = quoted(&page.body).filter(|path| path.starts_with("/page/")).collect();
     assert!(!page.body.contains("://"), "an address of another host");

@@ -33,17 +33,26 @@ pub struct Names {
     unary: Transport,
     batch: Transport,
     stream: Transport,
+    pub(super) infer: Transport,
 }
 
 /// The TCP listener's.
-pub(super) const TCP: Names =
-    Names { unary: Transport::grpc_unary, batch: Transport::grpc_batch, stream: Transport::grpc_stream };
+pub(super) const TCP: Names = Names {
+    unary: Transport::grpc_unary,
+    batch: Transport::grpc_batch,
+    stream: Transport::grpc_stream,
+    infer: Transport::grpc_infer,
+};
 /// The Unix socket's.
-pub(super) const UNIX: Names =
-    Names { unary: Transport::uds_unary, batch: Transport::uds_batch, stream: Transport::uds_stream };
+pub(super) const UNIX: Names = Names {
+    unary: Transport::uds_unary,
+    batch: Transport::uds_batch,
+    stream: Transport::uds_stream,
+    infer: Transport::uds_infer,
+};
 
 /// The handlers of `wade.v1.Hydrodynamics`.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Handlers {
     pub(super) shared: Shared,
     pub(super) names: Names,
@@ -138,7 +147,16 @@ impl Handlers {
         call: &Call<'_>,
         request: &proto::EvaluateBatchRequest,
     ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
-        let vehicle = self.shared.engine.vehicle(&request.vehicle)?;
+        self.batch_of(call, self.shared.engine.vehicle(&request.vehicle)?, request).await
+    }
+
+    /// Answers a batch for this version of its vehicle.
+    pub(super) async fn batch_of(
+        &self,
+        call: &Call<'_>,
+        vehicle: Arc<ServedVehicle>,
+        request: &proto::EvaluateBatchRequest,
+    ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
         let states = convert::batch(request, self.max_batch)?;
         let with_surfaces = !request.omit_surfaces;
         let mut response = convert::batch_response(&vehicle, states.len(), with_surfaces);
@@ -196,7 +214,7 @@ pub(in crate::service) struct Call<'s> {
 }
 
 impl<'s> Call<'s> {
-    fn begin<T>(shared: &'s Shared, transport: Transport, request: &Request<T>) -> Self {
+    pub(super) fn begin<T>(shared: &'s Shared, transport: Transport, request: &Request<T>) -> Self {
         let arrived = Instant::now();
         let timeout = request.metadata().get("grpc-timeout").and_then(|header| header.to_str().ok());
         let deadline = timeout.and_then(convert::timeout).and_then(|timeout| arrived.checked_add(timeout));
@@ -253,6 +271,15 @@ impl<'s> Call<'s> {
     }
 }
 
+/// Work with bundles on disk, which takes milliseconds and must not stand before a query.
+pub(super) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Status> {
+    tokio::task::spawn_blocking(work)
+        .await
+        .map_err(|_| Status::internal("the work on the bundles was interrupted"))
+}
+
 /// The handlers of `wade.v1.Admin`.
 #[derive(Debug)]
 pub struct AdminHandlers {
@@ -267,9 +294,7 @@ impl Admin for AdminHandlers {
     ) -> Result<Response<proto::ReloadResponse>, Status> {
         let vehicle = request.into_inner().vehicle;
         let reloader = Arc::clone(&self.reloader);
-        // reading and checking a bundle takes milliseconds, which must not stand before a query
-        let reloaded = tokio::task::spawn_blocking(move || reloader.reload(&vehicle));
-        let reloaded = reloaded.await.map_err(|_| Status::internal("the reload was interrupted"))?;
+        let reloaded = blocking(move || reloader.reload(&vehicle)).await?;
         let vehicles = reloaded.map_err(Refusal::from)?.into_iter().map(|reload| proto::Reloaded {
             vehicle: reload.vehicle,
             bundle_version: reload.served_version,

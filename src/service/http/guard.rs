@@ -77,7 +77,7 @@ fn is_known(host: &str, hosts: &[String]) -> bool {
 
 /// Browsers say where a request comes from; older ones at least name the origin. Other programs say neither.
 fn same_site(headers: &HeaderMap) -> Result<(), Rejection> {
-    let text = |name| headers.get(name).map(|value: &HeaderValue| value.to_str().unwrap_or("?"));
+    let text = |name: HeaderName| headers.get(name).map(|value: &HeaderValue| value.to_str().unwrap_or("?"));
     let host = text(header::HOST).unwrap_or_default();
     let ours = match (text(HeaderName::from_static("sec-fetch-site")), text(header::ORIGIN)) {
         (Some(site), _) => matches!(site, "same-origin" | "none"),

@@ -77,7 +77,8 @@ pub fn write(name: &str, message: &impl prost::Message) -> Response {
 pub fn from_parameters(name: &str, parameters: &str) -> Result<Vec<u8>, Rejection> {
     let mut root = Map::new();
     for (path, value) in form_urlencoded::parse(parameters.as_bytes()) {
-        insert(&mut root, descriptor(name), &path, &value)?;
+        insert(&mut root, descriptor(name), &path, &value)
+            .map_err(|reason| Rejection::Malformed { field: path.into_owned(), reason })?;
     }
     Ok(Value::Object(root).to_string().into_bytes())
 }
@@ -87,23 +88,21 @@ fn insert(
     message: MessageDescriptor,
     path: &str,
     value: &str,
-) -> Result<(), Rejection> {
+) -> Result<(), String> {
     let (first, rest) = path.split_once('.').map_or((path, None), |(first, rest)| (first, Some(rest)));
-    let refuse = |reason: String| Rejection::Malformed { field: path.to_owned(), reason };
-    let unknown =
-        || refuse(format!("unrecognized field name '{first}'; the fields are {}", field_names(&message)));
+    let unknown = || format!("unrecognized field name '{first}'; the fields are {}", field_names(&message));
     let field = field(&message, first).ok_or_else(unknown)?;
     match (field.kind(), rest) {
         (Kind::Message(inner), Some(rest)) if !field.is_list() => {
             let entry = object.entry(first).or_insert_with(|| Value::Object(Map::new()));
-            let Value::Object(entry) = entry else { return Err(unknown()) };
-            insert(entry, inner, rest, value)
+            match entry {
+                Value::Object(entry) => insert(entry, inner, rest, value),
+                _ => Err(format!("{first} is a message")),
+            }
         }
-        (Kind::Message(inner), _) => {
-            Err(refuse(format!("name one of its fields: {first}.{}", field_names(&inner))))
-        }
-        (_, Some(_)) => Err(refuse(format!("{first} has no fields"))),
-        (kind, None) => put(object, &field, scalar(&kind, value), first).map_err(refuse),
+        (Kind::Message(inner), _) => Err(format!("name one of its fields: {}", field_names(&inner))),
+        (_, Some(_)) => Err(format!("{first} has no fields")),
+        (kind, None) => put(object, &field, scalar(&kind, value), first),
     }
 }
 

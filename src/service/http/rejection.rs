@@ -1,6 +1,5 @@
 //! Why a request over HTTP got no answer, as status and JSON.
 
-use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
@@ -15,7 +14,7 @@ pub enum Rejection {
     #[error(transparent)]
     Refused(#[from] Refusal),
     /// Not JSON, or not the message it should be.
-    #[error("{}{reason}", if .field.is_empty() { String::new() } else { format!("{field}: ") })]
+    #[error("{}{reason}", prefix(.field))]
     Malformed {
         /// Where, empty for the whole body.
         field: String,
@@ -56,6 +55,10 @@ pub enum Rejection {
         "there is /, /v1/query, /v1/vehicles, /v1/vehicles/NAME, /v1/vehicles/NAME/hull, /v1/latency, /metrics, /livez and /readyz"
     )]
     NoSuchPath,
+}
+
+fn prefix(field: &str) -> String {
+    if field.is_empty() { String::new() } else { format!("{field}: ") }
 }
 
 impl Rejection {
@@ -108,7 +111,9 @@ impl IntoResponse for Rejection {
             "message": self.to_string(),
             "field_violations": self.violations(),
         });
-        let mut response = (status, Json(json!({"error": error}))).into_response();
+        let mut response =
+            (status, [(header::CONTENT_TYPE, "application/json")], json!({"error": error}).to_string())
+                .into_response();
         if matches!(status, StatusCode::TOO_MANY_REQUESTS | StatusCode::SERVICE_UNAVAILABLE) {
             // whole seconds are all that the header can say
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));

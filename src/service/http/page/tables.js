@@ -9,7 +9,8 @@ const UNITS = {
 const TRANSPORTS = {
   grpc_unary: "gRPC, TCP", grpc_batch: "gRPC batch, TCP", grpc_stream: "gRPC stream, TCP", uds_unary: "gRPC, Unix socket",
   uds_batch: "gRPC batch, Unix socket", uds_stream: "gRPC stream, Unix socket", shm: "shared memory",
-  shm_batch: "shared memory batch", http: "this page (JSON)",
+  shm_batch: "shared memory batch", http: "this page (JSON)", grpc_infer: "inference protocol, TCP",
+  uds_infer: "inference protocol, Unix socket",
 };
 
 const element = (id) => document.getElementById(id);
