@@ -131,9 +131,12 @@ fn the_picture_shows_the_hull_and_follows_the_state() {
     assert!(colors.len() > 300, "a blank picture has few colors: {}", colors.len());
     // dry surfaces are a bluish gray, arrows red, also where they shine through the hull
     let share = |value: u8, of: u8| f64::from(value) / f64::from(of.max(1));
-    let is_gray = |[r, g, b]: [u8; 3]| b < 190 && (share(r, b) - 0.933).abs() < 0.06 && (share(g, b) - 0.96).abs() < 0.06;
+    let is_gray = |[r, g, b]: [u8; 3]| {
+        b < 190 && (share(r, b) - 0.933).abs() < 0.06 && (share(g, b) - 0.96).abs() < 0.06
+    };
     let is_red = |[r, g, b]: [u8; 3]| r > 60 && share(r, g) > 1.7 && share(r, b) > 1.7;
-    let count = |pixels: &[[u8; 3]], is: &dyn Fn([u8; 3]) -> bool| pixels.iter().filter(|pixel| is(**pixel)).count();
+    let count =
+        |pixels: &[[u8; 3]], is: &dyn Fn([u8; 3]) -> bool| pixels.iter().filter(|pixel| is(**pixel)).count();
     assert!(count(&pixels, &is_gray) > 2000 && count(&pixels, &is_red) > 150, "surfaces and arrows");
     let Some(dry) = picture(&format!("{base}&depth=0"), "husky-dry-1440.png", 1440, 900) else { return };
     let dry = middle(&dry, [0.1, 0.55], [0.2, 0.6]);

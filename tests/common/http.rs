@@ -1,4 +1,5 @@
 //! Plain HTTP, so that a test can send what no client library would.
+#![allow(dead_code, reason = "every test file uses a part")]
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};

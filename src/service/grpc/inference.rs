@@ -73,7 +73,8 @@ impl GrpcInferenceService for InferenceHandlers {
         request: Request<ModelMetadataRequest>,
     ) -> Result<Response<ModelMetadataResponse>, Status> {
         let ModelMetadataRequest { name, version } = request.get_ref();
-        Ok(Response::new(metadata(&self.model(name, version)?)))
+        let vehicle = self.model(name, version)?;
+        Ok(Response::new(metadata(&vehicle)))
     }
 
     async fn model_infer(
