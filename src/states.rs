@@ -7,9 +7,9 @@ use crate::service::grpc::single;
 use crate::service::wire::State;
 
 /// Columns that describe a state.
-const STATE: [&str; 22] = [
-    "t", "vx", "vy", "vz", "wx", "wy", "wz", "roll", "pitch", "yaw", "depth", "ax", "ay", "az", "alx", "aly",
-    "alz", "rho", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr",
+const STATE: [&str; 25] = [
+    "t", "vx", "vy", "vz", "cx", "cy", "cz", "wx", "wy", "wz", "roll", "pitch", "yaw", "depth", "ax", "ay",
+    "az", "alx", "aly", "alz", "rho", "wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr",
 ];
 /// Columns of a trial that say nothing about the state.
 const NOT_STATE: [&str; 12] =
@@ -30,6 +30,9 @@ pub struct Row {
     vy: f64,
     vz: f64,
     depth: f64,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    cz: Option<f64>,
     wx: Option<f64>,
     wy: Option<f64>,
     wz: Option<f64>,
@@ -84,6 +87,7 @@ impl Row {
         let level = State::default();
         State {
             velocity: [self.vx, self.vy, self.vz].map(|value| value as f32),
+            current: [self.cx, self.cy, self.cz].map(or_zero),
             angular_velocity: [self.wx, self.wy, self.wz].map(or_zero),
             acceleration: [self.ax, self.ay, self.az].map(or_zero),
             angular_acceleration: [self.alx, self.aly, self.alz].map(or_zero),

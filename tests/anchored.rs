@@ -68,7 +68,7 @@ impl Lesson {
 
 fn short() -> Config {
     let mut config = Config { epochs: 12, ..Config::anchored() };
-    config.anchored.folds = 2;
+    config.anchored.between = 2;
     config
 }
 
@@ -265,9 +265,12 @@ fn loads_above_still_water_are_carried_by_wet_surfaces() {
     }
     let states = Known::states(&source.data, &lesson.split.training, &lesson.vehicles());
     for (state, before) in states.iter().zip(lesson.states(&lesson.split.training)) {
-        let count = state.loads.len() as f64;
+        let carried = state.carried();
+        let count = carried.len() as f64;
+        let sum: Vec3 = carried.iter().map(|load| load.0).sum();
+        assert!((sum - state.dynamic()).norm() < 1e-9 * count);
         assert!((state.dynamic() - before.dynamic() - push * count).norm() < 1e-9 * count);
-        for ((force, _), surface) in state.loads.iter().zip(&state.reading.surfaces) {
+        for ((force, _), surface) in carried.iter().zip(&state.reading.surfaces) {
             assert!(surface.wet_fraction > 0.0 || *force == Vec3::zeros());
         }
     }

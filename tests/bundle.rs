@@ -127,7 +127,7 @@ fn faults_behind_a_good_checksum_are_named() {
         ("vehicle.toml", Box::new(text(|t| t.replacen("mass_kg = 50.0", "mass_kg = nan", 1))), "mass"),
         (
             "vehicle.toml",
-            Box::new(text(|t| t.replacen("provenance = \"analytic\"", "provenance = \"cfd\"", 1))),
+            Box::new(text(|t| t.replacen("provenance = \"", "provenance = \"another ", 1))),
             "provenance",
         ),
         ("vehicle.toml", Box::new(text(|t| format!("colour = \"red\"\n{t}"))), "colour"),

@@ -4,14 +4,9 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Numbers, Served, VEHICLES, served_vehicle};
+use common::{Numbers, Served, VEHICLES, comparable, served_vehicle};
 use wade::client::{InProcess, Reply};
 use wade::service::wire::State;
-
-/// What a server computes does not depend on how long it took.
-fn timeless(reply: Reply) -> Reply {
-    Reply { compute_ns: 0, ..reply }
-}
 
 fn states(count: usize) -> Vec<State> {
     let mut numbers = Numbers::new(42);
@@ -25,9 +20,9 @@ fn every_transport_answers_the_same_bits() {
         let mut library = InProcess::new(Arc::new(served_vehicle(vehicle)));
         let mut clients = served.clients(vehicle);
         for state in states(100) {
-            let expected = timeless(library.evaluate(&state).expect("valid"));
+            let expected = comparable(library.evaluate(&state).expect("valid"));
             for (name, client) in &mut clients {
-                let reply = timeless(client.evaluate(&state).expect("answered"));
+                let reply = comparable(client.evaluate(&state).expect("answered"));
                 assert_eq!(reply, expected, "{vehicle} over {name}: {state:?}");
             }
         }
@@ -43,10 +38,10 @@ fn a_batch_answers_the_bits_of_its_states_alone() {
         let states: Vec<State> =
             states(150).into_iter().map(|state| State { dry_contact: false, ..state }).collect();
         let expected: Vec<Reply> =
-            states.iter().map(|state| timeless(library.evaluate(state).expect("valid"))).collect();
+            states.iter().map(|state| comparable(library.evaluate(state).expect("valid"))).collect();
         for (name, mut client) in served.clients(vehicle) {
             let replies = client.evaluate_batch(&states).expect("answered");
-            let replies: Vec<Reply> = replies.into_iter().map(timeless).collect();
+            let replies: Vec<Reply> = replies.into_iter().map(comparable).collect();
             assert_eq!(replies, expected, "{vehicle} over {name}");
         }
     }

@@ -473,3 +473,22 @@ fn two_data_sets_become_one_or_say_why_not() {
     other.meta.vehicles.insert("husky".into(), vec!["hull".into()]);
     assert!(matches!(merged.merge(other), Err(MergeError::Surfaces { .. })));
 }
+
+#[test]
+fn sets_of_cases_are_taken_alone() {
+    let mut both = data(3);
+    let cases: BTreeSet<String> = both.samples.iter().take(4).map(|s| s.case.clone()).collect();
+    for sample in both.samples.iter_mut().filter(|s| cases.contains(&s.case)) {
+        sample.set = "wide".into();
+    }
+    let (all, mut wide) = (both.samples.len(), both.clone());
+    wide.keep_sets(&["wide".into()]).unwrap();
+    assert_eq!(wide.samples.iter().map(|s| s.case.clone()).collect::<BTreeSet<_>>(), cases);
+    let other = both.samples.iter().find(|s| s.set != "wide").unwrap().set.clone();
+    let before = both.clone();
+    let error = both.keep_sets(&["wide".into(), "tidal".into()]).unwrap_err().to_string();
+    assert!(error.contains("`tidal`") && error.contains("wide") && error.contains(&other), "{error}");
+    assert_eq!(both, before, "nothing is lost");
+    both.keep_sets(&[other, "wide".into()]).unwrap();
+    assert_eq!(both.samples.len(), all);
+}

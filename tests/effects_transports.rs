@@ -7,7 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use common::{
-    Numbers, Served, VEHICLES, copy_of_vehicles, copy_with_every_effect, every_effect, served_with,
+    Numbers, Served, VEHICLES, comparable, copy_of_vehicles, copy_with_every_effect, every_effect,
+    served_with,
 };
 use wade::bundle;
 use wade::client::{Client, InProcess, Method, Reply};
@@ -15,10 +16,6 @@ use wade::effects::{Effect, LeftOut};
 use wade::model::kernel::Isa;
 use wade::service::shm::Wait;
 use wade::service::wire::State;
-
-fn timeless(reply: Reply) -> Reply {
-    Reply { compute_ns: 0, ..reply }
-}
 
 fn states(count: usize) -> Vec<State> {
     let mut numbers = Numbers::new(7);
@@ -56,10 +53,10 @@ fn every_transport_answers_the_same_bits_with_every_effect() {
         let mut clients: Vec<(&str, Client)> = clients.collect();
         for state in states(50) {
             for state in [state, State { implicit_added_mass: true, wheel_speeds: None, ..state }] {
-                let expected = timeless(library.evaluate(&state).expect("valid"));
+                let expected = comparable(library.evaluate(&state).expect("valid"));
                 assert!(expected.effects.len() == 14 && expected.added_mass.is_some());
                 for (name, client) in &mut clients {
-                    let reply = timeless(client.evaluate(&state).expect("answered"));
+                    let reply = comparable(client.evaluate(&state).expect("answered"));
                     assert_eq!(reply, expected, "{vehicle} over {name}: {state:?}");
                 }
             }
@@ -75,10 +72,10 @@ fn a_batch_with_every_effect_answers_the_bits_of_its_states_alone() {
     let states: Vec<State> =
         states(70).into_iter().map(|state| State { dry_contact: false, ..state }).collect();
     let expected: Vec<Reply> =
-        states.iter().map(|state| timeless(library.evaluate(state).expect("valid"))).collect();
+        states.iter().map(|state| comparable(library.evaluate(state).expect("valid"))).collect();
     for (name, mut client) in served.clients("husky") {
         let replies = client.evaluate_batch(&states).expect("answered");
-        let replies: Vec<Reply> = replies.into_iter().map(timeless).collect();
+        let replies: Vec<Reply> = replies.into_iter().map(comparable).collect();
         assert_eq!(replies, expected, "over {name}");
     }
 }
@@ -102,8 +99,8 @@ fn a_session_is_the_same_over_every_transport_that_has_one_and_each_has_its_own(
         for (first, second) in run(0.0).into_iter().zip(run(1.5)) {
             let mut replies = Vec::new();
             for ((client, alone), state) in clients.iter_mut().zip(&mut alone).zip([first, second]) {
-                let reply = timeless(client.evaluate(&state).expect("answered"));
-                assert_eq!(reply, timeless(alone.evaluate(&state).expect("valid")), "{name}");
+                let reply = comparable(client.evaluate(&state).expect("answered"));
+                assert_eq!(reply, comparable(alone.evaluate(&state).expect("valid")), "{name}");
                 assert!(reply.effects.iter().all(|load| load.left_out != Some(LeftOut::NoSession)));
                 replies.push(reply);
             }
@@ -126,7 +123,7 @@ fn a_batch_over_shared_memory_steps_many_runs_at_once() {
     // the states of one session within a batch follow each other
     let replies = client.evaluate_batch(&states).expect("answered");
     for (answer, state) in replies.iter().zip(&states) {
-        assert_eq!(timeless(Reply::from(answer)), timeless(alone.evaluate(state).expect("valid")));
+        assert_eq!(comparable(Reply::from(answer)), comparable(alone.evaluate(state).expect("valid")));
     }
 }
 
@@ -209,8 +206,8 @@ fn a_vehicle_with_effects_answers_as_the_library_does() {
     let mut from_disk = from(folder.path(), "warthog");
     let mut in_memory = InProcess::new(Arc::new(served_with("warthog", every_effect("warthog"))));
     for state in states(20) {
-        let disk = timeless(from_disk.evaluate(&state).expect("valid"));
-        let memory = timeless(in_memory.evaluate(&state).expect("valid"));
+        let disk = comparable(from_disk.evaluate(&state).expect("valid"));
+        let memory = comparable(in_memory.evaluate(&state).expect("valid"));
         assert_eq!(disk.effects, memory.effects);
         assert_eq!(disk.force, memory.force);
     }

@@ -79,7 +79,7 @@ fn a_vehicle_that_is_added_is_served_over_every_transport() {
     std::fs::rename(&warthog, aside.path().join("warthog")).expect("moved");
     let served = Served::with(|config| config.vehicles = folder.path().to_owned());
     let mut shm = served.shm("warthog", Wait::Block);
-    assert!(matches!(shm.evaluate(&state()), Err(ClientError::NoServer { .. })));
+    assert!(matches!(shm.evaluate(&state()), Err(ClientError::UnknownVehicle { .. })));
     std::fs::rename(aside.path().join("warthog"), &warthog).expect("moved back");
     served.running.reloader().reload("").expect("reloaded");
     served.tcp("warthog", Method::Unary).evaluate(&state()).expect("served over gRPC");

@@ -136,7 +136,7 @@ fn a_client_without_a_server_gets_an_error_of_its_own() {
 fn a_vehicle_that_is_not_served_is_an_error() {
     let served = Served::start();
     let error = served.shm("nautilus", Wait::Block).evaluate(&state()).expect_err("not served");
-    assert!(matches!(error, ClientError::NoServer { .. }), "{error:?}");
+    assert!(matches!(error, ClientError::UnknownVehicle { .. }), "{error:?}");
 }
 
 /// A client that writes what it likes, by the layout alone.

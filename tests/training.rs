@@ -250,6 +250,11 @@ fn refuses_what_it_cannot_train() {
     let error = Source::new(renamed, &vehicles(), false).unwrap_err().to_string();
     assert!(error.contains("vehicle `husky`") && error.contains("`bonnet` is in one of them"), "{error}");
 
+    let mut surging = analytic(4);
+    surging.samples[5].condition.acceleration = Vec3::new(0.3, 0.0, 0.4);
+    let case = surging.samples[5].case.clone();
+    let error = Source::new(surging, &vehicles(), false).unwrap_err().to_string();
+    assert!(error.contains(&format!("case `{case}` accelerates by 0.50 m/s2")), "{error}");
     let source = source();
     let mut sides = by_case(&source);
     let train = |split: &Split, config: &Config| {
@@ -259,6 +264,15 @@ fn refuses_what_it_cannot_train() {
     assert!(matches!(train(&sides, &hot), TrainError::Diverged { .. }));
     let idle = train(&sides, &Config { batch: 0, ..short() });
     assert_eq!(idle.to_string(), "`batch` is 0, which is not positive");
+    let mut beds = source.clone();
+    let parked = beds.data.samples.iter().position(|s| s.vehicle == "warthog").unwrap();
+    beds.data.samples[parked].condition.ground_velocity = Vec3::zeros();
+    let told = Sides { split: &sides, by: BY };
+    let error = train::train(&beds, told, Variant::Paper, &short(), None, &|_| ()).unwrap_err();
+    let case = &source.data.samples[parked].case;
+    assert!(
+        matches!(error, TrainError::Beds { vehicle, resting, .. } if vehicle == "warthog" && resting == *case)
+    );
     sides.training.clear();
     assert_eq!(train(&sides, &short()).to_string(), "the training side of the split is empty");
 
@@ -336,7 +350,12 @@ fn a_parquet_file_ends_in_bundles_that_say_where_they_come_from() {
         assert_eq!(weights.provenance, format!("analytic, data sha256 {sha256}"));
         assert_eq!(wade::train::report::fingerprint(&weights.network), record.weights_sha256);
     }
-    assert_eq!(bundle::read(&vehicles.path().join("husky")).unwrap().version, before.version + 1);
+    let husky = vehicles.path().join("husky");
+    assert_eq!(bundle::read(&husky).unwrap().version, before.version + 1);
+    // what was served before is not lost
+    assert_eq!(bundle::kept(&husky).unwrap().len(), 1);
+    assert_eq!(bundle::roll_back(&husky, None).unwrap(), before.version);
+    assert_eq!(bundle::read(&husky).unwrap().trained, before.trained);
 }
 
 #[test]

@@ -391,7 +391,7 @@ fn the_whole_way_from_a_seed_to_a_report_and_again_from_its_files() {
         assert!(!first[key].is_null(), "{key}");
     }
     assert_eq!(first["paper_label"], "paper: other data");
-    assert_eq!(first["subject"]["weights"], "analytic");
+    assert_eq!(first["subject"]["weights"], common::model("warthog").provenance());
     assert_eq!((&first["data"]["trials"], &first["data"]["source"]), (&71.into(), &"generated".into()));
     assert!(first["data"]["generated"].as_str().expect("text").starts_with("generated"));
     let depth = &first["drag_scaling"]["depths"][0];

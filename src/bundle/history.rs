@@ -1,4 +1,4 @@
-//! Versions of a bundle that effects were added to or taken from: kept beside it in `<name>.versions/<version>/<name>`.
+//! Versions of a bundle: what new weights or effects replace is kept beside it in `<name>.versions/<version>/<name>`.
 //!
 //! A version that leaves its place is moved there, so that each can be put back, one after the other. What was put back keeps
 //! its number; the next version that is made gets a number that none had before.
@@ -7,8 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Bundle, BundleError, FILES, Fault, VEHICLE_FILE, VehicleFile, at, checksums, exchange, read,
-    read_bounded, stage, staging_of, tensors,
+    Bundle, BundleError, FILES, Fault, NETWORK_FILE, VEHICLE_FILE, VehicleFile, at, checksums, exchange,
+    read, read_bounded, stage, staging_of, tensors, write,
 };
 use crate::effects::EffectsFile;
 
@@ -17,6 +17,8 @@ use crate::effects::EffectsFile;
 pub struct Kept {
     /// Its number.
     pub version: u32,
+    /// Name of the form of its weights, and where they were learnt from.
+    pub weights: Option<(&'static str, String)>,
     /// Names of the effects that it has switched on.
     pub effects: Vec<&'static str>,
 }
@@ -46,24 +48,35 @@ fn numbers(directory: &Path) -> Result<Vec<u32>, BundleError> {
 /// The versions that were kept of the bundle in a folder, rising.
 pub fn kept(directory: &Path) -> Result<Vec<Kept>, BundleError> {
     let one = |version: u32| {
-        let effects = read(&place_of(directory, version))?.effects;
+        let Bundle { effects, trained, .. } = read(&place_of(directory, version))?;
         let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.name.name()).collect();
-        Ok(Kept { version, effects: effects.map(names).unwrap_or_default() })
+        let weights = trained.map(|(weights, _)| (weights.form.name(), weights.provenance));
+        Ok(Kept { version, weights, effects: effects.map(names).unwrap_or_default() })
     };
     numbers(directory)?.into_iter().map(one).collect()
 }
 
 /// Puts effects in the place of those of a bundle, as its next version, and keeps the version before. Gives the new version.
-///
-/// The bundle changes in one step of the file system at the end; an error before it leaves everything as it was.
 pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleError> {
     let bundle = read(directory)?;
     let Some((weights, _)) = &bundle.trained else { return Err(at(directory)(Fault::NoWeights)) };
     effects.evidence.weights_sha256 = checksums::hexadecimal(&tensors::write_weights(weights));
-    let before = bundle.version;
+    succeed(directory, Bundle { effects: Some(effects), ..bundle })
+}
+
+/// Puts a bundle in the place of the one that is there, as its next version, and keeps the latter if it could be served.
+/// Gives the new version.
+///
+/// The bundle changes in one step of the file system at the end; an error before it leaves everything as it was.
+pub fn succeed(directory: &Path, bundle: Bundle) -> Result<u32, BundleError> {
+    let before = version_in(directory)?;
     let version = numbers(directory)?.last().copied().unwrap_or(0).max(before) + 1;
-    let staged = stage(directory, &Bundle { version, effects: Some(effects), ..bundle })?;
-    put(&staged, directory, before)?;
+    let bundle = Bundle { version, ..bundle };
+    if directory.join(NETWORK_FILE).exists() {
+        put(&stage(directory, &bundle)?, directory, before)?;
+    } else {
+        write(directory, &bundle)?;
+    }
     Ok(version)
 }
 

@@ -34,7 +34,7 @@ use crate::vehicle::{Vehicle, VehicleError};
 use tensors::TensorError;
 use vehicle_file::VehicleFile;
 
-pub use history::{Kept, apply, kept, roll_back};
+pub use history::{Kept, apply, kept, roll_back, succeed};
 
 /// The file that makes a folder a bundle.
 const VEHICLE_FILE: &str = "vehicle.toml";

@@ -271,15 +271,18 @@ impl Inputs<'_> {
     }
 
     /// Acceleration of the vehicle against time, of which the solver takes the opposite as a body force; dense, since it is
-    /// interpolated by splines.
+    /// interpolated. It is half a largest step late: an implicit step takes the acceleration of its end, while the inflow
+    /// changes by its mean over the step. Where the two differ, the water as a whole pushes the hull, for that one step with
+    /// the whole inertia of what it displaces.
     fn acceleration_table(&self) -> String {
         let (case, settle) = (self.case, self.settle());
         let acceleration = (case.end_speed_mps - case.speed_mps) / case.ramp_s;
         let step = 0.005;
+        let start = settle + 0.5 * self.settings.sample_s;
         let rows = (self.first_end() / step).ceil() as usize + 2;
         let row = |i: usize| {
             let time = i as f64 * step;
-            let inside = time >= settle && time < settle + case.ramp_s;
+            let inside = time >= start && time < start + case.ramp_s;
             let value = if inside { acceleration } else { 0.0 };
             format!("({} (({} 0 0) (0 0 0) (0 0 0)))\n", number(time), number(value))
         };

@@ -15,8 +15,11 @@ use wade::cfd::plan::{self, Campaign, Plan, Set};
 use wade::cfd::report;
 use wade::cfd::run::{Event, Machine, Work};
 use wade::cfd::slurm;
+use wade::cfd::trials;
+use wade::dataset;
 use wade::geometry::hydrostatics::float_depth;
 use wade::train;
+use wade::trials::{MANIFEST_FILE, write};
 
 use super::Vehicles;
 
@@ -25,7 +28,11 @@ use super::Vehicles;
 #[command(after_help = "Example, from nothing to a data set:
   wade campaign plan --vehicle husky --set paper --cases 175 --out campaigns/husky
   nice wade campaign run campaigns/husky --jobs 2
-  wade campaign collect campaigns/husky")]
+  wade campaign collect campaigns/husky
+
+What a model lacks that was learnt from parked, steady cases, by cases that move:
+  wade campaign trials campaigns/husky --set unsteady --out trials/
+  wade gap --vehicle husky --trials trials/ --out gap/")]
 pub struct CampaignCommand {
     #[command(subcommand)]
     command: Command,
@@ -39,6 +46,8 @@ enum Command {
     Run(Run),
     /// Add the cases that are done to the campaign's data set
     Collect(Collect),
+    /// Make trials of computed cases, for `wade gap`
+    Trials(Trials),
     /// Show what the campaign covers and how far it can be trusted
     Report(Report),
 }
@@ -50,6 +59,7 @@ impl CampaignCommand {
             Command::Plan(command) => command.run(),
             Command::Run(command) => command.run(),
             Command::Collect(command) => command.run(),
+            Command::Trials(command) => command.run(),
             Command::Report(command) => command.run(),
         }
     }
@@ -265,6 +275,44 @@ impl Collect {
         let new = collect::collect(&self.campaign, &plan, &bundle.vehicle, &work)?;
         let all = Collected::read(&self.campaign, &plan)?.cases.len();
         println!("{}: {all} of {} cases, {new} of them new", self.campaign.display(), plan.cases.len());
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Make trials of computed cases, for `wade gap`
+///
+/// A trial a case, a row a section of 0.1 s, labelled as computed. The effects of speed that changes are in `unsteady`; those
+/// of a moving bed and turning wheels are in `driving` beside `paper`, which holds the same states over a parked bed.
+#[derive(Debug, Args)]
+struct Trials {
+    /// Folder of the campaign
+    campaign: PathBuf,
+    #[command(flatten)]
+    vehicles: Vehicles,
+    /// The sets of cases; may be given several times
+    #[arg(long, value_enum, required = true)]
+    set: Vec<SetName>,
+    /// Folder for the trials, which must not hold any yet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl Trials {
+    fn run(self) -> Result<ExitCode> {
+        let plan = Plan::read(&self.campaign)?;
+        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
+        let dataset = dataset::read(&self.campaign.join(collect::SECTIONS_FILE))?;
+        let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
+        let (manifest, trials) = trials::trials(&plan, &dataset, &bundle.vehicle, &sets)?;
+        if self.out.join(MANIFEST_FILE).exists() {
+            bail!(
+                "{} holds trials already, which would be mixed with these: name another folder",
+                self.out.display()
+            );
+        }
+        write(&self.out, &manifest, &trials)?;
+        super::emit(&format!("{}: {} trials\n", self.out.display(), trials.len()))?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -93,12 +93,17 @@ case.toml, with z of the CFD forward, y up and so x to the left:
   wade dataset split data.parquet --by case --share 0.2 --seed 1 --out split
   wade dataset split data.parquet --by depth --parts 5 --out split    split/1 to split/5, one depth held out in each")]
     Split(SplitFile),
-    /// Join data sets, such as those of two vehicles
-    #[command(after_help = "Example: wade dataset merge husky.parquet warthog.parquet --out both.parquet")]
+    /// Join data sets, such as those of two vehicles, and take some sets of a campaign alone
+    #[command(after_help = "Examples:
+  wade dataset merge husky.parquet warthog.parquet --out both.parquet
+  wade dataset merge campaigns/mine/sections.parquet --set paper,wide --out steady.parquet")]
     Merge {
         /// The data sets
-        #[arg(required = true, num_args = 2..)]
+        #[arg(required = true)]
         files: Vec<PathBuf>,
+        /// Sets of cases to keep, separated by commas [default: all]
+        #[arg(long, value_delimiter = ',', value_name = "NAME")]
+        set: Vec<String>,
         /// The data set that holds them all
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
@@ -214,11 +219,14 @@ impl Dataset {
                 write(&out, &mirror::augment(&data, &vehicles, front_rear)?)?;
             }
             Command::Split(command) => command.run()?,
-            Command::Merge { files, out } => {
+            Command::Merge { files, set, out } => {
                 let mut data = dataset::read(&files[0])?;
                 for file in &files[1..] {
                     let other = dataset::read(file)?;
                     data.merge(other).with_context(|| format!("{} and those before", file.display()))?;
+                }
+                if !set.is_empty() {
+                    data.keep_sets(&set)?;
                 }
                 write(&out, &data)?;
             }

@@ -16,9 +16,10 @@ use super::Vehicles;
 
 /// Forces for every row of a table of states
 ///
-/// Columns: vx vy vz and depth; optionally wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho, wheel_fl wheel_fr wheel_rl
-/// wheel_rr, in SI units and radians. Adds fx fy fz mx my mz about the center of mass and in_domain (1 or 0); other columns
-/// are kept. Where there is a column t, the rows are one run in time, along which effects remember waves and flooding.
+/// Columns: vx vy vz and depth; optionally cx cy cz (current), wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho,
+/// wheel_fl wheel_fr wheel_rl wheel_rr, in SI units and radians. Adds fx fy fz mx my mz about the center of mass and
+/// in_domain (1 or 0); other columns are kept. Where there is a column t, the rows are one run in time, along which effects
+/// remember waves and flooding.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   wade predict --vehicle warthog --states in.csv --out out.csv --per-surface")]

@@ -81,7 +81,7 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Put the version before the last wade gap --apply back into its place, or any that was kept
+    /// Put the version before the last wade train or wade gap --apply back into its place, or any that was kept
     ///
     /// Versions lie in <VEHICLES>/<NAME>.versions. What leaves its place is kept too, so that --to puts it back.
     #[command(after_help = "Examples:
@@ -215,7 +215,10 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
         (depth, force)
     });
     let domain = bundle.trained.as_ref().map(|&(_, domain)| domain);
-    let provenance = bundle.trained.as_ref().map(|(weights, _)| weights.provenance.as_str());
+    let weights =
+        bundle.trained.as_ref().map(|(weights, _)| (weights.form.name(), weights.provenance.as_str()));
+    let told =
+        |weights: Option<(&str, &str)>| weights.map_or("none yet".into(), |(v, p)| format!("{v}, {p}"));
     let ranges = || Quantity::ALL.into_iter().filter_map(|q| Some((q.name(), domain?.range(q)?)));
     let d = &vehicle.dimensions;
     let effects: Vec<&ActiveEffect> = bundle.effects.iter().flat_map(|file| &file.effects).collect();
@@ -225,14 +228,17 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
                    "normal": s.normal.as_slice(), "area_m2": s.area})
         });
         let document = json!({
-            "name": vehicle.name, "version": bundle.version, "provenance": provenance,
+            "name": vehicle.name, "version": bundle.version,
+            "variant": weights.map(|(variant, _)| variant), "provenance": weights.map(|(_, provenance)| provenance),
             "length_m": d.length, "width_m": d.width, "height_m": d.height, "z0_m": vehicle.z0,
             "mass_kg": vehicle.mass, "center_of_mass_m": vehicle.center_of_mass.as_slice(),
             "faces": vehicle.hull.mesh.faces.len(), "surfaces": surfaces.collect::<Vec<_>>(),
             "domain": ranges().map(|(name, range)| (name.to_owned(), json!([range.min, range.max])))
                 .collect::<serde_json::Map<_, _>>(),
             "effects": effects,
-            "kept": kept.iter().map(|kept| json!({"version": kept.version, "effects": kept.effects}))
+            "kept": kept.iter().map(|kept| json!({"version": kept.version,
+                "variant": kept.weights.as_ref().map(|(variant, _)| variant),
+                "provenance": kept.weights.as_ref().map(|(_, provenance)| provenance), "effects": kept.effects}))
                 .collect::<Vec<_>>(),
             "hydrostatics": lift.map(|(depth, force)| json!({"depth_m": depth, "fz_n": force})),
         });
@@ -243,12 +249,7 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     let mut line = |line: String| {
         let _ = writeln!(text, "{line}");
     };
-    line(format!(
-        "{}, version {}, weights: {}",
-        vehicle.name,
-        bundle.version,
-        provenance.unwrap_or("none yet")
-    ));
+    line(format!("{}, version {}, weights: {}", vehicle.name, bundle.version, told(weights)));
     line(format!(
         "L W H {:.3} x {:.3} x {:.3} m, ground at z {:.4} m, {:.1} kg",
         d.length, d.width, d.height, vehicle.z0, vehicle.mass
@@ -277,7 +278,9 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     }
     for kept in kept {
         let effects = if kept.effects.is_empty() { "no effects".into() } else { kept.effects.join(", ") };
-        line(format!("kept: version {}, {effects}", kept.version));
+        let weights =
+            told(kept.weights.as_ref().map(|(variant, provenance)| (*variant, provenance.as_str())));
+        line(format!("kept: version {}, weights: {weights}; {effects}", kept.version));
     }
     for (depth, force) in lift {
         line(format!("lift at rest in fresh water, {depth:.3} m deep: {force:.1} N"));

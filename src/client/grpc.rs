@@ -4,17 +4,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
-use tokio::sync::mpsc;
-use tokio_stream::wrappers::ReceiverStream;
-use tonic::transport::{Channel, Endpoint};
-use tonic::{Code, Request, Status, Streaming};
+use tonic::transport::Endpoint;
 
-use super::{ClientError, EffectReply, Reply, SurfaceReply};
+use super::grpc_link::GrpcLink;
+use super::{ClientError, EffectReply, Reply, SurfaceReply, chain};
 use crate::domain::{Domain, Outside, Quantity, Range};
 use crate::effects::{BoxQuantity, Effect, LeftOut, OutsideBox};
 use crate::service::proto;
 use crate::service::proto::admin_client::AdminClient;
-use crate::service::proto::hydrodynamics_client::HydrodynamicsClient;
 use crate::service::wire::State;
 
 /// How single queries are sent.
@@ -26,44 +23,20 @@ pub enum Method {
     Stream,
 }
 
-/// Where the server is.
-#[derive(Debug, Clone)]
-enum Address {
-    Tcp(String),
-    Unix(PathBuf),
-}
-
-impl Address {
-    fn uri(&self) -> String {
-        match self {
-            Self::Tcp(uri) => uri.clone(),
-            Self::Unix(path) => format!("unix:{}", path.display()),
-        }
-    }
-}
-
 /// A blocking client of one vehicle.
 #[derive(Debug)]
 pub struct GrpcClient {
     runtime: Runtime,
-    client: HydrodynamicsClient<Channel>,
-    address: Address,
-    vehicle: String,
+    link: GrpcLink,
     method: Method,
-    timeout: Duration,
-    stream: Option<Open>,
-}
-
-#[derive(Debug)]
-struct Open {
-    requests: mpsc::Sender<proto::EvaluateRequest>,
-    answers: Streaming<proto::EvaluateResponse>,
 }
 
 impl GrpcClient {
     /// Connects over TCP to a URL such as `http://127.0.0.1:50051`.
     pub fn tcp(url: &str, vehicle: &str, method: Method, timeout: Duration) -> Result<Self, ClientError> {
-        Self::new(Address::Tcp(url.to_owned()), vehicle, method, timeout)
+        let runtime = runtime(url)?;
+        let link = runtime.block_on(GrpcLink::connect(url, vehicle, timeout))?;
+        Ok(Self { runtime, link, method })
     }
 
     /// Connects to a Unix socket.
@@ -73,80 +46,25 @@ impl GrpcClient {
         method: Method,
         timeout: Duration,
     ) -> Result<Self, ClientError> {
-        Self::new(Address::Unix(path), vehicle, method, timeout)
-    }
-
-    fn new(address: Address, vehicle: &str, method: Method, timeout: Duration) -> Result<Self, ClientError> {
-        let no_server =
-            |error: &dyn std::error::Error| ClientError::NoServer { at: address.uri(), reason: chain(error) };
-        let runtime =
-            tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| no_server(&e))?;
-        let endpoint = Endpoint::from_shared(address.uri()).map_err(|e| no_server(&e))?;
-        let endpoint = endpoint.connect_timeout(timeout).tcp_nodelay(true);
-        let channel = runtime.block_on(endpoint.connect()).map_err(|e| no_server(&e))?;
-        let client = HydrodynamicsClient::new(channel).max_decoding_message_size(64 << 20);
-        Ok(Self { runtime, client, address, vehicle: vehicle.to_owned(), method, timeout, stream: None })
+        Self::tcp(&format!("unix:{}", path.display()), vehicle, method, timeout)
     }
 
     /// The forces in one state.
     pub fn evaluate(&mut self, state: &State) -> Result<proto::EvaluateResponse, ClientError> {
-        let message = proto::EvaluateRequest { vehicle: self.vehicle.clone(), state: Some(message(state)) };
         match self.method {
-            Method::Unary => {
-                let request = self.request(message);
-                self.runtime
-                    .block_on(self.client.evaluate(request))
-                    .map(tonic::Response::into_inner)
-                    .map_err(|status| self.error(&status))
-            }
-            Method::Stream => self.evaluate_in_stream(message),
+            Method::Unary => self.runtime.block_on(self.link.evaluate(state)),
+            Method::Stream => self.runtime.block_on(self.link.evaluate_in_stream(state)),
         }
-    }
-
-    fn evaluate_in_stream(
-        &mut self,
-        message: proto::EvaluateRequest,
-    ) -> Result<proto::EvaluateResponse, ClientError> {
-        let Self { runtime, client, stream, timeout, .. } = self;
-        let exchange = async {
-            let open = match stream {
-                Some(open) => open,
-                None => stream.insert(open(client).await?),
-            };
-            if open.requests.send(message).await.is_err() {
-                tracing::debug!("the stream was closed by the server; its answer says why");
-            }
-            open.answers.message().await?.ok_or_else(|| Status::unavailable("the server closed the stream"))
-        };
-        let answer = runtime.block_on(async { tokio::time::timeout(*timeout, exchange).await });
-        let answer = answer.unwrap_or_else(|_| Err(Status::deadline_exceeded("no answer in the stream")));
-        answer.map_err(|status| {
-            // a stream ends with its first error; the next query opens another
-            self.stream = None;
-            self.error(&status)
-        })
     }
 
     /// The forces in each state of a batch.
     pub fn evaluate_batch(&mut self, states: &[State]) -> Result<proto::EvaluateBatchResponse, ClientError> {
-        if states.windows(2).any(|pair| shared(&pair[0]) != shared(&pair[1])) {
-            return Err(ClientError::MixedBatch);
-        }
-        let request = self.request(batch_message(&self.vehicle, states));
-        self.runtime
-            .block_on(self.client.evaluate_batch(request))
-            .map(tonic::Response::into_inner)
-            .map_err(|status| self.error(&status))
+        self.runtime.block_on(self.link.evaluate_batch(states))
     }
 
     /// What the server says of the vehicle.
     pub fn vehicle(&mut self) -> Result<proto::GetVehicleResponse, ClientError> {
-        let request =
-            self.request(proto::GetVehicleRequest { vehicle: self.vehicle.clone(), include_mesh: false });
-        self.runtime
-            .block_on(self.client.get_vehicle(request))
-            .map(tonic::Response::into_inner)
-            .map_err(|status| self.error(&status))
+        self.runtime.block_on(self.link.vehicle())
     }
 
     /// The training domain of the vehicle, as the server states it.
@@ -169,30 +87,13 @@ impl GrpcClient {
             angular_speed_radps: range(Quantity::AngularSpeed),
         })
     }
-
-    fn request<T>(&self, message: T) -> Request<T> {
-        let mut request = Request::new(message);
-        request.set_timeout(self.timeout);
-        request
-    }
-
-    fn error(&self, status: &Status) -> ClientError {
-        match status.code() {
-            Code::DeadlineExceeded | Code::Cancelled => ClientError::Timeout(self.timeout),
-            Code::Unavailable | Code::Unknown => {
-                ClientError::NoServer { at: self.address.uri(), reason: status.message().to_owned() }
-            }
-            code => ClientError::Refused { code: format!("{code:?}"), message: status.message().to_owned() },
-        }
-    }
 }
 
 /// Asks the server at a URL, `http://HOST:PORT` or `unix:PATH`, to read a vehicle's bundle again.
 pub fn reload(url: &str, vehicle: &str, timeout: Duration) -> Result<Vec<proto::Reloaded>, ClientError> {
     let no_server = |reason: String| ClientError::NoServer { at: url.to_owned(), reason };
     let failed = |error: &dyn std::error::Error| no_server(chain(error));
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|error| failed(&error))?;
+    let runtime = runtime(url)?;
     let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| failed(&error))?;
     runtime.block_on(async {
         let endpoint = endpoint.connect_timeout(timeout).timeout(timeout);
@@ -204,18 +105,13 @@ pub fn reload(url: &str, vehicle: &str, timeout: Duration) -> Result<Vec<proto::
     })
 }
 
-async fn open(client: &mut HydrodynamicsClient<Channel>) -> Result<Open, Status> {
-    let (requests, outgoing) = mpsc::channel(1);
-    let answers = client.stream(ReceiverStream::new(outgoing)).await?.into_inner();
-    Ok(Open { requests, answers })
+/// A runtime on which the calling thread does everything itself.
+fn runtime(url: &str) -> Result<Runtime, ClientError> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    runtime.map_err(|error| ClientError::NoServer { at: url.to_owned(), reason: chain(&error) })
 }
 
-fn chain(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
-}
-
-fn message(state: &State) -> proto::State {
+pub(super) fn message(state: &State) -> proto::State {
     let vector = |[x, y, z]: [f32; 3]| Some(proto::Vector3 { x, y, z });
     let [x, y, z] = state.gravity;
     proto::State {
@@ -241,13 +137,13 @@ fn ground_contact(state: &State) -> proto::GroundContact {
 }
 
 /// What the states of a batch have in common: the message carries it once, or not at all.
-fn shared(state: &State) -> [bool; 5] {
+pub(super) fn shared(state: &State) -> [bool; 5] {
     let State { heading, depth_rate, wheel_speeds, .. } = state;
     let given = [heading.is_some(), depth_rate.is_some(), wheel_speeds.is_some()];
     [state.dry_contact, state.implicit_added_mass, given[0], given[1], given[2]]
 }
 
-fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateBatchRequest {
+pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateBatchRequest {
     let rows = |row: fn(&State) -> [f32; 3]| states.iter().flat_map(row).collect();
     proto::EvaluateBatchRequest {
         vehicle: vehicle.to_owned(),

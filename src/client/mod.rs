@@ -1,13 +1,18 @@
 //! Clients of the library's own: in process, gRPC, shared memory; one call and one reply for all.
 
 mod grpc;
+mod grpc_link;
 mod shm;
+mod shm_link;
 
 use std::sync::Arc;
 use std::time::Duration;
 
-pub use grpc::{GrpcClient, Method, reload};
+pub use grpc::{GrpcClient, Method, reload, replies};
+pub use grpc_link::GrpcLink;
 pub use shm::ShmClient;
+pub use shm_link::{Asked, Lost, ShmLink};
+use tonic::Code;
 
 use crate::domain::Outside;
 use crate::effects::{Effect, LeftOut, OutsideBox, Session};
@@ -30,11 +35,29 @@ pub enum ClientError {
         /// What happened.
         reason: String,
     },
+    /// The server serves no such vehicle.
+    #[error("vehicle \"{vehicle}\" is not served; there are: {}", .served.join(", "))]
+    UnknownVehicle {
+        /// The vehicle.
+        vehicle: String,
+        /// What is served instead.
+        served: Vec<String>,
+    },
+    /// The server's shared memory has another layout.
+    #[error(
+        "shared memory of layout {expected} expected, found {found}; client and server must be of one version"
+    )]
+    Layout {
+        /// The client's.
+        expected: String,
+        /// The server's.
+        found: String,
+    },
     /// The server refused the request.
-    #[error("{code}: {message}")]
+    #[error("{code:?}: {message}")]
     Refused {
-        /// The gRPC code in words.
-        code: String,
+        /// What kind of refusal.
+        code: Code,
         /// What the server said.
         message: String,
     },
@@ -54,6 +77,12 @@ pub enum ClientError {
         /// The limit.
         limit: usize,
     },
+}
+
+/// An error with what caused it.
+fn chain(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
 }
 
 /// The load on one surface as it travels.

@@ -1,6 +1,6 @@
-//! Two data sets as one, such as those of two vehicles that share a network.
+//! Two data sets as one, such as those of two vehicles that share a network, and the sets of a campaign apart.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use super::Dataset;
 use crate::condition::GroundContact;
@@ -27,6 +27,14 @@ pub enum MergeError {
     Case {
         /// The case.
         case: String,
+    },
+    /// A set that is asked for and not there.
+    #[error("there is no case of the set `{set}`: there are {}", .known.join(", "))]
+    NoSet {
+        /// Its name.
+        set: String,
+        /// The sets that there are.
+        known: Vec<String>,
     },
 }
 
@@ -56,6 +64,17 @@ impl Dataset {
             }
         }
         self.samples.extend(other.samples);
+        Ok(())
+    }
+
+    /// Keeps the cases of some sets alone.
+    pub fn keep_sets(&mut self, sets: &[String]) -> Result<(), MergeError> {
+        let known: BTreeSet<&String> = self.samples.iter().map(|sample| &sample.set).collect();
+        if let Some(set) = sets.iter().find(|set| !known.contains(set)) {
+            let known = known.into_iter().cloned().collect();
+            return Err(MergeError::NoSet { set: set.clone(), known });
+        }
+        self.samples.retain(|sample| sets.contains(&sample.set));
         Ok(())
     }
 }

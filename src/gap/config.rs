@@ -24,7 +24,7 @@ pub struct Config {
     pub folds: usize,
     /// Share of the trials that take no part in naming and fitting.
     pub held_out: f64,
-    /// Fewest trials.
+    /// Fewest trials, 3 at least: one is kept back, and an effect of one trial is no effect.
     pub least_trials: usize,
     /// Largest probability of a false alarm of one effect.
     pub significance: f64,
@@ -81,7 +81,7 @@ impl Config {
         ];
         let counts = [
             ("folds", self.folds, 2),
-            ("least_trials", self.least_trials, 2),
+            ("least_trials", self.least_trials, 3),
             ("most_effects", self.most_effects, 1),
             ("bootstrap", self.bootstrap, 20),
         ];

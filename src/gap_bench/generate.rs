@@ -311,6 +311,7 @@ impl Scene<'_> {
             acceleration_is_measured: false,
             angular_acceleration: derivative(&t, &angular_velocity, track.step),
             velocity,
+            current: vec![Vec3::zeros(); kept.len()],
             angular_velocity,
             roll: of(&|state| state.attitude[0]),
             pitch: of(&|state| state.attitude[1]),

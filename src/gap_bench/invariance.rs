@@ -26,6 +26,7 @@ fn mirror(trial: &mut Trial) {
     // a rate of turning about x or z changes its sense, one about y does not
     let axial = |v: &mut Vec3| (v.x, v.z) = (-v.x, -v.z);
     trial.velocity.iter_mut().for_each(polar);
+    trial.current.iter_mut().for_each(polar);
     trial.acceleration.iter_mut().for_each(polar);
     trial.angular_velocity.iter_mut().for_each(axial);
     trial.angular_acceleration.iter_mut().for_each(axial);

@@ -38,8 +38,9 @@ pub struct Paper {
 /// Index of the answer that says how far the others may be off.
 pub const SPREAD: usize = ANCHORED_OUTPUTS;
 
-/// Distances, in units of what is usual, from which the learnt part has faded to nothing.
-const FAR: f64 = 3.0;
+/// Distances, in units of what is usual, up to which all of the learnt part counts, and from which nothing of it: one case in
+/// twenty lies farther from its neighbors than the unit, and the network was taught some way beyond the cases.
+const FADES: [f64; 2] = [2.0, 4.0];
 
 /// What goes with a network that learnt the remainder.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,9 +80,9 @@ impl Anchored {
         std::array::from_fn(|i| coordinates[i] as f32 / self.coordinate_scale[i])
     }
 
-    /// How much of the learnt part counts at a distance: all of it up to 1, nothing from 3, smooth between.
+    /// How much of the learnt part counts at a distance: all of it up to 2, nothing from 4, smooth between.
     pub fn trust(distance: f64) -> f64 {
-        let x = ((FAR - distance) / (FAR - 1.0)).clamp(0.0, 1.0);
+        let x = ((FADES[1] - distance) / (FADES[1] - FADES[0])).clamp(0.0, 1.0);
         x * x * (3.0 - 2.0 * x)
     }
 

@@ -12,9 +12,10 @@ h1{font-size:22px;margin:0 0 4px}h2{font-size:18px;margin:30px 0 4px}h3{font-siz
 .notice{border-color:#d97a06;background:#fdf6ec}\
 .wide{overflow-x:auto}table{border-collapse:collapse;margin:8px 0}\
 th,td{padding:3px 11px;border-bottom:1px solid #e3e6ea;text-align:right;white-space:nowrap}\
-th:first-child,td:first-child{text-align:left;padding-left:0}td.text{text-align:left;white-space:normal}\
+th:first-child,td:first-child{text-align:left;padding-left:0}.text{text-align:left;white-space:normal}\
 td.paper,th.paper{color:#8a5a00;background:#fdf9f1}td.none{background:#fdf0f0}\
 figure{display:inline-block;margin:0 6px 6px 0}.legend span{margin-right:18px;white-space:nowrap}\
+.bar{display:flex;height:22px;border-radius:4px;overflow:hidden;margin:8px 0 4px}\
 .legend i{display:inline-block;width:9px;height:9px;border-radius:5px;margin-right:6px}\
 .small{color:#57606a;font-size:13px}svg{max-width:100%;height:auto;display:block}pre{font-size:13px;overflow-x:auto}";
 

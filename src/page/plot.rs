@@ -103,6 +103,40 @@ pub fn curves(x_title: &str, y_title: &str, series: &[Series]) -> Result<String,
     Ok(format!("<figure>{}{svg}</figure>", legend(series)))
 }
 
+/// Lines over linear axes, and a gray band from `-band` to `band`.
+pub fn traces(x_title: &str, y_title: &str, band: f64, series: &[Series]) -> Result<String, PlotError> {
+    let mut svg = String::new();
+    {
+        let area = canvas(&mut svg, (960, 250))?;
+        let points = || series.iter().flat_map(|s| &s.points);
+        let (start, end) = extent(points().map(|p| p.0)).unwrap_or((0.0, 1.0));
+        let y = padded(extent(points().map(|p| p.1).chain([-1.2 * band, 1.2 * band])));
+        let mut chart = ChartBuilder::on(&area)
+            .margin(8)
+            .margin_right(16)
+            .x_label_area_size(42)
+            .y_label_area_size(66)
+            .build_cartesian_2d(start..end.max(start + 1e-3), y)?;
+        chart.draw_series([Rectangle::new([(start, -band), (end, band)], GRAY.mix(0.25).filled())])?;
+        chart
+            .configure_mesh()
+            .light_line_style(WHITE.mix(0.0))
+            .bold_line_style(GRID)
+            .x_labels(11)
+            .y_labels(7)
+            .x_desc(x_title)
+            .y_desc(y_title)
+            .label_style(("sans-serif", 13))
+            .axis_desc_style(("sans-serif", 13))
+            .draw()?;
+        for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
+            chart.draw_series(LineSeries::new(s.points.iter().copied(), color.stroke_width(2)))?;
+        }
+        area.present()?;
+    }
+    Ok(format!("<figure>{}{svg}</figure>", legend(series)))
+}
+
 /// Points over equal axes with the line on which both agree.
 pub fn parity(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotError> {
     let mut svg = String::new();

@@ -14,6 +14,7 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::{ListenerKey, Notifier};
 use iceoryx2::port::server::Server;
 use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, SignalHandlingMode, ZeroCopySend, ipc};
+use iceoryx2::service::Service;
 use iceoryx2::service::port_factory::{event, request_response};
 use serde::{Deserialize, Serialize};
 
@@ -93,15 +94,15 @@ impl ShmError {
 }
 
 /// A node that leaves the signals to their owner.
-pub(crate) fn node() -> Result<Node<ipc::Service>, ShmError> {
-    let node = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<ipc::Service>();
+pub(crate) fn node<S: Service>() -> Result<Node<S>, ShmError> {
+    let node = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<S>();
     node.map_err(|error| {
         let hint = "; its files lie in /tmp/iceoryx2 and /dev/shm and serve the one user who owns them";
         ShmError::new("a node")(&format!("{error}{hint}"))
     })
 }
 
-pub(crate) type Exchange<Q, A> = request_response::PortFactory<ipc::Service, Q, (), A, ()>;
+pub(crate) type Exchange<S, Q, A> = request_response::PortFactory<S, Q, (), A, ()>;
 
 /// Opens or creates a request-response service: what a dead client left behind is neither answered
 /// nor waited for.
@@ -109,7 +110,7 @@ fn exchange<Q, A>(
     node: &Node<ipc::Service>,
     name: &str,
     max_clients: usize,
-) -> Result<Exchange<Q, A>, ShmError>
+) -> Result<Exchange<ipc::Service, Q, A>, ShmError>
 where
     Q: ZeroCopySend + std::fmt::Debug + 'static,
     A: ZeroCopySend + std::fmt::Debug + 'static,
@@ -130,32 +131,45 @@ where
         .open_or_create()
         .or_else(|error| {
             // a client that outlived a server with smaller limits keeps its service: those limits stay until it goes
-            let open = open::<Q, A>(node, name)?.ok_or_else(|| ShmError::new(name)(&error))?;
+            let open = open::<_, Q, A>(node, name).map_err(|_| ShmError::new(name)(&error))?;
             tracing::warn!(name, %error, "a living client keeps this service's former limits");
             Ok(open)
         })
 }
 
-/// Opens a service that a server has created; none where there is no such server.
-pub(crate) fn open<Q, A>(node: &Node<ipc::Service>, name: &str) -> Result<Option<Exchange<Q, A>>, ShmError>
+/// Opens a service that a server has created.
+pub(crate) fn open<S, Q, A>(node: &Node<S>, name: &str) -> Result<Exchange<S, Q, A>, OpenError>
 where
+    S: Service,
     Q: ZeroCopySend + std::fmt::Debug + 'static,
     A: ZeroCopySend + std::fmt::Debug + 'static,
 {
-    use iceoryx2::service::builder::request_response::RequestResponseOpenError as OpenError;
-    let service = name.try_into().map_err(|error| ShmError::new(name)(&error))?;
-    match node.service_builder(&service).request_response::<Q, A>().open() {
-        Ok(exchange) => Ok(Some(exchange)),
-        Err(OpenError::DoesNotExist) => Ok(None),
-        Err(error) => Err(ShmError::new(name)(&error)),
-    }
+    use iceoryx2::service::builder::request_response::RequestResponseOpenError as Reason;
+    let failed = |reason: &dyn std::fmt::Display| OpenError::Failed(ShmError::new(name)(reason));
+    let service = name.try_into().map_err(|error| failed(&error))?;
+    node.service_builder(&service).request_response::<Q, A>().open().map_err(|error| match error {
+        Reason::DoesNotExist => OpenError::Absent,
+        Reason::IncompatibleRequestOrResponseType => OpenError::OtherTypes,
+        error => failed(&error),
+    })
+}
+
+/// Why a service could not be opened.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum OpenError {
+    /// Nobody has created it.
+    #[error("it does not exist")]
+    Absent,
+    /// What lies in it has another size or name.
+    #[error("it has other types")]
+    OtherTypes,
+    /// The system refused.
+    #[error(transparent)]
+    Failed(ShmError),
 }
 
 /// Opens or creates an event service.
-pub(crate) fn events(
-    node: &Node<ipc::Service>,
-    name: &str,
-) -> Result<event::PortFactory<ipc::Service>, ShmError> {
+pub(crate) fn events<S: Service>(node: &Node<S>, name: &str) -> Result<event::PortFactory<S>, ShmError> {
     let service = name.try_into().map_err(|error| ShmError::new(name)(&error))?;
     let builder = node
         .service_builder(&service)

@@ -27,6 +27,9 @@ pub const MAX_BATCH: usize = 256;
 /// Length of the provenance, which is cut to fit.
 pub const PROVENANCE_LEN: usize = 32;
 
+/// Version of the layout, as the names of the services have it.
+pub const VERSION: &str = "v3";
+
 /// Names of the services of one server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Names {
@@ -41,22 +44,28 @@ impl Names {
 
     /// A vehicle's service for single queries.
     pub fn evaluate(&self, vehicle: &str) -> String {
-        format!("{}/v3/evaluate/{vehicle}", self.namespace)
+        format!("{}/{VERSION}/evaluate/{vehicle}", self.namespace)
     }
 
     /// A vehicle's service for batches.
     pub fn evaluate_batch(&self, vehicle: &str) -> String {
-        format!("{}/v3/evaluate_batch/{vehicle}", self.namespace)
+        format!("{}/{VERSION}/evaluate_batch/{vehicle}", self.namespace)
+    }
+
+    /// The version of the layout and the vehicle of a service for single queries in this namespace.
+    pub fn version_and_vehicle<'n>(&self, service: &'n str) -> Option<(&'n str, &'n str)> {
+        let (version, rest) = service.strip_prefix(&self.namespace)?.strip_prefix('/')?.split_once('/')?;
+        Some((version, rest.strip_prefix("evaluate/")?))
     }
 
     /// Event service on which clients wake the server.
     pub fn wake(&self) -> String {
-        format!("{}/v3/wake", self.namespace)
+        format!("{}/{VERSION}/wake", self.namespace)
     }
 
     /// Event service on which the server wakes clients.
     pub fn done(&self) -> String {
-        format!("{}/v3/done", self.namespace)
+        format!("{}/{VERSION}/done", self.namespace)
     }
 }
 
@@ -406,6 +415,16 @@ impl Answer {
         std::str::from_utf8(bytes)
             .or_else(|e| std::str::from_utf8(&bytes[..e.valid_up_to()]))
             .unwrap_or_default()
+    }
+}
+
+impl BatchAnswer {
+    /// What was wrong with which state, where something was.
+    pub fn refusal(&self) -> Option<(InvalidState, usize)> {
+        let index = self.index as usize % MAX_BATCH;
+        (self.status == Status::InvalidState as u32)
+            .then(|| Some((self.answers[index].refusal()?, index)))
+            .flatten()
     }
 }
 

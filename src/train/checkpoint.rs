@@ -76,22 +76,9 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// That of a part of the work with a file of its own, which need not be there yet to go on.
-    pub fn part(&self, number: usize) -> Self {
-        let mut path = self.path.clone().into_os_string();
-        path.push(format!(".{number}"));
-        let path = PathBuf::from(path);
-        Self { resume: self.resume && path.exists(), path }
-    }
-
-    /// Removes it and those of its parts.
+    /// Removes it, if it was ever written.
     pub fn remove(&self) -> std::io::Result<()> {
-        let mut paths = vec![self.path.clone()];
-        paths.extend((1..).map(|number| self.part(number).path).take_while(|path| path.exists()));
-        for path in paths.iter().filter(|path| path.exists()) {
-            fs::remove_file(path)?;
-        }
-        Ok(())
+        if self.path.exists() { fs::remove_file(&self.path) } else { Ok(()) }
     }
 
     /// The state to go on from, if any.

@@ -51,15 +51,15 @@ pub struct Config {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AnchoredConfig {
-    /// Networks that are trained besides, each without a part of the cases, to learn how far the answer may be off.
-    pub folds: usize,
+    /// States between the cases in which the network is taught, for each case.
+    pub between: usize,
     /// Weights of the loss.
     pub loss: AnchoredLoss,
 }
 
 impl Default for AnchoredConfig {
     fn default() -> Self {
-        Self { folds: 5, loss: AnchoredLoss::default() }
+        Self { between: 16, loss: AnchoredLoss::default() }
     }
 }
 
@@ -67,9 +67,10 @@ impl Default for AnchoredConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
-    /// Those of the last epoch: the held-out cases set the pace of the learning rate but choose no weights.
+    /// Those of the last epoch: the held-out cases set the pace of the paper's learning rate but choose no weights.
     Last,
-    /// Those with the least held-out loss: the errors on the held-out cases are then those of a choice among epochs.
+    /// Those with the least loss of those that set the pace: where these are held-out ones, the errors on the held-out cases
+    /// are then those of a choice among epochs.
     Best,
 }
 
@@ -123,9 +124,9 @@ impl Config {
         Self { epochs: 2000, patience: 60, least_learning_rate: 1e-6, ..Self::default() }
     }
 
-    /// For the anchored network, which learns from one state a case.
+    /// For the anchored network, which learns from one state a case and some between the cases.
     pub fn anchored() -> Self {
-        Self { epochs: 1500, patience: 60, least_learning_rate: 1e-6, weight_decay: 0.01, ..Self::default() }
+        Self { epochs: 300, patience: 10, least_learning_rate: 1e-6, weight_decay: 0.01, ..Self::default() }
     }
 
     /// Refuses numbers that make no sense.
@@ -142,7 +143,6 @@ impl Config {
             ("loss.epsilon", self.loss.epsilon, f64::MIN_POSITIVE, "positive"),
             ("least_learning_rate", self.least_learning_rate, 0.0, "0 or more"),
             ("weight_decay", self.weight_decay, 0.0, "0 or more"),
-            ("anchored.folds", self.anchored.folds as f64, 2.0, "at least 2"),
             ("anchored.loss.delta", self.anchored.loss.delta, f64::MIN_POSITIVE, "positive"),
             ("anchored.loss.floor", self.anchored.loss.floor, f64::MIN_POSITIVE, "positive"),
             ("anchored.loss.net_weight", self.anchored.loss.net_weight, 0.0, "0 or more"),

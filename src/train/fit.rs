@@ -96,11 +96,12 @@ impl<'a> Fit<'a> {
         if !(training_loss.is_finite() && held_out_loss.is_finite()) {
             return Err(TrainError::Diverged { epoch: number });
         }
-        let best = held_out_loss < self.state.plateau.best;
+        let pace = self.task.objective.pace(training_loss, held_out_loss);
+        let best = pace < self.state.plateau.best;
         if best && self.config.keep == Keep::Best {
             self.state.best = Some((self.state.layers.parameters.clone(), number));
         }
-        self.state.plateau.observe(held_out_loss);
+        self.state.plateau.observe(pace);
         let epoch = Epoch { number, training_loss, held_out_loss, learning_rate };
         self.state.history.push(epoch);
         Ok(epoch)

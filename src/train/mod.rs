@@ -34,7 +34,7 @@ use crate::condition::GroundContact;
 use crate::dataset::Dataset;
 use crate::dataset::mirror::{self, MirrorError};
 use crate::dataset::split::Split;
-use crate::dataset::{Image, split};
+use crate::dataset::{self, Image, split};
 use crate::domain::Domain;
 use crate::model::network::{OUTPUTS, Scaling};
 use crate::model::{Form, Paper, Weights};
@@ -86,6 +86,36 @@ pub enum TrainError {
         vehicle: String,
         /// A surface that only one of them has.
         surface: String,
+    },
+    /// A state that accelerates: what is learnt has no input for it.
+    #[error(
+        "case `{case}` accelerates by {acceleration:.2} m/s2, which no network here is told: leave its set out with `wade dataset merge --set`"
+    )]
+    Unsteady {
+        /// The case.
+        case: String,
+        /// Magnitude [m/s2].
+        acceleration: f64,
+    },
+    /// Two kinds of bed for one vehicle: states that look the same to the network have different loads.
+    #[error(
+        "vehicle `{vehicle}`: the bed moves with the water in case `{moving}` and is at rest in `{resting}`, which the paper's network is not told: keep one of the sets with `wade dataset merge --set`, or train the anchored one"
+    )]
+    Beds {
+        /// The vehicle.
+        vehicle: String,
+        /// A case of the one kind.
+        moving: String,
+        /// A case of the other.
+        resting: String,
+    },
+    /// Cases that no regression can be fitted to.
+    #[error(
+        "vehicle `{vehicle}`: the covariance of its cases is not positive definite: their loads are not finite"
+    )]
+    Covariance {
+        /// The vehicle.
+        vehicle: String,
     },
     /// No mirror image.
     #[error("{0}")]
@@ -149,10 +179,48 @@ impl Source {
         for (name, vehicle) in &vehicles {
             label::order(vehicle, &data.meta.vehicles[name])?;
         }
+        check_steady(&data)?;
         let has_images = data.samples.iter().any(|sample| sample.image != Image::Original);
         let data = if has_images { data } else { mirror::augment(&data, &vehicles, front_rear)? };
         Ok(Self { data, vehicles })
     }
+}
+
+/// Accelerations above this are no rounding of a steady state [m/s2].
+const STEADY: f64 = 1e-6;
+
+/// Refuses states that differ by their acceleration, of which no network is told.
+fn check_steady(data: &Dataset) -> Result<(), TrainError> {
+    let unsteady = |sample: &&dataset::Sample| sample.condition.acceleration.norm() > STEADY;
+    match data.samples.iter().find(unsteady) {
+        Some(sample) => Err(TrainError::Unsteady {
+            case: sample.case.clone(),
+            acceleration: sample.condition.acceleration.norm(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses two kinds of bed for one vehicle, of which the paper's network is not told.
+fn check_beds(data: &Dataset) -> Result<(), TrainError> {
+    for vehicle in data.meta.vehicles.keys() {
+        let (mut moving, mut resting) = (None, None);
+        for sample in data.samples.iter().filter(|sample| sample.vehicle == *vehicle) {
+            let (over_ground, through_water) =
+                (sample.condition.ground_velocity.norm(), sample.condition.velocity.norm());
+            // at rest in the water a bed is either
+            if over_ground < 0.5 * through_water {
+                resting = Some(&sample.case);
+            } else if through_water > 0.0 {
+                moving = Some(&sample.case);
+            }
+        }
+        if let (Some(moving), Some(resting)) = (moving, resting) {
+            let [vehicle, moving, resting] = [vehicle, moving, resting].map(String::clone);
+            return Err(TrainError::Beds { vehicle, moving, resting });
+        }
+    }
+    Ok(())
 }
 
 /// Which samples are held out, and whether cases may be on both sides.
@@ -230,6 +298,7 @@ pub fn train(
 ) -> Result<Trained<Published>, TrainError> {
     config.validate()?;
     sides.check(&source.data)?;
+    check_beds(&source.data)?;
     let side = |numbers: &[usize]| samples::samples(&source.data, numbers, &source.vehicles);
     let (training, held_out) = (side(&sides.split.training)?, side(&sides.split.held_out)?);
     let (task, scaling) = Task::new(variant, &training, &held_out, config)?;

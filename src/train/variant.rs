@@ -80,6 +80,15 @@ impl Objective {
             Self::Anchored(config) => anchored_loss(config, batch, counts, output),
         }
     }
+
+    /// The loss that sets the pace of the learning rate: the held-out one, as in the paper. A network that is taught by a
+    /// regression goes by its own: what held-out cases scatter is nothing that it could learn.
+    pub fn pace(&self, training: f64, held_out: f64) -> f64 {
+        match self {
+            Self::Paper { .. } => held_out,
+            Self::Anchored(_) => training,
+        }
+    }
 }
 
 impl Variant {

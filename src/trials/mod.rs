@@ -4,13 +4,14 @@
 //! are finite, time increases, angles are radians and accelerations m/s2 without gravity, as far as that can be told.
 //!
 //! Reading order: `manifest` (`trials.toml`), `table` (a CSV file), `units` (limits, and columns that contradict each
-//! other), `acceleration` (where none was measured), `trial`.
+//! other), `acceleration` (where none was measured), `trial`, `write`.
 
 mod acceleration;
 mod manifest;
 mod table;
 mod trial;
 mod units;
+mod write;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method};
 pub use table::{Table, csv_text};
 pub use trial::{Gap, Trial, WHEELS, WRENCH};
+pub use write::{Columns, write};
 
 /// Why measured data was refused. The message names the file, and the row and column where there is one.
 #[derive(Debug, thiserror::Error)]

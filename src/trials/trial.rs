@@ -18,8 +18,10 @@ pub const WRENCH: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
 pub const WHEELS: [&str; 4] = ["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"];
 
 const SIMULATED: [&str; 6] = ["sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
-const REQUIRED: [&str; 8] = ["t", "vx", "vy", "vz", "wx", "wy", "wz", "depth"];
-const OPTIONAL: [&str; 10] = ["roll", "pitch", "yaw", "ax", "ay", "az", "alx", "aly", "alz", "rho"];
+/// Columns that every trial has.
+pub(super) const REQUIRED: [&str; 8] = ["t", "vx", "vy", "vz", "wx", "wy", "wz", "depth"];
+const OPTIONAL: [&str; 13] =
+    ["cx", "cy", "cz", "roll", "pitch", "yaw", "ax", "ay", "az", "alx", "aly", "alz", "rho"];
 
 /// A median step above this is no second's fraction any more [s].
 const LONG_STEP: f64 = 1.0;
@@ -44,6 +46,8 @@ pub struct Trial {
     pub t: Vec<f64>,
     /// Velocity over ground [m/s].
     pub velocity: Vec<Vec3>,
+    /// Known velocity of the water over ground [m/s]; 0 where no column states it.
+    pub current: Vec<Vec3>,
     /// Angular velocity [rad/s].
     pub angular_velocity: Vec<Vec3>,
     /// Roll [rad]; positive lowers the right side.
@@ -111,6 +115,7 @@ impl Trial {
         let velocity = vectors(table, ["vx", "vy", "vz"]).unwrap_or_default();
         let angular_velocity = vectors(table, ["wx", "wy", "wz"]).unwrap_or_default();
         let angular_acceleration = vectors(table, ["alx", "aly", "alz"]);
+        let current = vectors(table, ["cx", "cy", "cz"]);
         let other_forces = manifest.measured.other_forces.iter();
         Self {
             name: stem(&table.path),
@@ -118,6 +123,7 @@ impl Trial {
             acceleration_is_measured: false,
             angular_acceleration: angular_acceleration.unwrap_or_else(|| derivative(&t, &angular_velocity)),
             velocity,
+            current: current.unwrap_or_else(|| vec![Vec3::zeros(); t.len()]),
             angular_velocity,
             roll: or_constant("roll", 0.0),
             pitch: or_constant("pitch", 0.0),
@@ -150,10 +156,10 @@ impl Trial {
         up_from_roll_pitch(self.roll[sample], self.pitch[sample])
     }
 
-    /// The state at a sample, in still water.
+    /// The state at a sample.
     pub fn condition(&self, sample: usize, ground_contact: GroundContact) -> Condition {
         Condition {
-            velocity: self.velocity[sample],
+            velocity: self.velocity[sample] - self.current[sample],
             ground_velocity: self.velocity[sample],
             angular_velocity: self.angular_velocity[sample],
             acceleration: self.acceleration[sample],
@@ -178,7 +184,7 @@ impl Trial {
 
 /// Columns that come together, or that the manifest promises.
 fn check_presence(table: &Table, manifest: &Manifest) -> Result<(), TrialError> {
-    for group in [["ax", "ay", "az"], ["alx", "aly", "alz"]] {
+    for group in [["ax", "ay", "az"], ["alx", "aly", "alz"], ["cx", "cy", "cz"]] {
         let missing = group.into_iter().find(|name| !table.has(name));
         if let Some(missing) = missing.filter(|_| group.iter().any(|name| table.has(name))) {
             return Err(table.missing(missing));

@@ -6,7 +6,7 @@ use crate::frame::{GRAVITY, Vec3};
 
 /// Least and largest plausible value of a column, and its unit.
 const LIMITS: [(&[&str], f64, f64, &str); 8] = [
-    (&["vx", "vy", "vz"], -50.0, 50.0, "m/s"),
+    (&["vx", "vy", "vz", "cx", "cy", "cz"], -50.0, 50.0, "m/s"),
     (&["wx", "wy", "wz"], -50.0, 50.0, "rad/s"),
     (&["roll", "pitch"], -1.6, 1.6, "rad"),
     (&["depth"], -100.0, 20.0, "m"),

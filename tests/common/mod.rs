@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use tempfile::TempDir;
 use wade::bundle;
-use wade::client::{Client, GrpcClient, Method, ShmClient};
+use wade::client::{Client, GrpcClient, Method, Reply, ShmClient};
 use wade::config::Config;
 use wade::effects::{ActiveEffect, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
 use wade::model::Model;
@@ -15,6 +15,7 @@ use wade::model::kernel::Isa;
 use wade::served::ServedVehicle;
 use wade::server::{self, Running};
 use wade::service::shm::Wait;
+use wade::service::shm_layout::PROVENANCE_LEN;
 use wade::service::wire::State;
 
 /// Long enough for a busy machine: no test is about this time.
@@ -187,6 +188,12 @@ impl Served {
             ("shm polling", Client::Shm(Box::new(self.shm(vehicle, Wait::Spin)))),
         ]
     }
+}
+
+/// What every transport must answer alike: not how long it took, and of a long provenance what shared memory has room for.
+pub fn comparable(mut reply: Reply) -> Reply {
+    reply.provenance.truncate(PROVENANCE_LEN);
+    Reply { compute_ns: 0, ..reply }
 }
 
 /// Numbers that are the same in every run: a linear congruential generator with Knuth's constants.

@@ -14,10 +14,10 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
-use super::{ImportError, Series, write};
+use super::ImportError;
 use crate::frame::GRAVITY;
 use crate::signal::SavitzkyGolay;
-use crate::trials::{Body, Manifest, Measured, Method, Table};
+use crate::trials::{self, Body, Columns, Manifest, Measured, Method, Table};
 
 /// Density of air at 20 degrees Celsius [kg/m3].
 const AIR: f64 = 1.204;
@@ -86,7 +86,7 @@ fn import_ball(sheet: &Path, ball: &Ball, name: &str, out: &Path) -> Result<(), 
     let [drop, time, height] = COLUMNS.map(|column| table.column(column));
     let volume = PI / 6.0 * ball.diameter.powi(3);
     let filter = |error| ImportError::Filter { path: sheet.to_owned(), error };
-    let mut trials: Vec<Series> = Vec::new();
+    let mut trials: Vec<Columns> = Vec::new();
     for number in [1.0, 2.0] {
         let rows: Vec<usize> = (0..drop.len()).filter(|&i| drop[i] == number).collect();
         if rows.len() < WINDOW + LEFT_OUT {
@@ -133,7 +133,7 @@ fn import_ball(sheet: &Path, ball: &Ball, name: &str, out: &Path) -> Result<(), 
         }),
         ..Manifest::default()
     };
-    write(out, &manifest, &trials)
+    Ok(trials::write(out, &manifest, &trials)?)
 }
 
 #[cfg(test)]

@@ -15,9 +15,9 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{ImportError, write};
+use super::ImportError;
 use crate::signal::{SavitzkyGolay, UniformGrid, interpolate};
-use crate::trials::{Body, Manifest, Measured, Method, Table};
+use crate::trials::{self, Body, Manifest, Measured, Method, Table};
 
 /// Ship over model.
 const SCALE: f64 = 68.0;
@@ -95,7 +95,7 @@ pub fn import(from: &Path, out: &Path) -> Result<(), ImportError> {
         }),
         ..Manifest::default()
     };
-    write(out, &manifest, &trials)
+    Ok(trials::write(out, &manifest, &trials)?)
 }
 
 /// Roll acceleration as a function of roll and roll rate.

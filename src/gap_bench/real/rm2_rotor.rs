@@ -12,9 +12,9 @@
 
 use std::path::Path;
 
-use super::{ImportError, Series, write};
+use super::ImportError;
 use crate::signal::interpolate;
-use crate::trials::{Body, Manifest, Measured, Method, Table};
+use crate::trials::{self, Body, Columns, Manifest, Measured, Method, Table};
 
 /// Diameter and height [m].
 const DIAMETER: f64 = 1.075;
@@ -42,7 +42,7 @@ const CURVES: [&str; 12] = [
 pub fn import(from: &Path, out: &Path) -> Result<(), ImportError> {
     let bare = sorted_by_ratio(&Table::read(&from.join(WITHOUT_BLADES), &COLUMNS, &[])?);
     let present = CURVES.into_iter().filter(|name| from.join(format!("{name}.csv")).exists());
-    let (mut trials, mut errors): (Vec<Series>, Vec<f64>) = (Vec::new(), Vec::new());
+    let (mut trials, mut errors): (Vec<Columns>, Vec<f64>) = (Vec::new(), Vec::new());
     for name in present {
         let table = Table::read(&from.join(format!("{name}.csv")), &COLUMNS, &[])?;
         trials.push((name.to_lowercase().replace('.', "-"), columns(&table, &bare, &mut errors)));
@@ -73,7 +73,7 @@ pub fn import(from: &Path, out: &Path) -> Result<(), ImportError> {
         }),
         ..Manifest::default()
     };
-    write(out, &manifest, &trials)
+    Ok(trials::write(out, &manifest, &trials)?)
 }
 
 /// Tip-speed ratio, power and drag coefficient, the ratio increasing.

@@ -32,7 +32,8 @@ pub fn read<M: prost::Message + Default>(name: &str, text: &[u8]) -> Result<M, R
 }
 
 fn malformed(message: &str, path: &str, reason: &str) -> Rejection {
-    let field = if path == "." { String::new() } else { path.to_owned() };
+    // a dot is the whole, a question mark what could not be read so far
+    let field = path.trim_end_matches('?').trim_end_matches('.').to_owned();
     let unknown = reason.starts_with("unrecognized field");
     let known = unknown.then(|| message_at(message, &field)).flatten().map(|message| field_names(&message));
     let reason = known.map_or_else(|| reason.to_owned(), |known| format!("{reason}; the fields are {known}"));

@@ -11,6 +11,9 @@ use crate::frame::{GRAVITY, Vec3};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
+/// Load on a surface: force [N], and moment about the body origin [N m] where the data set has it.
+pub type Load = (Vec3, Option<Vec3>);
+
 /// A vehicle as the anchored network sees it.
 #[derive(Debug, Clone)]
 pub struct Prepared {
@@ -57,13 +60,16 @@ pub struct Known {
     pub vehicle: usize,
     /// Name of the case.
     pub case: String,
+    /// Whether it is a mirror image.
+    pub image: Image,
     /// The state.
     pub condition: Condition,
     /// What is known of it.
     pub reading: Reading,
-    /// Dynamic load that each surface is to answer, see `carry`: force, and moment about the body origin where the data
-    /// set has it.
-    pub loads: Vec<(Vec3, Option<Vec3>)>,
+    /// Dynamic load that was found on each surface.
+    pub loads: Vec<Load>,
+    /// Standard deviation of the net force over the sections, a component each [N].
+    pub scatter: Vec3,
 }
 
 impl Known {
@@ -93,15 +99,9 @@ impl Known {
             let prepared = &vehicles[index];
             let mut reading = Reading::default();
             prepared.anchor.read(&prepared.vehicle, &first.condition, &mut reading);
-            let mut loads = mean_loads(data, &members, prepared);
-            carry(&mut loads, &reading);
-            Some(Self {
-                vehicle: index,
-                case: first.case.clone(),
-                condition: first.condition,
-                reading,
-                loads,
-            })
+            let (loads, scatter) = mean_loads(data, &members, prepared);
+            let (case, image, condition) = (first.case.clone(), first.image, first.condition);
+            Some(Self { vehicle: index, case, image, condition, reading, loads, scatter })
         };
         groups.into_iter().filter_map(state).collect()
     }
@@ -111,31 +111,47 @@ impl Known {
         self.reading.surfaces.iter().map(|surface| surface.hydrostatic.force).sum()
     }
 
+    /// The dynamic load that each surface is to answer: what was found, but what was found on surfaces above still water on
+    /// the wet ones, in proportion to what a coefficient is worth there; of a surface on which loads are setting in, the part
+    /// that has not set in.
+    ///
+    /// A bow wave climbs surfaces that the model keeps dry by construction. Their loads belong to the vehicle all the same:
+    /// without this the net force would lack them, or be torn between them and the loads of the single surfaces.
+    pub fn carried(&self) -> Vec<Load> {
+        let mut loads = self.loads.clone();
+        carry(&mut loads, &self.reading);
+        loads
+    }
+
     /// Net dynamic force that was found [N].
     pub fn dynamic(&self) -> Vec3 {
         self.loads.iter().map(|(force, _)| *force).sum()
     }
 }
 
-fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> Vec<(Vec3, Option<Vec3>)> {
+/// Loads averaged over samples, and the standard deviation of their net force.
+fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> (Vec<Load>, Vec3) {
     let mut sums = vec![(Vec3::zeros(), Some(Vec3::zeros())); prepared.order.len()];
+    let mut nets = Vec::with_capacity(members.len());
     for &member in members {
         let found = label::dynamic(&prepared.vehicle, &prepared.order, &data.samples[member]);
+        let mut net = Vec3::zeros();
         for (sum, load) in sums.iter_mut().zip(found) {
+            net += load.force;
             sum.0 += load.force;
             sum.1 = sum.1.zip(load.moment).map(|(sum, moment)| sum + moment);
         }
+        nets.push(net);
     }
     let count = members.len() as f64;
-    sums.into_iter().map(|(force, moment)| (force / count, moment.map(|m| m / count))).collect()
+    let mean = nets.iter().sum::<Vec3>() / count;
+    let variance = nets.iter().map(|net| (net - mean).map(|x| x * x)).sum::<Vec3>() / count;
+    let loads = sums.into_iter().map(|(force, moment)| (force / count, moment.map(|m| m / count)));
+    (loads.collect(), variance.map(f64::sqrt))
 }
 
-/// Gives what was found on surfaces above still water to the wet ones, in proportion to what a coefficient is worth
-/// there; of a surface on which loads are setting in, the part that has not set in.
-///
-/// A bow wave climbs surfaces that the model keeps dry by construction. Their loads belong to the vehicle all the same:
-/// without this the net force would lack them, or be torn between them and the loads of the single surfaces.
-fn carry(loads: &mut [(Vec3, Option<Vec3>)], reading: &Reading) {
+/// See [`Known::carried`].
+fn carry(loads: &mut [Load], reading: &Reading) {
     let whole: f64 = reading.surfaces.iter().map(|surface| surface.unit).sum();
     if whole == 0.0 {
         return;

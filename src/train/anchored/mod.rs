@@ -1,30 +1,36 @@
 //! Learning the remainder that the anchored model adds to hydrostatics and a simple drag ([`crate::anchor`]).
 //!
-//! Reading order: `known` (states and what CFD found), `loss`, this file (rows, the networks, where the training cases
-//! lie), `spread` (how far the answer may be off).
+//! Reading order: `known` (states and what CFD found), `gaussian` and `teacher` (what the cases say together), `between`
+//! (the states in which it is taught), `loss`, this file (rows, the network, where the training cases lie), `spread` (how
+//! far the answer may be off).
 
+mod between;
+mod gaussian;
 pub mod known;
 pub mod loss;
 pub mod spread;
+mod teacher;
 
 use std::time::Instant;
 
 use nalgebra::DMatrix;
 
 use super::checkpoint::Checkpoint;
-use super::fit::{Epoch, Fit};
+use super::fit::Epoch;
 use super::layers::{Layers, Sizes};
 use super::score::{Judged, Score};
 use super::task::Task;
 use super::variant::{Objective, Rows};
 use super::{Config, Sides, Source, TrainError, Trained, TrainedVehicle, domain, run};
 use crate::anchor::{COORDINATES, DYNAMIC, GLOBAL, OUTPUTS, STATIC};
+use crate::dataset::Image;
 use crate::frame::Vec3;
 use crate::model::network::WIDTH;
 use crate::model::{Anchored, Form, SPREAD, Weights};
 use crate::random::Random;
 use known::{Known, Prepared};
 use spread::{Missed, Spread};
+use teacher::Teacher;
 
 /// Name in files and reports.
 pub const NAME: &str = "anchored";
@@ -35,8 +41,8 @@ pub const SIZES: Sizes = Sizes { inputs: STATIC + DYNAMIC + GLOBAL, width: WIDTH
 /// Share of the training cases that keep at most the usual distance to their nearest neighbor.
 const USUAL: f64 = 0.95;
 
-/// Trains one network for all vehicles of a data set, and as many besides as there are folds, each without a part of
-/// the training cases, from whose errors there the first learns how far it may be off.
+/// Trains one network for all vehicles of a data set to answer as the regressions do that are fitted to the training cases,
+/// and to say how far off these are in a case that they do not know.
 pub fn train(
     source: &Source,
     sides: Sides<'_>,
@@ -49,14 +55,18 @@ pub fn train(
     let vehicles = Prepared::all(&source.data, &source.vehicles)?;
     let states = |numbers: &[usize]| Known::states(&source.data, numbers, &vehicles);
     let (training, held_out) = (states(&sides.split.training), states(&sides.split.held_out));
-    let mut form = form(&training);
-    let task = task(&training, &held_out, &vehicles, &form, config)?;
+    let (mut form, unit) = form(&training);
+    let teacher = Teacher::new(&training, &vehicles, unit)?;
+    let mut random = Random::new(config.seed);
+    let taught =
+        between::taught(&training, &vehicles, &teacher, (&unit, config.anchored.between), &mut random);
+    let task = task(&taught, &held_out, &vehicles, &form, config)?;
     let begun = Instant::now();
     let (fit, epochs) = run(&task, config, checkpoint, progress)?;
     let epoch_s = (epochs > 0).then(|| begun.elapsed().as_secs_f64() / f64::from(epochs));
     let (mut layers, kept_epoch) = fit.kept();
     let history = fit.state.history;
-    let errors = errors_of_folds(&training, &vehicles, &form, config, checkpoint)?;
+    let errors = teacher.errors(training.len());
     let spread = Spread::fit(&missed(&layers, &training, &vehicles, &form, &errors));
     form.spread = spread.factors.map(|k| k as f32);
     layers.set_output(SPREAD, &spread.weights, spread.bias);
@@ -69,11 +79,12 @@ pub fn train(
 }
 
 /// Least unit of each coordinate of a state ([`crate::anchor::Reading::coordinates`]): what matters physically also where
-/// the training cases hardly differ. A tenth of a tilt; but whether the bed moves shows in the near-bed layer alone.
-const LEAST_UNIT: [f64; COORDINATES] = [0.05, 0.05, 0.05, 0.2, 0.2, 0.1, 0.1, 1.0];
+/// the training cases hardly differ. A tenth of a tilt; but whether the bed moves changes the load by a twentieth, so that
+/// a state over the other bed is no stranger.
+const LEAST_UNIT: [f64; COORDINATES] = [0.05, 0.05, 0.05, 0.2, 0.2, 0.1, 0.1, 10.0];
 
-/// Standardisation, and where the training cases lie.
-fn form(training: &[Known]) -> Box<Anchored> {
+/// Standardisation, and where the training cases lie, with the unit of each coordinate.
+fn form(training: &[Known]) -> (Box<Anchored>, [f64; COORDINATES]) {
     let (mean, std) = super::task::moments(training.iter().map(|state| state.reading.global));
     let scale = units(training.iter().map(|state| state.reading.coordinates));
     let mut form = Box::new(Anchored {
@@ -102,7 +113,7 @@ fn form(training: &[Known]) -> Box<Anchored> {
     let usual = (USUAL * nearest.len() as f64) as usize;
     form.near = nearest.get(usual).or(nearest.last()).copied().unwrap_or(1.0);
     form.cases = places;
-    form
+    (form, scale)
 }
 
 /// Standard deviation of each coordinate, or the least unit where that is larger.
@@ -146,7 +157,8 @@ fn rows(state: &Known, prepared: &Prepared, form: &Anchored, config: &Config) ->
     let scale = config.anchored.loss.scale(state, prepared);
     let length = prepared.vehicle.dimensions.length;
     let surfaces = &state.reading.surfaces;
-    let targets = surfaces.iter().zip(&state.loads);
+    let loads = state.carried();
+    let targets = surfaces.iter().zip(&loads);
     Rows {
         vehicle: state.vehicle,
         inputs: inputs(state, prepared, form),
@@ -167,38 +179,6 @@ fn inputs(state: &Known, prepared: &Prepared, form: &Anchored) -> Vec<f32> {
 /// A column of inputs a surface.
 fn columns(state: &Known, prepared: &Prepared, form: &Anchored) -> DMatrix<f32> {
     DMatrix::from_vec(SIZES.inputs, prepared.fixed.len(), inputs(state, prepared, form))
-}
-
-/// What each training state is missed by, by the network that has not learnt from its case.
-fn errors_of_folds(
-    training: &[Known],
-    vehicles: &[Prepared],
-    form: &Anchored,
-    config: &Config,
-    checkpoint: Option<&Checkpoint>,
-) -> Result<Vec<Vec3>, TrainError> {
-    let mut cases: Vec<&str> = training.iter().map(|state| state.case.as_str()).collect();
-    cases.sort_unstable();
-    cases.dedup();
-    let order = Random::new(config.seed).permutation(cases.len());
-    let folds = config.anchored.folds.min(cases.len());
-    let mut errors = vec![Vec3::zeros(); training.len()];
-    for fold in 0..folds {
-        let out = |state: &&Known| {
-            let place = cases.binary_search(&state.case.as_str()).unwrap_or_default();
-            order[place] % folds == fold
-        };
-        let inside: Vec<Known> = training.iter().filter(|state| !out(state)).cloned().collect();
-        let outside: Vec<Known> = training.iter().filter(out).cloned().collect();
-        let task = task(&inside, &outside, vehicles, form, config)?;
-        let checkpoint = checkpoint.map(|checkpoint| checkpoint.part(fold + 1));
-        let (fit, _): (Fit<'_>, _) = run(&task, config, checkpoint.as_ref(), &|_| ())?;
-        let (layers, _) = fit.kept();
-        for (state, error) in training.iter().zip(&mut errors).filter(|(state, _)| out(state)) {
-            *error = predict(&layers, state, &vehicles[state.vehicle], form) - state.dynamic();
-        }
-    }
-    Ok(errors)
 }
 
 /// Net dynamic force [N].
@@ -226,7 +206,9 @@ fn missed(
             wet.map(|(column, surface)| (hidden.column(column).iter().copied().collect(), surface.unit));
         Missed { surfaces: surfaces.collect(), error: (*error).into() }
     };
-    training.iter().zip(errors).map(of).collect()
+    // an image is missed by as much as its original
+    let originals = training.iter().zip(errors).filter(|(state, _)| state.image == Image::Original);
+    originals.map(of).collect()
 }
 
 impl Trained<Box<Anchored>> {

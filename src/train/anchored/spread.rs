@@ -1,7 +1,6 @@
-//! How far the answer may be off, learnt from states that were held out of it.
+//! How far the answer may be off, learnt from what each case would be missed by, were it not known.
 //!
-//! Each training case is held out of one of several networks; what that network then misses is an honest error. The
-//! network that is served learns the size of these errors: it states for each surface a measure `m_s >= 0`, and the
+//! The regressions that teach the network state that error for every training case. The network learns its size: it states for each surface a measure `m_s >= 0`, and the
 //! standard deviation of a component c of the net force is `k_c sum_s unit_s m_s`. Only the row of the last layer that
 //! answers `m_s` and the `k_c` are fitted, so the forces stay as they were. The loss is the negative log-likelihood of a
 //! Laplace distribution, `ln d + sqrt(2) |error| / d` with the deviation d: errors of CFD have long tails.

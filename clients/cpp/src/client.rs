@@ -1,0 +1,182 @@
+//! A client over any transport.
+
+use std::time::{Duration, Instant};
+
+use wade::service::shm::Wait;
+use wade::service::wire::InvalidState;
+
+use crate::abi::{WADE_MAX_BATCH, WADE_NEVER, WadeBatch, WadeForces, WadeState, WadeStatus};
+use crate::connection::Connection;
+use crate::convert::checked;
+use crate::grpc::Grpc;
+use crate::last::{Last, nanoseconds_since};
+use crate::shm::Shm;
+
+/// Longest budget that the clock is asked for.
+const DAY: Duration = Duration::from_secs(86_400);
+
+/// A client of one vehicle of one server. Any number of threads may call it; their calls are answered one at a time.
+pub struct WadeClient {
+    transport: Transport,
+    max_batch: usize,
+    /// When the last batch was asked that was answered.
+    batch_asked: std::sync::Mutex<Option<Instant>>,
+}
+
+enum Transport {
+    Shm(Shm),
+    Grpc(Grpc),
+}
+
+/// Where a server is, from what `wade_options.address` says.
+pub enum Address {
+    /// Shared memory of a namespace.
+    Shm(String),
+    /// gRPC at a URL.
+    Grpc(String),
+}
+
+impl Address {
+    /// Reads "shm:NAMESPACE", "unix:PATH" or "HOST:PORT".
+    pub fn parse(address: &str) -> Option<Self> {
+        match address.split_once(':')? {
+            ("shm", namespace) if !namespace.is_empty() => Some(Self::Shm(namespace.to_owned())),
+            ("unix", path) if !path.is_empty() => Some(Self::Grpc(address.to_owned())),
+            ("shm" | "unix", _) => None,
+            _ => {
+                let (host, port) = address.rsplit_once(':')?;
+                let valid = !host.is_empty() && !host.contains('/') && port.parse::<u16>().is_ok();
+                valid.then(|| Self::Grpc(format!("http://{address}")))
+            }
+        }
+    }
+}
+
+impl WadeClient {
+    /// Starts to look for the server. None where an option is wrong or the system gives no thread.
+    pub fn open(address: &Address, vehicle: &str, wait: Wait, max_batch: u32) -> Option<Self> {
+        if vehicle.is_empty() || max_batch > WADE_MAX_BATCH {
+            return None;
+        }
+        let max_batch = max_batch as usize;
+        let transport = match address {
+            Address::Shm(namespace) => Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch).ok()?),
+            Address::Grpc(url) => Transport::Grpc(Grpc::open(url.clone(), vehicle, max_batch).ok()?),
+        };
+        Some(Self { transport, max_batch, batch_asked: std::sync::Mutex::default() })
+    }
+
+    /// Whether it is connected.
+    pub fn connection(&self) -> &Connection {
+        match &self.transport {
+            Transport::Shm(client) => client.connection(),
+            Transport::Grpc(client) => client.connection(),
+        }
+    }
+
+    fn last(&self) -> &Last {
+        match &self.transport {
+            Transport::Shm(client) => client.last(),
+            Transport::Grpc(client) => client.last(),
+        }
+    }
+
+    /// The forces in a state, or the last ones.
+    pub fn evaluate(&self, state: &WadeState, budget_ns: u64, forces: &mut WadeForces) -> WadeStatus {
+        let start = Instant::now();
+        let deadline = start + Duration::from_nanos(budget_ns).min(DAY);
+        let valid = match checked(state) {
+            Ok(valid) => valid,
+            Err(invalid) => {
+                self.last().get(forces);
+                forces.blame(invalid);
+                return WadeStatus::InvalidState;
+            }
+        };
+        match &self.transport {
+            Transport::Shm(client) => client.evaluate(&valid, state.session, start, deadline, forces),
+            Transport::Grpc(client) => client.evaluate(&valid, state.session, start, deadline, forces),
+        }
+    }
+
+    /// The forces in the states of a batch, or none.
+    pub fn evaluate_batch(
+        &self,
+        states: &[WadeState],
+        budget_ns: u64,
+        forces: &mut [WadeForces],
+        batch: &mut WadeBatch,
+    ) -> WadeStatus {
+        let start = Instant::now();
+        let deadline = start + Duration::from_nanos(budget_ns).min(DAY);
+        *batch = WadeBatch::default();
+        if states.is_empty() || states.len() > self.max_batch {
+            return WadeStatus::InvalidArgument;
+        }
+        let invalid =
+            states.iter().enumerate().find_map(|(index, state)| Some((index, checked(state).err()?)));
+        let status = match (invalid, &self.transport) {
+            (Some((index, invalid)), _) => batch.blame(index, invalid),
+            (None, Transport::Shm(client)) => client.evaluate_batch(states, start, deadline, forces),
+            (None, Transport::Grpc(client)) => client.evaluate_batch(states, start, deadline, forces),
+        };
+        if let Some(mut asked) = crate::bounded::lock_until(&self.batch_asked, deadline) {
+            if status == WadeStatus::Ok {
+                *asked = Some(start);
+            }
+            batch.age_ns = asked.map_or(WADE_NEVER, nanoseconds_since);
+        }
+        status
+    }
+
+    /// Ends the client's thread.
+    pub fn close(self) {
+        match self.transport {
+            Transport::Shm(client) => client.close(),
+            Transport::Grpc(client) => client.close(),
+        }
+    }
+}
+
+impl Default for WadeBatch {
+    fn default() -> Self {
+        Self { age_ns: WADE_NEVER, invalid_index: 0, invalid_field: 0, invalid_problem: 0, reserved: 0 }
+    }
+}
+
+impl WadeBatch {
+    fn blame(&mut self, index: usize, invalid: InvalidState) -> WadeStatus {
+        self.invalid_index = index as u32;
+        (self.invalid_field, self.invalid_problem) = (invalid.field as u32, invalid.problem as u32);
+        WadeStatus::InvalidState
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_names_its_transport() {
+        let shown = |address| match Address::parse(address) {
+            Some(Address::Shm(namespace)) => format!("shm {namespace}"),
+            Some(Address::Grpc(url)) => format!("grpc {url}"),
+            None => "none".into(),
+        };
+        for (address, expected) in [
+            ("shm:wade", "shm wade"),
+            ("unix:/tmp/wade.sock", "grpc unix:/tmp/wade.sock"),
+            ("127.0.0.1:50051", "grpc http://127.0.0.1:50051"),
+            ("[::1]:50051", "grpc http://[::1]:50051"),
+            ("shm:", "none"),
+            ("unix:", "none"),
+            ("localhost", "none"),
+            ("localhost:", "none"),
+            (":50051", "none"),
+            ("http://localhost:50051", "none"),
+            ("localhost:99999", "none"),
+        ] {
+            assert_eq!(shown(address), expected, "{address}");
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! Over gRPC a thread of the client's own has the connection: the caller hands it the question and waits for the answer.
+
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use tokio::io::unix::AsyncFd;
+use wade::client::{ClientError, GrpcLink, Reply, replies};
+use wade::service::wire::State;
+
+use crate::abi::{WADE_SESSION_BEGINS, WadeForces, WadeState, WadeStatus};
+use crate::bounded::{lock, lock_until};
+use crate::connection::{Connection, RETRY, status_of};
+use crate::event::Event;
+use crate::last::{Last, nanoseconds_since};
+use crate::skipped::Skipped;
+
+/// A question that is open for longer than this has no server any more; also how long connecting may take.
+const LOST_AFTER: Duration = Duration::from_secs(1);
+
+/// A client over gRPC.
+pub struct Grpc {
+    shared: Arc<Shared>,
+    worker: JoinHandle<()>,
+}
+
+struct Shared {
+    url: String,
+    vehicle: String,
+    connection: Connection,
+    last: Last,
+    turn: Mutex<Turn>,
+    /// The question for the worker, of which `asked` tells it.
+    question: Mutex<Option<Question>>,
+    asked: Arc<Event>,
+    /// What the worker did last, of which `answered` tells.
+    done: Mutex<Done>,
+    answered: Event,
+    batch: Mutex<Batch>,
+}
+
+/// What belongs to the one thread whose call it is.
+#[derive(Default)]
+struct Turn {
+    number: u64,
+    /// The question of an earlier call. There is never more than one.
+    open: Option<u64>,
+    skipped: Skipped,
+}
+
+#[derive(Clone, Copy)]
+struct Question {
+    number: u64,
+    at: Instant,
+    what: What,
+}
+
+#[derive(Clone, Copy)]
+enum What {
+    State {
+        state: State,
+        session: u64,
+    },
+    /// The states lie in [`Shared::batch`].
+    Batch,
+}
+
+#[derive(Clone, Copy)]
+struct Done {
+    number: u64,
+    status: WadeStatus,
+}
+
+/// Room that is reserved when the client is opened.
+struct Batch {
+    states: Vec<State>,
+    forces: Vec<WadeForces>,
+}
+
+impl Grpc {
+    /// Starts to connect to `http://HOST:PORT` or `unix:PATH`.
+    pub fn open(url: String, vehicle: &str, max_batch: usize) -> std::io::Result<Self> {
+        let batch = Batch { states: Vec::with_capacity(max_batch), forces: Vec::with_capacity(max_batch) };
+        let shared = Arc::new(Shared {
+            url,
+            vehicle: vehicle.to_owned(),
+            connection: Connection::new(),
+            last: Last::new(),
+            turn: Mutex::default(),
+            question: Mutex::default(),
+            asked: Arc::new(Event::new()?),
+            done: Mutex::new(Done { number: 0, status: WadeStatus::Ok }),
+            answered: Event::new()?,
+            batch: Mutex::new(batch),
+        });
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let worked = Arc::clone(&shared);
+        let work = move || {
+            let work = || runtime.block_on(worked.work());
+            let reason = match std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)) {
+                Ok(Ok(())) => return,
+                Ok(Err(error)) => error.to_string(),
+                Err(_) => "the thread that has the connection broke down".into(),
+            };
+            worked.connection.tell(WadeStatus::Internal, reason);
+        };
+        let worker = thread::Builder::new().name("wade-grpc".into()).spawn(work)?;
+        Ok(Self { shared, worker })
+    }
+
+    /// Whether it is connected.
+    pub fn connection(&self) -> &Connection {
+        &self.shared.connection
+    }
+
+    /// The last answer.
+    pub fn last(&self) -> &Last {
+        &self.shared.last
+    }
+
+    /// Asks for the forces in a state until the deadline, and copies the last answer: where it says `Ok`, that to this state.
+    pub fn evaluate(
+        &self,
+        state: &State,
+        session: u64,
+        start: Instant,
+        deadline: Instant,
+        forces: &mut WadeForces,
+    ) -> WadeStatus {
+        let shared = &*self.shared;
+        let mut turn = lock_until(&shared.turn, deadline);
+        let status = match &mut turn {
+            None => WadeStatus::Timeout,
+            Some(turn) => shared.evaluate(turn, state, session, start, deadline),
+        };
+        // while it is still this thread's turn, so that no other's answer comes between
+        shared.last.get(forces);
+        drop(turn);
+        status
+    }
+
+    /// Asks for the forces in the states of a batch until the deadline; all of them are written, or none.
+    pub fn evaluate_batch(
+        &self,
+        states: &[WadeState],
+        start: Instant,
+        deadline: Instant,
+        forces: &mut [WadeForces],
+    ) -> WadeStatus {
+        let shared = &*self.shared;
+        let Some(mut turn) = lock_until(&shared.turn, deadline) else { return WadeStatus::Timeout };
+        let status = shared.connection.status();
+        if status != WadeStatus::Ok {
+            return status;
+        }
+        // the worker reads the states of an open batch
+        if !shared.free(&mut turn, deadline) {
+            return WadeStatus::Timeout;
+        }
+        let Some(mut batch) = lock_until(&shared.batch, deadline) else { return WadeStatus::Timeout };
+        batch.states.clear();
+        batch.states.extend(states.iter().map(State::from));
+        drop(batch);
+        let status = shared.ask(&mut turn, What::Batch, start, deadline);
+        if status != WadeStatus::Ok {
+            return status;
+        }
+        let Some(batch) = lock_until(&shared.batch, deadline) else { return WadeStatus::Timeout };
+        let age_ns = nanoseconds_since(start);
+        for (forces, answer) in forces.iter_mut().zip(&batch.forces) {
+            *forces = WadeForces { age_ns, ..*answer };
+        }
+        WadeStatus::Ok
+    }
+
+    /// Ends the client's thread.
+    pub fn close(self) {
+        self.shared.connection.stop();
+        self.shared.asked.set();
+        // a panic of it has been told to the connection
+        let _ = self.worker.join();
+    }
+}
+
+impl Shared {
+    fn evaluate(
+        &self,
+        turn: &mut Turn,
+        state: &State,
+        session: u64,
+        start: Instant,
+        deadline: Instant,
+    ) -> WadeStatus {
+        let status = self.connection.status();
+        if status != WadeStatus::Ok {
+            // what was remembered is lost with the connection
+            turn.skipped = Skipped::default();
+            return status;
+        }
+        let time_step = turn.skipped.step(session, state.time_step);
+        let what = What::State { state: State { time_step, ..*state }, session };
+        self.ask(turn, what, start, deadline)
+    }
+
+    /// Waits until the question of an earlier call is answered; false where it is not until the deadline.
+    fn free(&self, turn: &mut Turn, deadline: Instant) -> bool {
+        if let Some(open) = turn.open
+            && self.until_done(open, deadline).is_none()
+        {
+            return false;
+        }
+        turn.open = None;
+        true
+    }
+
+    fn ask(&self, turn: &mut Turn, what: What, at: Instant, deadline: Instant) -> WadeStatus {
+        if !self.free(turn, deadline) {
+            return WadeStatus::Timeout;
+        }
+        let Some(mut question) = lock_until(&self.question, deadline) else { return WadeStatus::Timeout };
+        turn.number += 1;
+        let number = turn.number;
+        *question = Some(Question { number, at, what });
+        drop(question);
+        self.asked.set();
+        if let What::State { .. } = what {
+            turn.skipped.asked();
+        }
+        self.until_done(number, deadline).unwrap_or_else(|| {
+            turn.open = Some(number);
+            WadeStatus::Timeout
+        })
+    }
+
+    /// What the worker did with a question, unless it does not until the deadline.
+    fn until_done(&self, number: u64, deadline: Instant) -> Option<WadeStatus> {
+        loop {
+            if let Some(done) = lock_until(&self.done, deadline)
+                && done.number == number
+            {
+                return Some(done.status);
+            }
+            if !self.answered.wait(deadline) {
+                return None;
+            }
+            self.answered.clear();
+        }
+    }
+
+    /// Connects, answers until the server is lost, and connects again.
+    async fn work(&self) -> std::io::Result<()> {
+        let asked = self.asked.register()?;
+        while !self.connection.is_stopped() {
+            match self.connect().await {
+                Ok(link) => {
+                    self.connection.opened();
+                    self.serve(link, &asked).await?;
+                }
+                Err(error) => {
+                    self.connection.failed(&error);
+                    tokio::time::sleep(RETRY).await;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Connects, and sees that the server has the vehicle.
+    async fn connect(&self) -> Result<GrpcLink, ClientError> {
+        let mut link = GrpcLink::connect(&self.url, &self.vehicle, LOST_AFTER).await?;
+        link.vehicle().await?;
+        Ok(link)
+    }
+
+    /// Answers until the server is lost or the client is to end.
+    async fn serve(&self, mut link: GrpcLink, asked: &AsyncFd<Arc<Event>>) -> std::io::Result<()> {
+        let mut session = 0;
+        loop {
+            let question = lock(&self.question).take();
+            let Some(question) = question else {
+                let mut ready = asked.readable().await?;
+                self.asked.clear();
+                ready.clear_ready();
+                if self.connection.is_stopped() {
+                    return Ok(());
+                }
+                continue;
+            };
+            let answer = match question.what {
+                What::Batch => self.answer_batch(&mut link).await,
+                What::State { state, session: of } => {
+                    let forces = answer(&mut link, &state, of, &mut session).await;
+                    forces.map(|forces| self.last.put(forces, question.at))
+                }
+            };
+            let status = answer.as_ref().map_or_else(status_of, |()| WadeStatus::Ok);
+            let lost = answer.err().filter(|_| {
+                use WadeStatus::{LayoutMismatch, NoServer, Timeout, UnknownVehicle};
+                matches!(status, Timeout | NoServer | UnknownVehicle | LayoutMismatch)
+            });
+            // told before the caller goes on
+            if let Some(error) = &lost {
+                self.connection.failed(error);
+            }
+            *lock(&self.done) = Done { number: question.number, status };
+            self.answered.set();
+            if lost.is_some() {
+                return Ok(());
+            }
+        }
+    }
+
+    async fn answer_batch(&self, link: &mut GrpcLink) -> Result<(), ClientError> {
+        let states = std::mem::take(&mut lock(&self.batch).states);
+        let answer = link.evaluate_batch(&states).await.map(replies);
+        let mut batch = lock(&self.batch);
+        batch.states = states;
+        batch.forces.clear();
+        batch.forces.extend(answer?.iter().map(WadeForces::from));
+        Ok(())
+    }
+}
+
+/// The forces in a state: in the stream where it belongs to a session, which has a stream of its own.
+async fn answer(
+    link: &mut GrpcLink,
+    state: &State,
+    session: u64,
+    streamed: &mut u64,
+) -> Result<WadeForces, ClientError> {
+    if session == 0 {
+        return Ok(WadeForces::from(&Reply::from(link.evaluate(state).await?)));
+    }
+    if session != *streamed {
+        link.end_stream();
+        *streamed = session;
+    }
+    let begins = if link.has_stream() { 0 } else { WADE_SESSION_BEGINS };
+    let mut forces = WadeForces::from(&Reply::from(link.evaluate_in_stream(state).await?));
+    forces.flags |= begins;
+    Ok(forces)
+}

@@ -1,0 +1,282 @@
+//! Over shared memory the calling thread asks and waits by itself: a hand-over to another thread would cost more than the
+//! answer. The ports are opened, and given up, by a thread of the client's own.
+
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use wade::client::{Asked, ShmLink};
+use wade::service::shm::Wait;
+use wade::service::shm_layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
+use wade::service::wire::State;
+
+use crate::abi::{WadeForces, WadeState, WadeStatus};
+use crate::bounded::{lock, lock_until};
+use crate::connection::{Connection, RETRY};
+use crate::convert::answered;
+use crate::last::{Last, nanoseconds_since};
+use crate::skipped::Skipped;
+
+/// A question that is open for longer than this has no server any more. iceoryx2 says nothing of one that was killed.
+const LOST_AFTER: Duration = Duration::from_millis(200);
+
+/// A client over shared memory.
+pub struct Shm {
+    shared: Arc<Shared>,
+    keeper: JoinHandle<()>,
+}
+
+struct Shared {
+    names: Names,
+    vehicle: String,
+    wait: Wait,
+    connection: Connection,
+    last: Last,
+    turn: Mutex<Turn>,
+}
+
+/// What belongs to the one thread whose call it is.
+struct Turn {
+    link: Option<ShmLink>,
+    /// The question of an earlier call. There is never more than one, so that a server that is late is not asked for more.
+    open: Option<Open>,
+    /// What broke, for the keeper to close: that takes its time.
+    given_up: Option<(ShmLink, Option<Open>)>,
+    skipped: Skipped,
+    batch: Vec<WadeForces>,
+    /// When the first of the batches was asked that have had no answer since.
+    batch_asked: Option<Instant>,
+}
+
+struct Open {
+    asked: Asked<Query, Answer>,
+    at: Instant,
+}
+
+impl Shm {
+    /// Starts to look for the server of a namespace.
+    pub fn open(namespace: &str, vehicle: &str, wait: Wait, max_batch: usize) -> std::io::Result<Self> {
+        let turn = Turn {
+            link: None,
+            open: None,
+            given_up: None,
+            skipped: Skipped::default(),
+            batch: Vec::with_capacity(max_batch),
+            batch_asked: None,
+        };
+        let shared = Arc::new(Shared {
+            names: Names::new(namespace),
+            vehicle: vehicle.to_owned(),
+            wait,
+            connection: Connection::new(),
+            last: Last::new(),
+            turn: Mutex::new(turn),
+        });
+        let kept = Arc::clone(&shared);
+        let keeper = thread::Builder::new().name("wade-shm".into()).spawn(move || kept.keep_watched())?;
+        Ok(Self { shared, keeper })
+    }
+
+    /// Whether it is connected.
+    pub fn connection(&self) -> &Connection {
+        &self.shared.connection
+    }
+
+    /// The last answer.
+    pub fn last(&self) -> &Last {
+        &self.shared.last
+    }
+
+    /// Asks for the forces in a state until the deadline, and copies the last answer: where it says `Ok`, that to this state.
+    pub fn evaluate(
+        &self,
+        state: &State,
+        session: u64,
+        start: Instant,
+        deadline: Instant,
+        forces: &mut WadeForces,
+    ) -> WadeStatus {
+        let turn = lock_until(&self.shared.turn, deadline);
+        let Some(mut turn) = turn else {
+            self.shared.last.get(forces);
+            return WadeStatus::Timeout;
+        };
+        let query = Query { session, ..Query::from(state) };
+        let status = turn.evaluate(&self.shared, query, start, deadline);
+        self.wake_keeper(&turn);
+        // while it is still this thread's turn, so that no other's answer comes between
+        self.shared.last.get(forces);
+        status
+    }
+
+    /// Asks for the forces in the states of a batch until the deadline; all of them are written, or none.
+    pub fn evaluate_batch(
+        &self,
+        states: &[WadeState],
+        start: Instant,
+        deadline: Instant,
+        forces: &mut [WadeForces],
+    ) -> WadeStatus {
+        let Some(mut turn) = lock_until(&self.shared.turn, deadline) else {
+            return WadeStatus::Timeout;
+        };
+        let status = turn.evaluate_batch(&self.shared, states, deadline);
+        self.wake_keeper(&turn);
+        if status == WadeStatus::Ok {
+            let age_ns = nanoseconds_since(start);
+            for (forces, answer) in forces.iter_mut().zip(&turn.batch) {
+                *forces = WadeForces { age_ns, ..*answer };
+            }
+        }
+        status
+    }
+
+    fn wake_keeper(&self, turn: &Turn) {
+        if turn.given_up.is_some() {
+            self.keeper.thread().unpark();
+        }
+    }
+
+    /// Ends the client's thread.
+    pub fn close(self) {
+        self.shared.connection.stop();
+        self.keeper.thread().unpark();
+        // a panic of it has been told to the connection
+        let _ = self.keeper.join();
+    }
+}
+
+impl Turn {
+    fn evaluate(&mut self, shared: &Shared, query: Query, start: Instant, deadline: Instant) -> WadeStatus {
+        let Some(link) = &mut self.link else { return shared.why_not() };
+        let query = Query { time_step_s: self.skipped.step(query.session, query.time_step_s), ..query };
+        if let Some(open) = &self.open {
+            match link.answer(&open.asked, deadline, answered) {
+                Ok(Some(answer)) => {
+                    if let Ok(forces) = answer {
+                        shared.last.put(forces, open.at);
+                    }
+                    self.open = None;
+                }
+                Ok(None) if open.at.elapsed() < LOST_AFTER => return WadeStatus::Timeout,
+                Ok(None) => return self.give_up(shared, WadeStatus::Timeout),
+                Err(_) => return self.give_up(shared, WadeStatus::NoServer),
+            }
+        }
+        let Ok(asked) = link.ask(query) else { return self.give_up(shared, WadeStatus::NoServer) };
+        self.skipped.asked();
+        match link.answer(&asked, deadline, answered) {
+            Ok(Some(Ok(forces))) => {
+                shared.last.put(forces, start);
+                WadeStatus::Ok
+            }
+            Ok(Some(Err(refused))) => refused,
+            Ok(None) => {
+                self.open = Some(Open { asked, at: start });
+                WadeStatus::Timeout
+            }
+            Err(_) => self.give_up(shared, WadeStatus::NoServer),
+        }
+    }
+
+    fn evaluate_batch(&mut self, shared: &Shared, states: &[WadeState], deadline: Instant) -> WadeStatus {
+        let Self { link, batch, batch_asked, .. } = self;
+        let Some(link) = link else { return shared.why_not() };
+        batch.clear();
+        while batch.len() < states.len() {
+            let chunk = &states[batch.len()..];
+            let chunk = &chunk[..chunk.len().min(MAX_BATCH)];
+            let queries = chunk
+                .iter()
+                .map(|state| Query { session: state.session, ..Query::from(&State::from(state)) });
+            let since = *batch_asked.get_or_insert_with(Instant::now);
+            let taken = link.ask_batch(queries).and_then(|asked| {
+                link.answer_batch(&asked, deadline, |answer| take(answer, chunk.len(), batch))
+            });
+            if let Ok(Some(_)) = taken {
+                *batch_asked = None;
+            }
+            match taken {
+                Ok(Some(WadeStatus::Ok)) => {}
+                Ok(Some(refused)) => return refused,
+                Ok(None) if since.elapsed() < LOST_AFTER => return WadeStatus::Timeout,
+                Ok(None) => return self.give_up(shared, WadeStatus::Timeout),
+                Err(_) => return self.give_up(shared, WadeStatus::NoServer),
+            }
+        }
+        WadeStatus::Ok
+    }
+
+    fn give_up(&mut self, shared: &Shared, status: WadeStatus) -> WadeStatus {
+        shared.connection.lost();
+        // what was remembered is lost with the link
+        (self.skipped, self.batch_asked) = (Skipped::default(), None);
+        self.given_up = self.link.take().map(|link| (link, self.open.take()));
+        status
+    }
+}
+
+/// Adds the answers to a part of a batch to those before it. A bundle that was exchanged on the way would mix two versions in
+/// one answer: then it is begun again.
+fn take(answer: &BatchAnswer, count: usize, batch: &mut Vec<WadeForces>) -> WadeStatus {
+    if answer.status != Status::Ok as u32 {
+        return if answer.refusal().is_some() { WadeStatus::InvalidState } else { WadeStatus::Refused };
+    }
+    let answers = &answer.answers[..count];
+    let version = answers.first().map(|answer| answer.bundle_version);
+    if batch.first().is_some_and(|first| Some(first.bundle_version) != version) {
+        batch.clear();
+    } else {
+        batch.extend(answers.iter().map(WadeForces::from));
+    }
+    WadeStatus::Ok
+}
+
+impl Shared {
+    /// Why there is no link.
+    fn why_not(&self) -> WadeStatus {
+        match self.connection.status() {
+            WadeStatus::Ok => WadeStatus::NoServer,
+            status => status,
+        }
+    }
+
+    fn keep_watched(&self) {
+        let kept = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.keep()));
+        if kept.is_err() {
+            self.connection
+                .tell(WadeStatus::Internal, "the thread that keeps the connection broke down".into());
+        }
+    }
+
+    /// Opens a link where there is none, and closes what was given up.
+    fn keep(&self) {
+        while !self.connection.is_stopped() {
+            let mut turn = lock(&self.turn);
+            let (given_up, linked) = (turn.given_up.take(), turn.link.is_some());
+            drop(turn);
+            if let Some((link, open)) = given_up {
+                drop((open, link));
+            }
+            if linked {
+                thread::park();
+                continue;
+            }
+            match ShmLink::open(&self.names, &self.vehicle, self.wait) {
+                Ok(link) => {
+                    let mut turn = lock(&self.turn);
+                    turn.link = Some(link);
+                    self.connection.opened();
+                }
+                Err(error) => {
+                    self.connection.failed(&error);
+                    thread::park_timeout(RETRY);
+                }
+            }
+        }
+        let mut turn = lock(&self.turn);
+        let (link, open) = (turn.link.take(), turn.open.take());
+        drop(turn);
+        drop((open, link));
+    }
+}

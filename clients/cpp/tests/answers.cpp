@@ -1,0 +1,129 @@
+// Promise: the same bits over every transport, alone and in a batch, from any thread; what the server says of a vehicle is told.
+
+#include <cmath>
+#include <cstring>
+#include <thread>
+
+#include "server.hpp"
+
+using namespace test;
+
+namespace {
+
+std::vector<wade::State> states(std::size_t count) {
+  std::vector<wade::State> states;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto share = static_cast<float>(i) / static_cast<float>(count);
+    wade::State state = wade::state(0.05F + 0.2F * share);
+    state.velocity_mps[0] = 0.3F + share;
+    state.velocity_mps[1] = 0.2F - share;
+    wade_gravity_from_roll_pitch(0.1F * share, -0.05F * share, state.gravity_direction);
+    states.push_back(state);
+  }
+  return states;
+}
+
+static_assert(sizeof(wade_state) == 120, "no padding");
+static_assert(sizeof(wade_forces) == 3368, "no padding");
+
+// What does not depend on the call: bit by bit.
+bool same(wade::Forces left, wade::Forces right) {
+  left.age_ns = right.age_ns = left.answer = right.answer = left.compute_ns = right.compute_ns = 0;
+  return std::memcmp(&left, &right, sizeof left) == 0;
+}
+
+void the_same_bits_over_every_transport_alone_and_in_a_batch(const Server &server) {
+  const auto asked = states(600);  // more than shared memory carries at a time
+  std::vector<wade::Forces> reference;
+  for (const auto &address : server.addresses()) {
+    for (const auto wait : {WADE_WAIT_BLOCK, WADE_WAIT_SPIN}) {
+      wade::Client client = connected(address, "husky", {wait, 600});
+      std::vector<wade::Forces> forces(asked.size());
+      wade::Batch batch;
+      CHECK_EQUAL(client.evaluate_batch(asked, patience, forces, &batch), wade::Status::ok);
+      CHECK(batch.age_ns != WADE_NEVER && batch.age_ns == batch.age_ns);
+      if (reference.empty()) reference = forces;
+      for (std::size_t i = 0; i < asked.size(); ++i) CHECK(same(forces[i], reference[i]));
+      for (std::size_t i = 0; i < asked.size(); i += 60) {
+        wade::Forces alone;
+        CHECK_EQUAL(client.evaluate(asked[i], patience, alone), wade::Status::ok);
+        CHECK(same(alone, reference[i]));
+        CHECK_EQUAL(alone.answer, i / 60 + 1);
+        CHECK(wade::age(alone).has_value() && alone.compute_ns > 0);
+      }
+    }
+  }
+  const wade::Forces &first = reference.front();
+  CHECK(first.force_n[2] > 0.0F && first.surface_count > 4 && first.bundle_version > 0);
+  // surfaces sum to the net force where no effects are added
+  double sum = 0.0;
+  for (const auto &force : wade::surface_forces(first)) sum += static_cast<double>(force[2]);
+  CHECK(std::abs(sum - static_cast<double>(first.force_n[2])) < 1e-2);
+}
+
+void a_vehicle_is_told(const Server &server) {
+  static wade::Vehicle vehicle;
+  for (const auto &address : server.addresses()) {
+    const auto status = wade::get_vehicle(address.c_str(), "husky", patience, vehicle);
+    if (address == server.shm()) {
+      CHECK_EQUAL(status, wade::Status::invalid_argument);
+      continue;
+    }
+    CHECK_EQUAL(status, wade::Status::ok);
+    CHECK_EQUAL(std::string(vehicle.name), std::string("husky"));
+    CHECK(vehicle.mass_kg > 10.0 && vehicle.length_m > 0.5 && vehicle.inertia_kgm2[0] > 0.0);
+    CHECK(vehicle.domain[WADE_QUANTITY_DEPTH].minimum < vehicle.domain[WADE_QUANTITY_DEPTH].maximum);
+    wade::Client client = connected(address);
+    wade::Forces forces;
+    CHECK_EQUAL(client.evaluate(wading(), patience, forces), wade::Status::ok);
+    CHECK_EQUAL(forces.surface_count, vehicle.surface_count);
+    for (const auto &surface : wade::surfaces(vehicle)) CHECK(surface.name[0] != '\0' && surface.area_m2 > 0.0);
+    CHECK_EQUAL(wade::get_vehicle(address.c_str(), "nautilus", patience, vehicle), wade::Status::unknown_vehicle);
+  }
+}
+
+void threads_share_a_client(const Server &server) {
+  const auto asked = states(8);
+  for (const auto &address : server.addresses()) {
+    wade::Client client = connected(address);
+    std::vector<wade::Forces> expected(asked.size());
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      CHECK_EQUAL(client.evaluate(asked[i], patience, expected[i]), wade::Status::ok);
+    }
+    std::vector<std::thread> threads;
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      threads.emplace_back([&, i] {
+        wade::Forces forces;
+        for (int turn = 0; turn < 20; ++turn) {
+          CHECK_EQUAL(client.evaluate(asked[i], patience, forces), wade::Status::ok);
+          CHECK(same(forces, expected[i]));
+        }
+      });
+    }
+    for (auto &thread : threads) thread.join();
+  }
+}
+
+void attitudes_agree() {
+  float by_angles[3], by_quaternion[3];
+  const float roll = 0.3F, pitch = -0.2F;
+  wade_gravity_from_roll_pitch(roll, pitch, by_angles);
+  // pitch about y, then roll about x, no yaw
+  const double cr = std::cos(roll / 2.0), sr = std::sin(roll / 2.0), cp = std::cos(pitch / 2.0), sp = std::sin(pitch / 2.0);
+  const float world_from_body[4] = {static_cast<float>(cp * cr), static_cast<float>(cp * sr), static_cast<float>(sp * cr),
+                                    static_cast<float>(-sp * sr)};
+  wade_gravity_from_quaternion(world_from_body, by_quaternion);
+  for (int i = 0; i < 3; ++i) CHECK(std::abs(by_angles[i] - by_quaternion[i]) < 1e-6F);
+  CHECK(std::abs(by_angles[0] - std::sin(pitch)) < 1e-6F);  // nose up: gravity points to the rear
+}
+
+}  // namespace
+
+int main() {
+  attitudes_agree();
+  Server server;
+  server.start();
+  the_same_bits_over_every_transport_alone_and_in_a_batch(server);
+  a_vehicle_is_told(server);
+  threads_share_a_client(server);
+}

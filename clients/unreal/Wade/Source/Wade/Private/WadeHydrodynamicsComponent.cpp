@@ -1,0 +1,258 @@
+#include "WadeHydrodynamicsComponent.h"
+
+#include "Components/PrimitiveComponent.h"
+#include "Engine/World.h"
+#include "GameFramework/Actor.h"
+#include "PBDRigidsSolver.h"
+#include "Physics/Experimental/PhysScene_Chaos.h"
+#include "PhysicsEngine/BodyInstance.h"
+#include "WadeAxes.h"
+#include "WadeDebugDraw.h"
+#include "WadeLink.h"
+#include "WadeModule.h"
+#include "WadeSettings.h"
+#include "WadeSimCallback.h"
+
+namespace
+{
+	constexpr uint64 VehicleTimeoutNs = 2000000000;
+
+	EWadeLinkState Shown(wade::LinkState State)
+	{
+		switch (State)
+		{
+		case wade::LinkState::Connecting:
+			return EWadeLinkState::Connecting;
+		case wade::LinkState::Serving:
+			return EWadeLinkState::Serving;
+		case wade::LinkState::Stale:
+			return EWadeLinkState::Stale;
+		case wade::LinkState::Lost:
+			return EWadeLinkState::Lost;
+		case wade::LinkState::UnknownVehicle:
+			return EWadeLinkState::UnknownVehicle;
+		case wade::LinkState::Incompatible:
+			return EWadeLinkState::Incompatible;
+		case wade::LinkState::Refused:
+			return EWadeLinkState::Refused;
+		}
+		return EWadeLinkState::Disconnected;
+	}
+}
+
+UWadeHydrodynamicsComponent::UWadeHydrodynamicsComponent()
+{
+	PrimaryComponentTick.bCanEverTick = true;
+	PrimaryComponentTick.TickGroup = TG_PrePhysics;
+}
+
+void UWadeHydrodynamicsComponent::BeginPlay()
+{
+	Super::BeginPlay();
+	if (!FWadeModule::IsLibraryLoaded())
+	{
+		return;
+	}
+	UPrimitiveComponent* Body = FindBody();
+	if (Body == nullptr)
+	{
+		UE_LOG(LogWade, Error, TEXT("%s: the root component is not a primitive, so that the water has no body to act on."), *GetOwner()->GetName());
+		return;
+	}
+	const UWadeSettings* Settings = GetDefault<UWadeSettings>();
+	Link = MakeShared<FWadeLink, ESPMode::ThreadSafe>(Settings->Address(), Vehicle, Settings->bPollForAnswers);
+	FPhysScene* Scene = GetWorld()->GetPhysicsScene();
+	if (!Link->IsOpen() || Scene == nullptr)
+	{
+		return;
+	}
+	wade::Pacing Pacing;
+	Pacing.substep = 1.0e-3 * Settings->SubstepMilliseconds;
+	Pacing.budget_ns = 1000ull * Settings->BudgetMicroseconds;
+	Callback = Scene->GetSolver()->CreateAndRegisterSimCallbackObject_External<FWadeSimCallback>();
+	Callback->Begin(Link, Pacing);
+	Body->OnComponentPhysicsStateChanged.AddDynamic(this, &UWadeHydrodynamicsComponent::OnPhysicsStateChanged);
+	SetLinkState(EWadeLinkState::Connecting);
+}
+
+void UWadeHydrodynamicsComponent::EndPlay(const EEndPlayReason::Type EndPlayReason)
+{
+	if (UPrimitiveComponent* Body = FindBody())
+	{
+		Body->OnComponentPhysicsStateChanged.RemoveDynamic(this, &UWadeHydrodynamicsComponent::OnPhysicsStateChanged);
+	}
+	FPhysScene* Scene = GetWorld()->GetPhysicsScene();
+	if (Callback != nullptr && Scene != nullptr)
+	{
+		// the solver frees it when its thread is done with it, and with it the last hold on the link
+		Scene->GetSolver()->UnregisterAndFreeSimCallbackObject_External(Callback);
+	}
+	Callback = nullptr;
+	Link.Reset();
+	Latest.Reset();
+	SetLinkState(EWadeLinkState::Disconnected);
+	Super::EndPlay(EndPlayReason);
+}
+
+void UWadeHydrodynamicsComponent::TickComponent(float DeltaTime, ELevelTick TickType, FActorComponentTickFunction* ThisTickFunction)
+{
+	Super::TickComponent(DeltaTime, TickType, ThisTickFunction);
+	if (Callback == nullptr)
+	{
+		return;
+	}
+	TakeOutput();
+	GiveInput();
+	if (bDrawDebug && Latest.IsValid())
+	{
+		DrawWadeForces(GetWorld(), *Latest, DebugScale);
+	}
+}
+
+void UWadeHydrodynamicsComponent::OnPhysicsStateChanged(UPrimitiveComponent* /*Changed*/, EComponentPhysicsStateChange Change)
+{
+	if (Callback != nullptr && Change == EComponentPhysicsStateChange::Destroyed)
+	{
+		Callback->GetProducerInputData_External()->Scene = FWadeScene();
+	}
+}
+
+UPrimitiveComponent* UWadeHydrodynamicsComponent::FindBody() const
+{
+	return Cast<UPrimitiveComponent>(GetOwner()->GetRootComponent());
+}
+
+bool UWadeHydrodynamicsComponent::SampleWaterAt(const FVector& Location, FWadeWaterSample& Sample) const
+{
+	switch (WaterSource)
+	{
+	case EWadeWaterSource::Actor:
+		return WaterActor != nullptr && WaterActor->Implements<UWadeWaterSurface>()
+			&& IWadeWaterSurface::Execute_SampleWater(WaterActor, Location, Sample);
+	case EWadeWaterSource::Callback:
+		return WaterCallback.IsBound() && WaterCallback.Execute(Location, Sample);
+	default:
+		Sample = Water;
+		return true;
+	}
+}
+
+void UWadeHydrodynamicsComponent::TakeOutput()
+{
+	while (Chaos::TSimCallbackOutputHandle<FWadeSimOutput> Output = Callback->PopOutputData_External())
+	{
+		Latest = MakeShared<FWadeReport>(Output->Report);
+	}
+	if (!Latest.IsValid())
+	{
+		return;
+	}
+	SetLinkState(Shown(Latest->Link));
+	if (Latest->Link == wade::LinkState::Serving)
+	{
+		Link->RefreshTable(Latest->BundleVersion, Latest->CenterOfMass);
+	}
+}
+
+void UWadeHydrodynamicsComponent::GiveInput()
+{
+	FWadeScene& Scene = Callback->GetProducerInputData_External()->Scene;
+	const UPrimitiveComponent* Body = FindBody();
+	FBodyInstance* Instance = Body != nullptr ? Body->GetBodyInstance(Bone) : nullptr;
+	Scene.Proxy = Instance != nullptr ? Instance->GetPhysicsActorHandle() : nullptr;
+	if (Body == nullptr || Scene.Proxy == nullptr)
+	{
+		return;
+	}
+	Scene.HullInBody = HullInBody;
+	Scene.Table = Link->Table();
+	Scene.Beginnings = Beginnings;
+	Scene.Surroundings.z0 = wade::axes::meters_per_unit * GroundContactZ;
+	Scene.Surroundings.gravity = WadeAxes::FromUnreal(FVector(0.0, 0.0, GetWorld()->GetGravityZ()));
+	Scene.Surroundings.dry_contact = bDryContact;
+	Scene.Surroundings.session = 1 + Beginnings;
+	if (bWheelSpeedsKnown)
+	{
+		Scene.Surroundings.wheel_speeds = {{WheelSpeeds[0], WheelSpeeds[1], WheelSpeeds[2], WheelSpeeds[3]}};
+	}
+	const FVector Location = Body->GetComponentLocation();
+	FWadeWaterSample Sample;
+	Scene.bWater = SampleWaterAt(Location, Sample);
+	Scene.Water.point = WadeAxes::FromUnreal(FVector(Location.X, Location.Y, Sample.Level));
+	Scene.Water.normal = wade::axes::mirrored(WadeAxes::Plain(Sample.Normal.GetSafeNormal(UE_SMALL_NUMBER, FVector(0.0, 0.0, 1.0))));
+	Scene.Water.current = WadeAxes::FromUnreal(Sample.Velocity);
+	Scene.Water.density = Sample.Density;
+}
+
+void UWadeHydrodynamicsComponent::SetLinkState(EWadeLinkState State)
+{
+	if (State == LinkState)
+	{
+		return;
+	}
+	LinkState = State;
+	const FString Name = UEnum::GetValueAsString(State);
+	if (State == EWadeLinkState::Serving || !Link.IsValid())
+	{
+		UE_LOG(LogWade, Log, TEXT("%s (%s): %s"), *GetOwner()->GetName(), *Vehicle, *Name);
+	}
+	else
+	{
+		UE_LOG(LogWade, Warning, TEXT("%s (%s): %s. %s"), *GetOwner()->GetName(), *Vehicle, *Name, *Link->Reason());
+	}
+	OnLinkStateChanged.Broadcast(State);
+}
+
+void UWadeHydrodynamicsComponent::SetWaterCallback(FWadeSampleWater Sampler)
+{
+	WaterCallback = Sampler;
+	WaterSource = EWadeWaterSource::Callback;
+}
+
+void UWadeHydrodynamicsComponent::SetWheelSpeeds(double FrontLeft, double FrontRight, double RearLeft, double RearRight)
+{
+	WheelSpeeds[0] = FrontLeft;
+	WheelSpeeds[1] = FrontRight;
+	WheelSpeeds[2] = RearLeft;
+	WheelSpeeds[3] = RearRight;
+	bWheelSpeedsKnown = true;
+}
+
+void UWadeHydrodynamicsComponent::BeginAnew()
+{
+	++Beginnings;
+}
+
+FVector UWadeHydrodynamicsComponent::GetNetForce() const
+{
+	return Latest.IsValid() ? Latest->Force : FVector::ZeroVector;
+}
+
+double UWadeHydrodynamicsComponent::GetWaterDepth() const
+{
+	return Latest.IsValid() ? Latest->DepthCm : 0.0;
+}
+
+double UWadeHydrodynamicsComponent::GetDepthOutsideDomain() const
+{
+	return Latest.IsValid() ? Latest->DepthOutsideCm : 0.0;
+}
+
+void UWadeHydrodynamicsComponent::ReadFromServer()
+{
+	const FString& Endpoint = GetDefault<UWadeSettings>()->Endpoint;
+	if (!FWadeModule::IsLibraryLoaded())
+	{
+		return;
+	}
+	wade_vehicle Answer{};
+	const wade_status Status = wade_get_vehicle(TCHAR_TO_UTF8(*Endpoint), TCHAR_TO_UTF8(*Vehicle), VehicleTimeoutNs, &Answer);
+	if (Status != WADE_STATUS_OK)
+	{
+		UE_LOG(LogWade, Error, TEXT("%s of %s: %s"), *Vehicle, *Endpoint, UTF8_TO_TCHAR(wade_status_message(Status)));
+		return;
+	}
+	Modify();
+	GroundContactZ = Answer.z0_m / wade::axes::meters_per_unit;
+	UE_LOG(LogWade, Log, TEXT("%s: ground contact at %.2f cm; the vehicle file has a mass of %.1f kg, to be set on the body."), *Vehicle, GroundContactZ, Answer.mass_kg);
+}

@@ -1,0 +1,133 @@
+// The load of the water on a body for one step of a physics engine.
+//
+// Engines of games step half-implicitly: v += a dt, then x += v dt. Read as a leapfrog, positions are those of the ends of the
+// steps and velocities those of their middles, and the load that a step wants is the mean over the time from half a step before
+// its beginning to half a step after. That is what `step` gives: it goes back half a step along the reported velocity and
+// integrates forward over the whole one, in substeps, each of which is a question. With a step no longer than a substep this is
+// one question about the very state that the engine reports, and a float without drag keeps its swing. With a longer one the
+// load is not frozen over it: a float that leaves the water in the middle of the step gets half of the impulse. What such a
+// step adds is a damping ratio of (w dt)^3 / 48 of a swing of frequency w: 0.0008 for a small rover at 30 frames a second.
+
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "added_mass.h"
+#include "held_answer.h"
+#include "link_state.h"
+
+namespace wade {
+
+// As `wade_evaluate`: a question, a budget [ns], room for the answer.
+using Ask = std::function<wade_status(const wade_state&, std::uint64_t, wade_forces&)>;
+// A steady clock [ns].
+using Clock = std::function<std::uint64_t()>;
+
+struct Pacing {
+  // Longest time over which one answer counts [s].
+  double substep = 1.0 / 120.0;
+  // Most questions a step; a longer step has longer substeps.
+  int most_substeps = 16;
+  // Most time that a step may wait for answers, all its questions together [ns]. 0 never waits: every answer is a step late.
+  std::uint64_t budget_ns = 300000;
+};
+
+// What the caller knows beside body, motion and water.
+struct Surroundings {
+  // z of the ground-contact plane in the hull frame [m].
+  double z0 = 0.0;
+  // What pulls at the body before anything is known of the forces on it, world [m/s2].
+  Vec3 gravity{0.0, 0.0, -9.81};
+  // Front left, front right, rear left, rear right [rad/s].
+  std::optional<std::array<double, 4>> wheel_speeds;
+  // No water pressure under the contact patches.
+  bool dry_contact = false;
+  // Number of the run for effects that remember; 0 for none.
+  std::uint64_t session = 0;
+};
+
+// What to put on the body for the whole step.
+struct StepLoad {
+  // World [N].
+  Vec3 force;
+  // About the center of mass, world [N m].
+  Vec3 moment;
+  // Where the body is in the water at the step's beginning.
+  Immersion immersion;
+  // Questions asked, and those of them that were answered in time.
+  int asked = 0;
+  int answered = 0;
+};
+
+class Hydrodynamics {
+ public:
+  Hydrodynamics(Ask ask, Clock clock, Pacing pacing)
+      : ask_(std::move(ask)), clock_(std::move(clock)), pacing_(pacing) {}
+
+  // Loads for a step of `time` [s].
+  StepLoad step(const Body& body, const Motion& motion, const Water& water, const Surroundings& surroundings,
+                double time);
+
+  // After a teleport: the velocity of the step before says nothing of forces.
+  void begin_anew();
+
+  // Null takes it away.
+  void set_rest_table(std::shared_ptr<const RestTable> table) { table_ = std::move(table); }
+
+  LinkState link() const { return monitor_.state(); }
+
+  // What the server last answered; its loads per surface are for drawing.
+  const wade_forces& forces() const { return forces_; }
+
+ private:
+  struct WaterLoad {
+    Vec6 load;
+    Mat6 added{};
+  };
+  struct Step {
+    const Body& body;
+    const Water& water;
+    const Surroundings& surroundings;
+    std::uint64_t deadline = 0;
+    bool silent = false;
+  };
+  struct Sent {
+    std::uint64_t time = 0;
+    HeldAnswer::Asked asked;
+  };
+
+  Vec6 external(const Body& body, const Motion& motion, const Vec3& gravity) const;
+  WaterLoad water_load(Step& step, const Motion& motion, double time, StepLoad& out);
+  bool answered(Step& step, const Motion& motion, const Immersion& immersion, StepLoad& out);
+  void take(const Body& body, HeldAnswer::Asked asked);
+  void take_late(const Body& body, std::uint64_t now);
+
+  Ask ask_;
+  Clock clock_;
+  Pacing pacing_;
+  std::shared_ptr<const RestTable> table_;
+  LinkMonitor monitor_;
+  HeldAnswer held_;
+  wade_forces forces_{};
+  std::uint64_t last_answer_ = 0;
+  // questions that were not answered in time, so that a late answer finds its own
+  std::array<Sent, 8> sent_{};
+  std::size_t next_sent_ = 0;
+  double unasked_time_ = 0.0;
+  Accelerations accelerations_;
+
+  struct Before {
+    Motion motion;
+    Vec6 load;  // world
+    double time = 0.0;
+  };
+  std::optional<Before> before_;
+};
+
+}  // namespace wade

@@ -1,0 +1,204 @@
+//! Computed cases as trials, so that `wade gap` can hold a model against the flow that it was not told of: speed that
+//! changes, a bed that moves.
+//!
+//! A row is a section, stamped at its middle. The wrench is that of the water on the hull about the center of mass: the load
+//! of the case less its own load at rest on the mesh, and the exact hydrostatics of the hull with water under the tires.
+//!
+//! Signs. An unsteady case is computed in the frame of the vehicle, whose acceleration `a` the water feels as `g - a`, with
+//! an inflow that changes by `-a`. Far from the hull `grad p = rho (g - a) - rho (-a) = rho g`: no pressure gradient along
+//! the way. So the force holds no buoyancy along `a`, which a parked vehicle would feel in a current that speeds up, and is
+//! that of a vehicle that speeds up in still water: an added mass pulls against `a`.
+//! Where the bed is parked the velocity over ground is 0, and the current is minus the velocity through the water.
+
+use std::collections::BTreeMap;
+
+use super::mesh::Channel;
+use super::placement::Placement;
+use super::plan::{Plan, Set};
+use crate::condition::{Condition, GroundContact};
+use crate::dataset::{Dataset, Image, Sample};
+use crate::frame::Vec3;
+use crate::train::TrainError;
+use crate::train::label::{labels, order};
+use crate::trials::{Columns, Manifest, Measured, Method, WHEELS, WRENCH};
+use crate::vehicle::Vehicle;
+use crate::wrench::Wrench;
+
+/// The components that count unless the manifest is edited. A flow is so little noisy that the few centimeters between where
+/// a load acts and where its law puts it would show in the moments before anything else, and bend the coefficient.
+const FORCES: [&str; 3] = ["fx", "fy", "fz"];
+
+/// Why cases could not be turned into trials.
+#[derive(Debug, thiserror::Error)]
+pub enum CaseTrialsError {
+    /// Nothing of these sets is in the data set.
+    #[error(
+        "no case of {sets} is in the data set of the campaign: plan it (wade campaign plan --set), run it, collect it"
+    )]
+    Nothing {
+        /// The sets.
+        sets: String,
+    },
+    /// Surfaces that are not the vehicle's.
+    #[error(transparent)]
+    Surfaces(#[from] TrainError),
+    /// A load without a moment.
+    #[error("case `{case}` has no moments, which a wrench about the center of mass needs")]
+    NoMoments {
+        /// The case.
+        case: String,
+    },
+}
+
+/// Trials of the computed cases of some sets, one a case, with what holds for all.
+pub fn trials(
+    plan: &Plan,
+    dataset: &Dataset,
+    vehicle: &Vehicle,
+    sets: &[Set],
+) -> Result<(Manifest, Vec<Columns>), CaseTrialsError> {
+    let names = sets.iter().map(Set::to_string).collect::<Vec<_>>().join(" and ");
+    let mut cases: BTreeMap<&str, Vec<&Sample>> = BTreeMap::new();
+    let chosen = |sample: &&Sample| {
+        sample.image == Image::Original && sets.iter().any(|set| set.to_string() == sample.set)
+    };
+    for sample in dataset.samples.iter().filter(chosen) {
+        cases.entry(&sample.case).or_default().push(sample);
+    }
+    let surfaces = dataset.meta.vehicles.get(&vehicle.name).filter(|_| !cases.is_empty());
+    let surfaces = surfaces.ok_or_else(|| CaseTrialsError::Nothing { sets: names.clone() })?;
+    let order = order(vehicle, surfaces)?;
+    let wheels = wheels(plan, vehicle);
+    let (mut trials, mut noise) = (Vec::new(), Noise::default());
+    for (case, mut samples) in cases {
+        samples.sort_by_key(|sample| sample.section);
+        let wrenches = samples.iter().map(|sample| wrench(vehicle, &order, sample));
+        let wrenches: Vec<[f64; 6]> = wrenches
+            .collect::<Option<_>>()
+            .ok_or_else(|| CaseTrialsError::NoMoments { case: case.to_owned() })?;
+        noise.hear(&samples, &wrenches);
+        trials.push((case.to_owned(), columns(&samples, &wrenches, &wheels)));
+    }
+    let manifest = Manifest {
+        vehicle: vehicle.name.clone(),
+        generated: Some(format!(
+            "computed by {}, cases of {names}, means of a tenth of a second; nothing of it was measured",
+            dataset.meta.provenance
+        )),
+        channel_width: plan.cases.first().map(|case| {
+            let (settings, placement) = (&plan.campaign.settings.mesh, Placement::new(vehicle, case));
+            Channel::new(settings, &placement, vehicle.dimensions.length, case.speed_mps, 1.0).size.y
+        }),
+        measured: Measured {
+            columns: Some(FORCES.map(str::to_owned).into()),
+            method: Some(Method::Cfd),
+            ..Measured::default()
+        },
+        sensor_noise: noise.of_a_section(),
+        trial_offset: noise.of_a_mean(),
+        ..Manifest::default()
+    };
+    Ok((manifest, trials))
+}
+
+/// Wheels that have a column, with their radius [m].
+fn wheels(plan: &Plan, vehicle: &Vehicle) -> Vec<(&'static str, f64)> {
+    let Some(case) = plan.cases.first() else { return Vec::new() };
+    let wheels = Placement::new(vehicle, case).wheels(vehicle);
+    let radius = |name: &'static str| Some((name, wheels.iter().find(|w| w.surface == name)?.radius));
+    WHEELS.into_iter().filter_map(radius).collect()
+}
+
+/// The wrench of a section about the center of mass, as if water reached under the tires [N, N m].
+fn wrench(vehicle: &Vehicle, order: &[usize], sample: &Sample) -> Option<[f64; 6]> {
+    let mut sum = Wrench::default();
+    for label in labels(vehicle, order, sample) {
+        sum += Wrench { force: label.force, moment: label.moment? };
+    }
+    let wetted = Condition { ground_contact: GroundContact::Wetted, ..sample.condition };
+    for (wetted, stated) in vehicle.at_rest(&wetted).into_iter().zip(vehicle.at_rest(&sample.condition)) {
+        sum += wetted + stated * -1.0;
+    }
+    let Wrench { force: f, moment: m } = sum.moved(&Vec3::zeros(), &vehicle.center_of_mass);
+    Some([f.x, f.y, f.z, m.x, m.y, m.z])
+}
+
+fn columns(
+    samples: &[&Sample],
+    wrenches: &[[f64; 6]],
+    wheels: &[(&'static str, f64)],
+) -> Vec<(&'static str, Vec<f64>)> {
+    let of =
+        |value: &dyn Fn(&Sample) -> f64| samples.iter().map(|sample| value(sample)).collect::<Vec<f64>>();
+    let mut columns = vec![
+        ("t", of(&|s| 0.5 * (s.start_s + s.end_s))),
+        ("depth", of(&|s| s.condition.depth)),
+        ("rho", of(&|s| s.condition.density)),
+        // up = (-sin pitch, sin roll cos pitch, cos roll cos pitch)
+        ("roll", of(&|s| s.condition.up.y.atan2(s.condition.up.z))),
+        ("pitch", of(&|s| (-s.condition.up.x).asin())),
+    ];
+    type Vector = fn(&Condition) -> Vec3;
+    let vectors: [([&'static str; 3], Vector); 5] = [
+        (["vx", "vy", "vz"], |c| c.ground_velocity),
+        (["cx", "cy", "cz"], |c| c.ground_velocity - c.velocity),
+        (["wx", "wy", "wz"], |c| c.angular_velocity),
+        (["ax", "ay", "az"], |c| c.acceleration),
+        (["alx", "aly", "alz"], |c| c.angular_acceleration),
+    ];
+    for (names, vector) in vectors {
+        columns.extend((0..3).map(|axis| (names[axis], of(&|s| vector(&s.condition)[axis]))));
+    }
+    // wheels roll on a bed that moves, and stand on one that is parked
+    columns
+        .extend(wheels.iter().map(|&(name, radius)| (name, of(&|s| s.condition.ground_velocity.x / radius))));
+    columns.extend((0..6).map(|c| (WRENCH[c], wrenches.iter().map(|w| w[c]).collect())));
+    columns
+}
+
+/// What the flow does of itself: sums of squares and their numbers.
+#[derive(Debug, Default)]
+struct Noise {
+    section: [f64; 6],
+    sections: f64,
+    mean: [f64; 6],
+    means: f64,
+}
+
+impl Noise {
+    /// Takes a case in: second differences of sections where the acceleration stays what it is, which trends do not touch;
+    /// and, where the state stays the same, half the difference of the means of both halves of the window.
+    fn hear(&mut self, samples: &[&Sample], wrenches: &[[f64; 6]]) {
+        for (three, w) in samples.windows(3).zip(wrenches.windows(3)) {
+            let acceleration = three[0].condition.acceleration;
+            if three.iter().any(|sample| sample.condition.acceleration != acceleration) {
+                continue;
+            }
+            (0..6).for_each(|c| self.section[c] += (w[0][c] - 2.0 * w[1][c] + w[2][c]).powi(2) / 6.0);
+            self.sections += 1.0;
+        }
+        let half = wrenches.len() / 2;
+        if half > 0 && samples.iter().all(|sample| sample.condition == samples[0].condition) {
+            let mean =
+                |part: &[[f64; 6]], c: usize| part.iter().map(|w| w[c]).sum::<f64>() / part.len() as f64;
+            for c in 0..6 {
+                self.mean[c] += (0.5 * (mean(&wrenches[half..], c) - mean(&wrenches[..half], c))).powi(2);
+            }
+            self.means += 1.0;
+        }
+    }
+
+    fn of_a_section(&self) -> BTreeMap<String, f64> {
+        deviations(&self.section, self.sections)
+    }
+
+    fn of_a_mean(&self) -> BTreeMap<String, f64> {
+        deviations(&self.mean, self.means)
+    }
+}
+
+/// Standard deviations by component; none where nothing was heard.
+fn deviations(squares: &[f64; 6], count: f64) -> BTreeMap<String, f64> {
+    let heard = WRENCH.into_iter().zip(squares).filter(|_| count > 0.0);
+    heard.map(|(name, sum)| (name.to_owned(), (sum / count).sqrt())).collect()
+}

@@ -1,0 +1,105 @@
+//! States between the cases, in which the network is taught what the cases say together.
+
+use super::known::{Known, Prepared};
+use super::teacher::Teacher;
+use crate::anchor::{COORDINATES, Reading};
+use crate::condition::Condition;
+use crate::frame::Vec3;
+use crate::random::Random;
+use nalgebra::UnitVector3;
+
+/// Neighbors among which the other end is drawn.
+const NEIGHBORS: usize = 8;
+/// How far states go beyond either case, in units of their distance.
+const BEYOND: f64 = 0.3;
+
+/// The training states and `count` states for each between it and a neighbor, all with the loads that the teacher gives.
+pub fn taught(
+    training: &[Known],
+    vehicles: &[Prepared],
+    teacher: &Teacher,
+    (unit, count): (&[f64; COORDINATES], usize),
+    random: &mut Random,
+) -> Vec<Known> {
+    let mut taught = Vec::with_capacity(training.len() * (count + 1));
+    for state in training {
+        let prepared = &vehicles[state.vehicle];
+        let learn = |condition: Condition| {
+            let mut reading = Reading::default();
+            prepared.anchor.read(&prepared.vehicle, &condition, &mut reading);
+            let loads = teacher.loads(state.vehicle, (&condition, &reading), prepared)?;
+            Some(Known { condition, reading, loads, ..state.clone() })
+        };
+        let Some(itself) = learn(state.condition) else {
+            taught.push(state.clone());
+            continue;
+        };
+        taught.push(itself);
+        let near = neighbors(state, training, unit);
+        for _ in 0..count {
+            let Some(other) = near.get((random.unit() * near.len() as f64) as usize) else { break };
+            let share = (1.0 + 2.0 * BEYOND) * random.unit() - BEYOND;
+            taught.extend(learn(between(&state.condition, &other.condition, share)));
+        }
+    }
+    taught
+}
+
+fn neighbors<'a>(state: &Known, all: &'a [Known], unit: &[f64; COORDINATES]) -> Vec<&'a Known> {
+    let distance = |other: &Known| -> f64 {
+        let (a, b) = (&state.reading.coordinates, &other.reading.coordinates);
+        (0..COORDINATES).map(|i| ((a[i] - b[i]) / unit[i]).powi(2)).sum()
+    };
+    let others = all.iter().filter(|other| other.vehicle == state.vehicle);
+    let mut others: Vec<(f64, &Known)> = others.map(|other| (distance(other), other)).collect();
+    others.retain(|(distance, _)| *distance > 0.0);
+    others.sort_by(|a, b| a.0.total_cmp(&b.0));
+    others.into_iter().take(NEIGHBORS).map(|(_, other)| other).collect()
+}
+
+/// A state on the line through two, `share` of the way from the first; seen from the side to which each moves.
+fn between(first: &Condition, second: &Condition, share: f64) -> Condition {
+    let mix = |a: f64, b: f64| a + share * (b - a);
+    // a depth or speed is extrapolated by at most half of itself
+    let positive = |a: f64, b: f64| mix(a, b).max(0.5 * a.min(b));
+    let polar = |c: &Condition| (c.velocity.xy().norm(), c.velocity.y.abs().atan2(c.velocity.x));
+    let ((speed, heading), (other_speed, other_heading)) = (polar(first), polar(second));
+    let speed = positive(speed, other_speed);
+    let (sin, cos) = mix(heading, other_heading).clamp(0.0, std::f64::consts::PI).sin_cos();
+    let velocity = Vec3::new(speed * cos, speed * sin, mix(first.velocity.z, second.velocity.z));
+    let up = |c: &Condition| {
+        let side = if c.velocity.y < 0.0 { -1.0 } else { 1.0 };
+        Vec3::new(c.up.x, c.up.y * side, c.up.z)
+    };
+    let bed = |c: &Condition| {
+        let square = c.velocity.norm_squared();
+        if square > 0.0 { c.ground_velocity.dot(&c.velocity) / square } else { 0.0 }
+    };
+    Condition {
+        velocity,
+        ground_velocity: velocity * mix(bed(first), bed(second)),
+        depth: positive(first.depth, second.depth),
+        density: positive(first.density, second.density),
+        up: UnitVector3::new_normalize(up(first).lerp(&up(second), share)),
+        ..*first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_lies_on_the_line_and_motion_to_the_right_counts_as_its_image() {
+        let first = Condition::level(Vec3::new(1.0, -1.0, 0.0), 0.10);
+        let second = Condition { density: 1200.0, ..Condition::level(Vec3::new(0.0, 2.0, 0.0), 0.30) };
+        let middle = between(&first, &second, 0.5);
+        let speed = 0.5 * (2.0_f64.sqrt() + 2.0);
+        let expected = Vec3::new((67.5_f64).to_radians().cos(), (67.5_f64).to_radians().sin(), 0.0) * speed;
+        assert!((middle.velocity - expected).norm() < 1e-12 && (middle.depth - 0.2).abs() < 1e-12);
+        assert!((middle.ground_velocity - middle.velocity).norm() < 1e-12 && middle.density == 1100.0);
+        let start = between(&first, &second, 0.0).velocity;
+        assert!((start - Vec3::new(1.0, 1.0, 0.0)).norm() < 1e-12, "{start}");
+        assert_eq!(between(&first, &second, -10.0).depth, 0.05, "no state above the ground");
+    }
+}

@@ -1,0 +1,208 @@
+//! Promise: the cases of a campaign become trials with the signs of a vehicle that drives: its wrench about the center of
+//! mass, its acceleration, the current past a parked one, its turning wheels, and the noise of the flow.
+
+mod common;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+use wade::cfd::case::Settings;
+use wade::cfd::plan::{Campaign, Case, FORMAT, Plan, Set, hull_hash};
+use wade::condition::GroundContact;
+use wade::dataset::{self, Dataset, Image, Meta, Rest, Sample, SurfaceLoad};
+use wade::forces::Forces;
+use wade::frame::Vec3;
+use wade::model::{Model, Workspace};
+use wade::train;
+use wade::trials::{Method, Trials};
+
+/// Water that moves with the hull in the generated loads [kg].
+const ADDED_KG: f64 = 80.0;
+/// Where its inertia acts [m].
+const POINT: [f64; 3] = [0.2, 0.0, -0.3];
+/// What the mesh displaces over what the hull does.
+const STAIRCASE: f64 = 1.04;
+
+/// Unsteady cases head-on and broadside, a paper case, its driving twin: planned, not computed.
+fn plan(model: &Model) -> Plan {
+    let campaign = Campaign {
+        format: FORMAT,
+        vehicle: "warthog".into(),
+        hull_sha256: hull_hash(model.vehicle()),
+        table: train::Config::default().analytic.tables["warthog"],
+        settings: Settings::default(),
+    };
+    let mut plan = Plan { campaign, cases: Vec::new() };
+    plan.extend(Set::Unsteady, 0, 1, 0.5).expect("planned");
+    plan.extend(Set::Paper, 3, 1, 0.5).expect("planned");
+    plan.extend(Set::Driving, 1, 1, 0.5).expect("planned");
+    plan
+}
+
+/// The state in the middle of a section: half a second before the ramp, the ramp, two seconds after it.
+fn state(case: &Case, section: u32) -> (f64, f64) {
+    let t = 0.1 * (f64::from(section) + 0.5) - 0.5;
+    let progress = if case.is_unsteady() { (t / case.ramp_s).clamp(0.0, 1.0) } else { 0.0 };
+    let change = case.end_speed_mps - case.speed_mps;
+    let acceleration = if progress > 0.0 && progress < 1.0 { change / case.ramp_s } else { 0.0 };
+    (case.speed_mps + progress * change, acceleration)
+}
+
+/// Loads that no solver computed: what the model says, the mesh's own load at rest, and `added` kilograms of inertia at
+/// [`POINT`]; a force of `flutter` newtons that changes its sign from section to section.
+fn sample(model: &Model, case: &Case, section: u32, added: f64, flutter: f64) -> Sample {
+    let vehicle = model.vehicle();
+    let (speed, acceleration) = state(case, section);
+    let condition = case.condition(speed, acceleration);
+    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    model.evaluate(&condition, &mut workspace, &mut forces);
+    let exact = vehicle.at_rest(&condition);
+    let mut surfaces: Vec<SurfaceLoad> = forces
+        .surfaces
+        .iter()
+        .zip(&exact)
+        .map(|(load, exact)| {
+            let rest = Rest { force: exact.force * STAIRCASE, moment: exact.moment * STAIRCASE };
+            SurfaceLoad {
+                force: load.force - exact.force + rest.force,
+                moment: Some(load.point.cross(&load.force) - exact.moment + rest.moment),
+                viscous: None,
+                rest: Some(rest),
+            }
+        })
+        .collect();
+    let sign = if section % 2 == 0 { 1.0 } else { -1.0 };
+    let force = condition.acceleration * -added + Vec3::x() * (flutter * sign);
+    surfaces[0].force += force;
+    surfaces[0].moment = surfaces[0].moment.map(|moment| moment + Vec3::from(POINT).cross(&force));
+    let start_s = 4.9 + 0.1 * f64::from(section);
+    Sample {
+        vehicle: "warthog".into(),
+        case: case.id.clone(),
+        set: case.set.to_string(),
+        image: Image::Original,
+        section,
+        start_s,
+        end_s: start_s + 0.1,
+        condition,
+        surfaces,
+    }
+}
+
+/// A campaign whose loads are generated.
+fn campaign(folder: &Path, model: &Model, added: f64, flutter: f64) {
+    let plan = plan(model);
+    plan.write(folder).expect("written");
+    let names = model.vehicle().surfaces.iter().map(|surface| surface.name.clone()).collect();
+    let meta = Meta {
+        provenance: "generated for a test".into(),
+        ground_contact: GroundContact::Dry,
+        vehicles: [("warthog".to_owned(), names)].into(),
+        notes: [].into(),
+    };
+    let sections = |case: &Case| if case.is_unsteady() { (10.0 * (2.5 + case.ramp_s)) as u32 } else { 20 };
+    let of =
+        |case: &Case| (0..sections(case)).map(|i| sample(model, case, i, added, flutter)).collect::<Vec<_>>();
+    let dataset = Dataset { meta, samples: plan.cases.iter().flat_map(of).collect() };
+    dataset::write(&folder.join("sections.parquet"), &dataset).expect("written");
+}
+
+fn wade(campaign: &Path, sets: &[&str], out: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+    command.args(["campaign", "trials"]).arg(campaign).env("WADE_VEHICLES", common::vehicles());
+    for set in sets {
+        command.args(["--set", set]);
+    }
+    command.arg("--out").arg(out).output().expect("wade runs")
+}
+
+fn trials(model: &Model, added: f64, flutter: f64, sets: &[&str]) -> Trials {
+    let folder = TempDir::new().expect("a folder");
+    let (source, out) = (folder.path().join("campaign"), folder.path().join("trials"));
+    campaign(&source, model, added, flutter);
+    let output = wade(&source, sets, &out);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let manifest = out.join("trials.toml");
+    let text = std::fs::read_to_string(&manifest).expect("written");
+    let forces = "columns = [\"fx\", \"fy\", \"fz\"]\n";
+    assert!(text.contains(forces), "forces alone unless it is edited: {text}");
+    std::fs::write(&manifest, text.replace(forces, "")).expect("written");
+    Trials::read(&out).expect("sound trials")
+}
+
+#[test]
+fn an_accelerating_hull_is_held_back_by_the_water_that_moves_with_it() {
+    let model = common::model("warthog");
+    let (with, without) =
+        (trials(&model, ADDED_KG, 0.0, &["unsteady"]), trials(&model, 0.0, 0.0, &["unsteady"]));
+    assert_eq!((with.trials.len(), with.manifest.measured.method), (15, Some(Method::Cfd)));
+    assert!(with.manifest.generated.as_ref().is_some_and(|how| how.contains("nothing of it was measured")));
+    let arm = Vec3::from(POINT) - model.vehicle().center_of_mass;
+    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    let mut sped_up = 0;
+    for (with, without) in with.trials.iter().zip(&without.trials) {
+        for i in 0..with.len() {
+            let wrench = |trial: &wade::trials::Trial| {
+                let of = |c: usize| trial.measured[c].as_ref().expect("measured")[i];
+                (Vec3::new(of(0), of(1), of(2)), Vec3::new(of(3), of(4), of(5)))
+            };
+            let ((force, moment), (still, still_moment)) = (wrench(with), wrench(without));
+            let inertia = with.acceleration[i] * -ADDED_KG;
+            assert!((force - still - inertia).norm() < 0.01, "{} {i}", with.name);
+            assert!((moment - still_moment - arm.cross(&inertia)).norm() < 0.01, "{} {i}", with.name);
+            // forward, faster: held back, and with it about the center of mass
+            if with.acceleration[i].x > 0.0 {
+                sped_up += 1;
+                assert!(force.x < still.x && with.condition(i, GroundContact::Wetted).velocity.x > 0.9);
+            }
+            // without it, what the model says, with water under the tires as in every query
+            let condition = without.condition(i, GroundContact::Wetted);
+            model.evaluate(&condition, &mut workspace, &mut forces);
+            assert!((still - forces.wrench.force).norm() < 0.05, "{} {i}", with.name);
+        }
+        assert!(with.velocity.iter().all(|v| *v == Vec3::zeros()), "the bed is parked");
+    }
+    assert!(sped_up > 50, "{sped_up}");
+}
+
+#[test]
+fn a_driving_vehicle_moves_over_ground_and_its_wheels_roll() {
+    let model = common::model("warthog");
+    let trials = trials(&model, 0.0, 3.0, &["driving", "paper"]);
+    let driving = trials.trials.iter().find(|trial| trial.name.contains("driving")).expect("a driving case");
+    let parked = driving.name.replace("driving", "paper");
+    let parked = trials.trials.iter().find(|trial| trial.name == parked).expect("its twin");
+    let through = |trial: &wade::trials::Trial| trial.condition(0, GroundContact::Wetted).velocity;
+    assert!((through(driving) - through(parked)).norm() < 1e-6, "the same state through the water");
+    assert!(through(driving).x > 0.3);
+    assert_eq!((driving.current[0], parked.velocity[0]), (Vec3::zeros(), Vec3::zeros()));
+    let wheel = |trial: &wade::trials::Trial| trial.wheel_speeds[0].as_ref().expect("a wheel")[0];
+    assert_eq!(wheel(parked), 0.0);
+    let vehicle = model.vehicle();
+    let tire: Vec<usize> = vehicle.hull.faces_of(vehicle.surface_index("wheel_fl").expect("there")).collect();
+    let height = vehicle.hull.mesh.part(&tire).bounds().expect("faces").extent().z;
+    assert!((wheel(driving) * 0.5 * height - driving.velocity[0].x).abs() < 1e-6, "it rolls, without slip");
+    // +3, -3, +3 N: second differences of 12 N, of which white noise has the root of 6 times its own
+    let noise = trials.manifest.sensor_noise["fx"];
+    assert!((noise - 12.0 / 6_f64.sqrt()).abs() < 0.05, "{noise}");
+    assert!(trials.manifest.trial_offset["fx"] < 0.05, "both halves of the window have the same mean");
+    assert!((trials.manifest.channel_width.expect("known") - 3.94 * vehicle.dimensions.length).abs() < 1e-6);
+}
+
+#[test]
+fn what_is_not_there_or_would_be_mixed_is_refused() {
+    let model = common::model("warthog");
+    let folder = TempDir::new().expect("a folder");
+    let (source, out) = (folder.path().join("campaign"), folder.path().join("trials"));
+    campaign(&source, &model, 0.0, 0.0);
+    let refused = |sets: &[&str], says: &str| {
+        let output = wade(&source, sets, &out);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && message.contains(says), "{message}");
+    };
+    refused(&["wide"], "no case of wide");
+    assert!(!out.exists());
+    assert!(wade(&source, &["paper"], &out).status.success());
+    refused(&["paper"], "holds trials already");
+}
