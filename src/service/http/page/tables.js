@@ -101,7 +101,7 @@ export function showLatency({ latencies, window_s: window }) {
   const head = row("th", ["transport", "vehicle", "last", "p50 [µs]", "p99 [µs]", "all", "p50 [µs]", "p99 [µs]"]);
   const micros = (percentiles, name) => (percentiles.count > 0 ? percentiles[name].toFixed(1) : "–");
   const part = (percentiles) => [String(percentiles.count), micros(percentiles, "p50_us"), micros(percentiles, "p99_us")];
-  const lines = latencies.map((entry) => {
+  const lines = latencies.filter((entry) => entry.since_start.count > 0).map((entry) => {
     const name = TRANSPORTS[entry.transport] ?? entry.transport;
     return row("td", [name, entry.vehicle, ...part(entry.window), ...part(entry.since_start)]);
   });
