@@ -4,20 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::candidates::Setting;
 use super::series::Series;
-use crate::effects::{self, Effect, Memory, Shape};
+use crate::effects::{self, Effect, Memory};
 use crate::frame::{GRAVITY, Vec3};
 
-/// Drag of the prediction as coefficients on windward areas: least squares over forces beside buoyancy and lift, by the law
-/// that leaves less, with the whole speed or the speed along each axis. The wrong one has no drag across a hull that
-/// drives ahead and only seems to move sideways.
+/// Drag of the prediction as coefficients on windward areas: least squares over forces beside buoyancy and lift.
 pub(super) fn base_drag(all: &[Series], setting: &Setting) -> Vec3 {
-    let fits = [0.0, 1.0].map(|law| of_law(all, setting, &[law, 0.0, 0.0]));
-    let best = fits.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
-    best.map_or_else(Vec3::zeros, |(drag, _)| drag)
-}
-
-/// Coefficients, and the change of the sum of squares.
-fn of_law(all: &[Series], setting: &Setting, law: &Shape) -> Option<(Vec3, f64)> {
     const COLUMNS: usize = 5;
     let mut xx = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
     let mut xy = DVector::<f64>::zeros(COLUMNS);
@@ -28,7 +19,7 @@ fn of_law(all: &[Series], setting: &Setting, law: &Shape) -> Option<(Vec3, f64)>
             let mut rows = [[0.0; COLUMNS]; 3];
             effects::basis(
                 Effect::DragCoefficientError,
-                law,
+                &[0.0; 3],
                 &Memory::default(),
                 &input,
                 |coefficient, _, load| (0..3).for_each(|axis| rows[axis][coefficient] += load.force[axis]),
@@ -56,8 +47,8 @@ fn of_law(all: &[Series], setting: &Setting, law: &Shape) -> Option<(Vec3, f64)>
         xx[(i, j)] / (scale[i] * scale[j]) + if i == j { 1e-6 } else { 0.0 }
     });
     let right = DVector::from_fn(COLUMNS, |i, _| xy[i] / scale[i]);
-    let solved = scaled.cholesky()?.solve(&right);
+    let Some(factor) = scaled.cholesky() else { return Vec3::zeros() };
+    let solved = factor.solve(&right);
     // a drag that is not excited is taken as none
-    let drag = Vec3::from_fn(|i, _| (solved[i] / scale[i]).clamp(0.0, 5.0));
-    Some((drag, -solved.dot(&right)))
+    Vec3::from_fn(|i, _| (solved[i] / scale[i]).clamp(0.0, 5.0))
 }

@@ -8,9 +8,7 @@ use super::candidates::Setting;
 use super::design::Design;
 use super::detect::{self, Excitation};
 use super::experiment::separating;
-use super::features::{ACCELERATION, of_bins};
 use super::fit::{Fit, Parameter, fit};
-use super::gated::{Gated, gated};
 use super::holdout::{closures, explained, worse};
 use super::noise::{Floor, floors_of};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
@@ -60,13 +58,9 @@ pub(super) fn compose(
         _ => Vec::new(),
     };
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
-    let gated = match found.verdict {
-        Verdict::NoCandidateFits => gated(all, judge, library),
-        _ => None,
-    };
     let (regions, regions_tried) = match found.verdict {
         Verdict::NothingMissing => (Vec::new(), 0),
-        _ => locate::locate(all, &design.trials, gap_excess, gated.map(|gated| gated.limits), config),
+        _ => locate::locate(all, &design.trials, gap_excess, config),
     };
     let excitation =
         detect::excitations(design, all, setting, &trials.manifest, &found.residual, &config.library, config);
@@ -79,10 +73,8 @@ pub(super) fn compose(
         let effects = |set: &[Member]| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
         separating(&effects(&found.members), &effects(rival))
     });
-    let left: Vec<Vec<[f64; 6]>> =
-        held.iter().map(|&trial| left(&named, &all[trial], trial, setting)).collect();
-    let held_floors = floors_of(all, &held, &left, judge.floors, &setting.components);
-    let unexplained = unexplained(judge, &found, gated);
+    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
+    let unexplained = unexplained(judge, &found);
     let gap = GapReport {
         held_out: closures(&named, all, &held, setting, &held_floors, config),
         size: detect::sizes(all, judge.floors, &setting.components, config),
@@ -116,12 +108,6 @@ pub(super) fn compose(
     };
     report.summary = summary(&report);
     report
-}
-
-/// What the named effects leave of a trial's gap.
-fn left(named: &[Named], series: &Series, trial: usize, setting: &Setting) -> Vec<[f64; 6]> {
-    let added = explained(named, series, trial, setting);
-    series.gap.iter().zip(added).map(|(gap, added)| std::array::from_fn(|c| gap[c] - added[c])).collect()
 }
 
 fn names(judge: &Judge, set: &[Member]) -> Vec<&'static str> {
@@ -250,7 +236,7 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
     ])
 }
 
-fn unexplained(judge: &Judge, found: &Found, gated: Option<Gated>) -> Option<String> {
+fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
     let left = &found.left;
     let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
     let share = left.gain / whole;
@@ -264,20 +250,11 @@ fn unexplained(judge: &Judge, found: &Found, gated: Option<Gated>) -> Option<Str
     }
     let functions: Vec<String> =
         left.strongest.iter().map(|(name, share)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
-    let mut text = format!(
+    Some(format!(
         "{:.0} % of the gap above the floor can be predicted from the state beyond the named effects; it goes most with {}",
         (100.0 * share).clamp(0.0, 100.0),
         functions.join(", ")
-    );
-    if let Some(gated) = gated {
-        text += &format!(
-            "; where {} it is like {} and {:.0} % of it goes with that, and nothing of it elsewhere",
-            locate::in_words(&gated.limits),
-            gated.effect.name().replace('_', " "),
-            100.0 * gated.share.min(1.0)
-        );
-    }
-    Some(text)
+    ))
 }
 
 /// Squared standardised gap of each bin less that of noise.
@@ -295,20 +272,19 @@ fn excess(all: &[Series], design: &Design, setting: &Setting, trial: usize) -> V
 
 fn validity(all: &[Series]) -> BTreeMap<&'static str, [f64; 2]> {
     type Quantity = fn(&Condition) -> f64;
-    let quantities: [(&'static str, Quantity); 4] = [
+    let quantities: [(&'static str, Quantity); 5] = [
         ("depth_m", |c| c.depth),
         ("speed_mps", |c| c.velocity.norm()),
+        ("acceleration_mps2", |c| c.acceleration.norm()),
         ("angular_speed_radps", |c| c.angular_velocity.norm()),
         ("density_kgpm3", |c| c.density),
     ];
-    // single samples of noise do not widen what was tested
-    let range = |mut values: Vec<f64>| [quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995)];
-    let of = |of: Quantity| range(all.iter().flat_map(|s| s.conditions.iter().map(of)).collect());
-    let mut ranges: BTreeMap<&'static str, [f64; 2]> =
-        quantities.into_iter().map(|(name, quantity)| (name, of(quantity))).collect();
-    let accelerations = all.iter().flat_map(of_bins).map(|bin| bin[ACCELERATION]).collect();
-    ranges.insert("acceleration_mps2", range(accelerations));
-    ranges
+    let range = |of: Quantity| {
+        let mut values: Vec<f64> = all.iter().flat_map(|s| s.conditions.iter().map(of)).collect();
+        // single samples of noise do not widen what was tested
+        [quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995)]
+    };
+    quantities.into_iter().map(|(name, of)| (name, range(of))).collect()
 }
 
 /// Hash over all numbers, whatever the order of the trials.

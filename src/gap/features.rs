@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::candidates::Column;
-use super::design::{Design, smooth, to_rows};
+use super::design::{Design, to_rows};
 use super::series::Series;
 use super::statistics::{quantile, white_variance};
 use crate::frame::GRAVITY;
@@ -21,9 +21,6 @@ pub(super) const FEATURES: [(&str, &str); 9] = [
     ("roll", "rad"),
 ];
 
-/// Place of the acceleration among them.
-pub(super) const ACCELERATION: usize = 3;
-
 /// Features of each bin of a trial.
 pub(super) fn of_bins(series: &Series) -> Vec<[f64; 9]> {
     let time_in_water = time_in_water(series);
@@ -35,11 +32,7 @@ pub(super) fn of_bins(series: &Series) -> Vec<[f64; 9]> {
         mean(&|i| conditions[i].velocity.norm()),
         // the mean before the norm, or noise would pass for acceleration
         {
-            let [x, y, z] = [0, 1, 2].map(|axis| {
-                let mut values = mean(&|i| conditions[i].acceleration[axis]);
-                series.runs.iter().for_each(|run| smooth(&mut values[run.clone()], 2));
-                values
-            });
+            let [x, y, z] = [0, 1, 2].map(|axis| mean(&|i| conditions[i].acceleration[axis]));
             (0..x.len()).map(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt()).collect()
         },
         mean(&|i| conditions[i].angular_velocity.z).into_iter().map(f64::abs).collect(),

@@ -1,9 +1,9 @@
 //! Parameters of the named effects, with intervals.
 //!
-//! Least squares on the rows of the design. A column with a share `s` of noise in its variance pulls its coefficient down
-//! by `1 - s` (Fuller, Measurement Error Models, section 1.2); `noise::smoothing` keeps that share below a hundredth, in the
-//! gap and all columns alike. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, and
-//! what the formula itself leaves open.
+//! Least squares on the rows of the design, corrected for noise in the accelerations: a column with a share `s` of noise in
+//! its variance pulls its coefficient down by `1 - s` (Fuller, Measurement Error Models, section 1.2), so that share is
+//! taken off the normal matrix. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, and what
+//! the formula itself leaves open.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -11,11 +11,12 @@ use serde::Serialize;
 use super::Config;
 use super::candidates::Setting;
 use super::design::Design;
+use super::rates::accelerations;
 use super::robust::errors;
 use super::select::Member;
 use super::series::Series;
 use super::statistics::quantile;
-use crate::effects::{Kind, Shape};
+use crate::effects::{Effect, Kind, Shape};
 use crate::random::Random;
 
 /// Two-sided 90 % of a normal distribution.
@@ -73,6 +74,7 @@ pub(super) fn fit(
         .flat_map(|(m, member)| member.columns.iter().map(move |&(column, k)| (m, column, k)))
         .collect();
     let columns: Vec<usize> = used.iter().map(|(_, column, _)| *column).collect();
+    let mut noise: Vec<f64> = used.iter().map(|&(m, _, k)| noise_share(design, &set[m], k, all)).collect();
     let (beta, _) = design.solve(&columns)?;
     let errors = errors(design, &columns, &design.residual(&columns, &beta))?;
     // a nonlinear parameter moves the rows like one more column; its draws are changes of its logarithm
@@ -85,12 +87,13 @@ pub(super) fn fit(
             design.shape_derivative(all, setting, set[m].candidate, axis, &own)
         })
         .collect();
+    noise.resize(columns.len() + moved.len(), 0.0);
     let clusters = clusters(design, &columns, &moved);
     let few = errors.iter().map(|e| e.trials).fold(f64::INFINITY, f64::min) < ENOUGH_TRIALS;
     let groups = if few { clusters.blocks } else { clusters.trials };
     let count = columns.len();
-    let best = weighted(&groups, &vec![1.0; groups.len()])?;
-    let draws = bootstrap(&groups, config);
+    let best = weighted(&groups, &vec![1.0; groups.len()], &noise)?;
+    let draws = bootstrap(&groups, &noise, config);
     let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
     let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
     let formula = |i: usize| match design.candidates[set[used[i].0].candidate].effect.kind() {
@@ -182,8 +185,8 @@ fn clusters(design: &Design, columns: &[usize], moved: &[DVector<f64>]) -> Clust
     Clusters { trials, blocks }
 }
 
-fn weighted(groups: &[Group], weights: &[f64]) -> Option<DVector<f64>> {
-    let count = groups.first()?.xy.len();
+fn weighted(groups: &[Group], weights: &[f64], noise: &[f64]) -> Option<DVector<f64>> {
+    let count = noise.len();
     let mut xx = DMatrix::zeros(count, count);
     let mut xy = DVector::zeros(count);
     for (group, &weight) in groups.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
@@ -191,13 +194,13 @@ fn weighted(groups: &[Group], weights: &[f64]) -> Option<DVector<f64>> {
         xy += &group.xy * weight;
     }
     for i in 0..count {
-        xx[(i, i)] *= 1.0 + 1e-9;
+        xx[(i, i)] *= 1.0 - noise[i] + 1e-9;
     }
     xx.cholesky().map(|factor| factor.solve(&xy))
 }
 
 /// Estimates from clusters drawn with replacement.
-fn bootstrap(groups: &[Group], config: &Config) -> Vec<DVector<f64>> {
+fn bootstrap(groups: &[Group], noise: &[f64], config: &Config) -> Vec<DVector<f64>> {
     let mut random = Random::new(config.seed ^ 0xb007);
     let draw = |random: &mut Random| {
         let mut weights = vec![0.0; groups.len()];
@@ -206,5 +209,25 @@ fn bootstrap(groups: &[Group], config: &Config) -> Vec<DVector<f64>> {
         }
         weights
     };
-    (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random))).collect()
+    (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random), noise)).collect()
+}
+
+/// Share of noise in the variance of a column of accelerations.
+fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Series]) -> f64 {
+    let candidate = &design.candidates[member.candidate];
+    let axes = match candidate.effect {
+        Effect::AddedMass => coefficient..coefficient + 1,
+        Effect::MassError => 0..3,
+        _ => return 0.0,
+    };
+    let (mut noise, mut power) = (0.0, 0.0);
+    for &trial in &design.trials {
+        let series = &all[trial];
+        for axis in axes.clone() {
+            noise += series.rate_noise[axis] * series.t.len() as f64;
+            power += series.conditions.iter().map(|c| accelerations(c)[axis].powi(2)).sum::<f64>();
+        }
+    }
+    // an axis that does not move has no coefficient worth a correction
+    if power > 0.0 { (noise / power).clamp(0.0, 0.3) } else { 0.0 }
 }

@@ -4,7 +4,6 @@
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
 use super::design::{RowNoise, smooth};
-use super::rates::short_lived;
 use super::series::Series;
 use super::statistics::{median, white_variance};
 use crate::signal::interpolate;
@@ -84,28 +83,18 @@ fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -
     (sum / f64::max(count, 1.0)).sqrt()
 }
 
-/// The floors of some trials alone, where no repeats state them: noise may differ from trial to trial. `left` is what the
-/// named effects leave of each trial's gap; what of it forgets itself within the reach of the filters is noise, of the
-/// sensor and of the recorded motion in the prediction.
+/// The floors of some trials alone, where they come from the trials themselves: noise may differ from trial to trial.
 pub(super) fn floors_of(
     all: &[Series],
     trials: &[usize],
-    left: &[Vec<[f64; 6]>],
     floors: &[Floor; 6],
     components: &[usize],
 ) -> [Floor; 6] {
     let mut own = *floors;
-    let count = trials.iter().map(|&trial| all[trial].t.len()).sum::<usize>().max(1) as f64;
-    for &component in components.iter().filter(|&&c| floors[c].source != FloorSource::Repeats) {
-        let noise = |(&trial, left): (&usize, &Vec<[f64; 6]>)| {
-            let values: Vec<f64> = left.iter().map(|left| left[component]).collect();
-            short_lived(&all[trial].t, &values) * values.len() as f64
-        };
-        let short = (trials.iter().zip(left).map(noise).sum::<f64>() / count).sqrt();
-        own[component].sample = match own[component].source {
-            FloorSource::Stated => own[component].sample.max(short),
-            _ => short,
-        };
+    for &component in components {
+        if own[component].source == FloorSource::HighFrequency && !trials.is_empty() {
+            own[component].sample = high_frequency(trials.iter().map(|&trial| &all[trial]), component);
+        }
     }
     own
 }
@@ -174,38 +163,28 @@ fn rms(all: &[Series], trials: &[usize], component: usize) -> f64 {
 }
 
 /// Passes of smoothing over bins after which the noise of the acceleration is a small share of it; the same smoothing goes
-/// over the gap and every column, so that none is favored and no column is pulled down.
+/// over the gap and every column, so that none is favored.
 pub(super) fn smoothing(all: &[Series], trials: &[usize]) -> usize {
     const MOST: usize = 6;
-    const SMALL: f64 = 0.01;
+    const SMALL: f64 = 0.03;
     (0..MOST).find(|&passes| acceleration_noise(all, trials, passes) < SMALL).unwrap_or(MOST)
 }
 
-/// Share of noise in the mean square of the forward acceleration's bins after some passes.
+/// Share of noise in the variance of the forward acceleration's bins after some passes.
 fn acceleration_noise(all: &[Series], trials: &[usize], passes: usize) -> f64 {
-    // `C(2n, n) / 4^n`, the mean of a cosine to the power 2n
-    let mean = |n: usize| (1..=n).map(|k| (2.0 * k as f64 - 1.0) / (2.0 * k as f64)).product::<f64>();
-    let (mut squares, mut total, mut count) = (Vec::new(), 0.0, 0.0);
-    let measured = trials.iter().all(|&trial| all[trial].acceleration_is_measured);
+    let (mut noise, mut total) = (0.0, 0.0);
     for &trial in trials {
         let series = &all[trial];
         let values = series.binned(|sample| series.conditions[sample].acceleration.x);
         for run in series.runs.iter().filter(|run| run.len() >= 8) {
-            let mut values = values[run.clone()].to_vec();
-            // third differences; most bins of most trials are free of maneuvers, so that their median is noise
-            squares.extend(values.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).powi(2)));
-            smooth(&mut values, passes);
-            total += values.iter().map(|v| v * v).sum::<f64>();
-            count += values.len() as f64;
+            let raw = white_variance(&values[run.clone()]);
+            let mut smoothed = values[run.clone()].to_vec();
+            smooth(&mut smoothed, passes);
+            // white noise keeps C(4m, 2m) / 16^m of its variance after m passes
+            let gain = if passes == 0 { 1.0 } else { (std::f64::consts::TAU * passes as f64).sqrt().recip() };
+            noise += raw * gain * run.len() as f64;
+            total += smoothed.iter().map(|v| v * v).sum::<f64>();
         }
     }
-    // the median of a square of a normal variable over its mean
-    const MEDIAN: f64 = 0.455;
-    // white noise has 20 times its variance there; the differences of white noise have 35 times theirs, and keep less of it
-    let (amplified, kept) = match measured {
-        true => (20.0, mean(2 * passes)),
-        false => (35.0, 2.0 * (mean(2 * passes) - mean(2 * passes + 1))),
-    };
-    let noise = median(&mut squares) / MEDIAN / amplified * kept;
-    if total > 0.0 { noise * count / total } else { 0.0 }
+    if total > 0.0 { noise / total } else { 0.0 }
 }

@@ -1,13 +1,17 @@
-//! Rates of a motion that was differentiated, and how much of them is signal.
+//! Rates of a motion that was differentiated: how much of them is signal, and smoothing where it is little.
 
 use super::statistics::white_variance;
-use crate::frame::Vec3;
+use crate::condition::Condition;
 use crate::signal::{SavitzkyGolay, pieces};
 
 /// Longer than the filters that differentiate a motion reach, shorter than a maneuver [s].
 const COHERENT: f64 = 0.35;
-/// Reach of two filters of nine samples, one on places and one on velocities, at the rate of a camera [s].
+/// Reach of two filters of nine samples, one on places and one on velocities, at the rate of a camera [s]; and that of one
+/// with the sample's own at slower rates.
 const REACH_S: f64 = 0.155;
+const REACH: usize = 11;
+/// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
+const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
 
 /// How a rate hangs together in time.
 #[derive(Debug, Clone, Copy, Default)]
@@ -16,6 +20,9 @@ pub(super) struct Coherence {
     pub power: f64,
     /// Sum of the products [`COHERENT`] apart.
     pub covariance: f64,
+    /// Mean square of the signal alone: the autocovariance beyond the reach `r` of the filters, back to 0 by a parabola,
+    /// `c(0) = c(r) + (c(r) - c(2 r)) / 3`, since the noise of one sample does not reach the other.
+    pub signal: f64,
 }
 
 impl Coherence {
@@ -23,53 +30,54 @@ impl Coherence {
     pub fn of(t: &[f64], value: impl Fn(usize) -> f64) -> Self {
         let values: Vec<f64> = (0..t.len()).map(value).collect();
         let step = (t[t.len() - 1] - t[0]) / (t.len().max(2) - 1) as f64;
-        let lag = (COHERENT / step.max(1e-6)).ceil() as usize;
-        Self { power: products(t, &values, 0).0, covariance: products(t, &values, lag).0 }
+        let lag = |seconds: f64| (seconds / step.max(1e-6)).ceil() as usize;
+        let reach = lag(REACH_S).max(REACH);
+        let at = |lag: usize| {
+            let pairs = pieces(t).into_iter().flat_map(|piece| {
+                let values = &values[piece];
+                values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b)
+            });
+            pairs.fold((0.0, 0.0), |(sum, count), product| (sum + product, count + 1.0))
+        };
+        let mean = |(sum, count): (f64, f64)| sum / f64::max(count, 1.0);
+        let (near, far) = (mean(at(reach)), mean(at(2 * reach)));
+        let (power, count) = at(0);
+        let signal = (near + (near - far) / 3.0).clamp(0.0, power / f64::max(count, 1.0));
+        Self { power, covariance: at(lag(COHERENT)).0, signal }
     }
 }
 
-/// Mean square of what forgets itself within the reach of the filters that made the motion: noise, of the sensor and of the
-/// motion in the prediction. The autocovariance beyond that reach `r` goes back to 0 by a parabola,
-/// `c(0) = c(r) + (c(r) - c(2 r)) / 3`, since the noise of one sample does not reach the other.
-pub(super) fn short_lived(t: &[f64], values: &[f64]) -> f64 {
-    let step = (t[t.len() - 1] - t[0]) / (t.len().max(2) - 1) as f64;
-    let reach = ((REACH_S / step.max(1e-6)).ceil() as usize).max(1);
-    let mean = |lag: usize| {
-        let (sum, count) = products(t, values, lag);
-        sum / count.max(1.0)
-    };
-    let (near, far, power) = (mean(reach), mean(2 * reach), mean(0));
-    power - (near + (near - far) / 3.0).clamp(0.0, power)
+/// Linear and angular acceleration in one row.
+pub(super) fn accelerations(condition: &Condition) -> [f64; 6] {
+    let (a, b) = (condition.acceleration, condition.angular_acceleration);
+    [a.x, a.y, a.z, b.x, b.y, b.z]
 }
 
-/// Sum of the products of values so many samples apart, and how many there are.
-fn products(t: &[f64], values: &[f64], lag: usize) -> (f64, f64) {
-    let pairs = pieces(t).into_iter().flat_map(|piece| {
-        let values = &values[piece];
-        values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b)
-    });
-    pairs.fold((0.0, 0.0), |(sum, count), product| (sum + product, count + 1.0))
-}
-
-/// Acceleration of each sample from the velocities on either side of it, in an inertial frame and body axes. Its mean over a
-/// bin is the change of the velocity over the bin, whatever happens in between: the integral form of a law in the
-/// acceleration. A filter would take off the peaks of a column, but not those of the gap.
-pub(super) fn acceleration(t: &[f64], velocity: &[Vec3], angular_velocity: &[Vec3]) -> Vec<Vec3> {
-    let turning = angular_velocity.iter().zip(velocity);
-    rates(t, velocity).into_iter().zip(turning).map(|(rate, (omega, v))| rate + omega.cross(v)).collect()
-}
-
-/// Rate of each sample from its neighbors.
-pub(super) fn rates(t: &[f64], values: &[Vec3]) -> Vec<Vec3> {
-    let mut rates = Vec::with_capacity(t.len());
-    for piece in pieces(t) {
-        let last = piece.end - 1;
-        rates.extend(piece.clone().map(|i| {
-            let (before, after) = (i.max(piece.start + 1) - 1, (i + 1).min(last));
-            (values[after] - values[before]) / (t[after] - t[before]).max(1e-9)
-        }));
+/// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
+pub(super) fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
+    let pieces = pieces(t);
+    for rate in 0..6 {
+        let values: Vec<f64> = conditions.iter().map(|c| accelerations(c)[rate]).collect();
+        let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
+        let share = white_variance(&values) / power.max(f64::MIN_POSITIVE);
+        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else {
+            continue;
+        };
+        for piece in &pieces {
+            let span = t[piece.end - 1] - t[piece.start];
+            let step = span / (piece.len().max(2) - 1) as f64;
+            let odd = (piece.len() - 1) / 2 * 2 + 1;
+            let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
+            let smooth = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
+            for (sample, value) in piece.clone().zip(smooth.into_iter().flatten()) {
+                let condition = &mut conditions[sample];
+                match rate {
+                    0..3 => condition.acceleration[rate] = value,
+                    _ => condition.angular_acceleration[rate - 3] = value,
+                }
+            }
+        }
     }
-    rates
 }
 
 /// Rate of the depth [m/s], smoothed over at most a third of a second: noise must not look like entry, nor smoothing take
@@ -114,24 +122,11 @@ mod tests {
         let filtered =
             SavitzkyGolay::new(9, 2).and_then(|f| f.derivative(&white, 1, 0.009)).expect("long enough");
         let noise = filtered.iter().map(|v| v * v).sum::<f64>() / filtered.len() as f64;
-        let both: Vec<f64> =
-            filtered.iter().zip(&t).map(|(n, t)| n + 2.0 * noise.sqrt() * (3.0 * t).sin()).collect();
-        assert!((short_lived(&t, &both) / noise - 1.0).abs() < 0.1, "{} {noise}", short_lived(&t, &both));
+        let wave = |i: usize| 2.0 * noise.sqrt() * (3.0 * t[i]).sin();
+        let both = Coherence::of(&t, |i| filtered[i] + wave(i));
+        // the wave's mean square is twice that of the noise
+        assert!((both.signal / (2.0 * noise) - 1.0).abs() < 0.05, "{both:?} {noise}");
         let alone = Coherence::of(&t, |i| filtered[i]);
-        assert!(alone.covariance / alone.power < 0.05, "{alone:?}");
-    }
-
-    #[test]
-    fn a_bin_has_the_change_of_the_velocity_over_it() {
-        // a push of half a second, v = (1 - cos(2 pi t)) / 2, at 37 Hz: the mean over 0.1 to 0.4 s is that of the push itself
-        let t: Vec<f64> = (0..38).map(|i| f64::from(i) / 37.0).collect();
-        let speed = |t: f64| 0.5 - 0.5 * (std::f64::consts::TAU * t).cos();
-        let velocity: Vec<Vec3> = t.iter().map(|&t| Vec3::new(speed(t), 0.0, 0.0)).collect();
-        let turning = vec![Vec3::z(); t.len()];
-        let found = acceleration(&t, &velocity, &turning);
-        let mean = found[4..15].iter().map(|a| a.x).sum::<f64>() / 11.0;
-        let exact = (speed(14.5 / 37.0) - speed(3.5 / 37.0)) / (11.0 / 37.0);
-        assert!((mean / exact - 1.0).abs() < 0.01, "{mean} {exact}");
-        assert!((found[10].y - speed(t[10])).abs() < 1e-12, "omega x v");
+        assert!(alone.covariance / alone.power < 0.05 && alone.signal < 0.05 * noise, "{alone:?} {noise}");
     }
 }

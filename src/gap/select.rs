@@ -17,7 +17,7 @@ use super::robust::{Error, contribution, errors, group, noise_of};
 use super::shared::outlasts_noise;
 use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
-use crate::effects::{Effect, Kind};
+use crate::effects::Effect;
 use crate::random::Random;
 
 /// Least deviate of a column that stays in a group.
@@ -29,8 +29,6 @@ const MOST_FOLDS: f64 = 0.75;
 /// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
 /// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
 const MOST_SCATTER: f64 = 0.75;
-/// Share of what a law of the water explains that it may miss where it is the right one, on a hull that it was not made for.
-const LAW: f64 = 0.05;
 /// A shifted column that still points the same way is no placebo.
 const SAME_DIRECTION: f64 = 0.9;
 
@@ -211,17 +209,6 @@ impl<'a> Judge<'a> {
                 own.remove(drop);
                 continue;
             }
-            let noisy = |i: usize| {
-                let mut others = columns.clone();
-                others.remove(at + i);
-                let part = contribution(self.design, &others, &[own[i].0], &[beta[at + i]]);
-                part.is_none_or(|part| !outlasts_noise(self.design, &part, &(&residual + &part)))
-            };
-            // a channel that shares but noise with the gap would make a fault of it
-            if let Some(drop) = (0..own.len()).find(|&i| noisy(i)).filter(|_| own.len() > 1) {
-                own.remove(drop);
-                continue;
-            }
             if outside(0) && own.len() == 1 {
                 refused = Some(Refusal::OutOfBounds);
             }
@@ -254,10 +241,6 @@ impl<'a> Judge<'a> {
         fitted: &Fitted,
     ) -> Option<Refusal> {
         let effect = self.effect(member);
-        // what comes with an effect does not come without it
-        if effect.needs_its_first() && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
-            return Some(Refusal::NotSignificant);
-        }
         // a moving bed changes drag and lift; drag alone is the drag coefficient's
         let held = &self.design.candidates[member.candidate].columns;
         if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
@@ -442,12 +425,7 @@ impl<'a> Judge<'a> {
 
     /// The best form of an effect beside a set, by every gate.
     pub fn weighed(&self, set: &[Member], effect: Effect) -> Option<Judged> {
-        let judged = self.judge(set, effect)?;
-        self.beyond_chance(set, judged)
-    }
-
-    /// The gates that look at a form once it has passed the others: its placebos, and the noise that it shares with the gap.
-    fn beyond_chance(&self, set: &[Member], mut judged: Judged) -> Option<Judged> {
+        let mut judged = self.judge(set, effect)?;
         if judged.refused.is_some() {
             return Some(judged);
         }
@@ -594,8 +572,6 @@ impl<'a> Judge<'a> {
     pub fn alternatives(&self, set: &[Member], library: &[Effect]) -> Vec<Vec<Member>> {
         let columns = self.columns(set);
         let Some(fitted) = self.design.fit(&columns) else { return Vec::new() };
-        // what the winner itself leaves says how well a law can be expected to hold
-        let misfit = (fitted.loss - self.floor_loss).max(0.0);
         let mut found = Vec::new();
         for index in 0..set.len() {
             let mut others = set.to_vec();
@@ -603,21 +579,18 @@ impl<'a> Judge<'a> {
             let without = self.design.solve(&self.columns(&others)).map_or(fitted.loss, |(_, loss)| loss);
             let explained = (without - fitted.loss).max(0.0);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
-                let rivals = self.passing(&others, effect).into_iter().filter_map(|judged| {
-                    if !self.is_rival(&judged.member, &out, &others) {
-                        return None;
-                    }
-                    let mut rival = others.clone();
-                    rival.push(judged.member);
-                    let outline = if effect.kind() == Kind::Physics { LAW * explained } else { misfit };
-                    let (difference, open) = self.difference(&rival, set, explained, outline)?;
-                    (difference <= open).then_some((difference, rival))
-                });
-                let best = rivals.min_by(|a, b| a.0.total_cmp(&b.0));
-                found.extend(best.map(|(difference, mut rival)| {
+                let Some(judged) = self.passes(&others, effect) else { continue };
+                // what needs many more numbers to say the same is no rival
+                if self.numbers(&judged.member) > self.numbers(&out) + 1 {
+                    continue;
+                }
+                let mut rival = others.clone();
+                rival.push(judged.member);
+                let Some((difference, open)) = self.difference(&rival, set, explained) else { continue };
+                if difference <= open {
                     rival.sort_by_key(|member| self.effect(member));
-                    (difference, rival)
-                }));
+                    found.push((difference, rival));
+                }
             }
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -629,50 +602,6 @@ impl<'a> Judge<'a> {
             rivals.extend(self.both(ours, theirs));
         }
         rivals
-    }
-
-    /// Forms of an effect that pass every gate beside a set: the best one by losses, and that of the fewest columns, since
-    /// what many numbers say of each channel one may say of all.
-    fn passing(&self, set: &[Member], effect: Effect) -> Vec<Judged> {
-        let best = self.passes(set, effect);
-        let base = self.columns(set);
-        let plain = || -> Option<Judged> {
-            let before = self.design.solve(&base)?.1;
-            let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
-            let (candidate, _) = forms.min_by_key(|(index, c)| (c.columns.len(), *index))?;
-            if best.as_ref().is_some_and(|best| best.member.candidate == candidate) {
-                return None;
-            }
-            let judged = self.judge_form(set, &base, before, candidate)?;
-            self.beyond_chance(set, judged).filter(|judged| judged.refused.is_none())
-        };
-        let plain = if effect == Effect::SensorGain { plain() } else { None };
-        best.into_iter().chain(plain).collect()
-    }
-
-    /// True where an effect may stand in another's place: with no more numbers, and none that nobody has ever measured. One
-    /// number more is allowed the water, where a flow has a direction; faults of single channels that agree by chance are
-    /// no explanation.
-    fn is_rival(&self, member: &Member, out: &Member, others: &[Member]) -> bool {
-        let spare = usize::from(self.effect(member).kind() != Kind::Sensor);
-        self.numbers(member) <= self.numbers(out) + spare && self.is_published(member, others)
-    }
-
-    /// True where every coefficient that has a band of published values lies in it, or a quarter beyond.
-    fn is_published(&self, member: &Member, others: &[Member]) -> bool {
-        const BEYOND: f64 = 1.25;
-        let mut columns = self.columns(others);
-        let first = columns.len();
-        columns.extend(member.columns.iter().map(|(column, _)| *column));
-        let Some((beta, _)) = self.design.solve(&columns) else { return false };
-        member.columns.iter().enumerate().all(|(i, &(column, coefficient))| {
-            let value = beta[first + i] / self.design.scale[column];
-            let band = self.effect(member).coefficients()[coefficient].literature;
-            // a band ends where nothing was measured, on either side of 0
-            let reach =
-                |end: f64, outwards: f64| if end * outwards > 0.0 { end * BEYOND } else { end / BEYOND };
-            band.is_none_or(|[low, high]| value >= reach(low, -1.0) && value <= reach(high, 1.0))
-        })
     }
 
     fn effects(&self, set: &[Member]) -> Vec<Effect> {
@@ -708,18 +637,10 @@ impl<'a> Judge<'a> {
     /// Cross-validated loss of one set over another, and how much of it two standard errors and the formulas' own
     /// uncertainty leave open, for a member that explains `explained`.
     ///
-    /// No law holds exactly: a rival of the water may miss a twentieth of what is explained, another as much again as the
-    /// winner leaves, `misfit`, but not less than a hundredth nor more than a twentieth. Beside it the scatter from trial to trial; where few trials tell the two
-    /// apart that scatter says nothing: there the noise counts, through what the two predict differently.
-    fn difference(
-        &self,
-        rival: &[Member],
-        set: &[Member],
-        explained: f64,
-        misfit: f64,
-    ) -> Option<(f64, f64)> {
+    /// The scatter from trial to trial, and a hundredth for the formula. Where few trials tell the two apart that scatter
+    /// says nothing: there the noise alone counts, through what the two predict differently, and a twentieth.
+    fn difference(&self, rival: &[Member], set: &[Member], explained: f64) -> Option<(f64, f64)> {
         const ENOUGH: f64 = 8.0;
-        let formula = misfit.clamp(0.01 * explained, 0.05 * explained);
         let (a, b) = (self.predictions(rival)?, self.predictions(set)?);
         let design = self.design;
         let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
@@ -732,11 +653,11 @@ impl<'a> Judge<'a> {
         let total: f64 = trials.iter().sum();
         if sum * sum >= ENOUGH * squares {
             let variance = trials.iter().map(|d| (d - total / count).powi(2)).sum::<f64>() / (count - 1.0);
-            return Some((total, (2.0 * (variance * count).sqrt()).max(formula)));
+            return Some((total, (2.0 * (variance * count).sqrt()).max(0.01 * explained)));
         }
         // the loss of the rival has the noise twice as often as the predictions differ
         let noise = 2.0 * noise_of(design, &(&design.y - &b), &(&a - &b)).sqrt();
-        Some((total, (2.0 * noise).max(formula)))
+        Some((total, (2.0 * noise).max(0.05 * explained)))
     }
 
     /// What a set predicts of each row by the fit without the row's fold.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::measurement::{measured, other_force};
-use super::rates::{Coherence, acceleration, rates, wetting_rate};
+use super::rates::{Coherence, accelerations, smooth_accelerations, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
@@ -31,10 +31,9 @@ pub(super) struct Series {
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one.
     pub other: Vec<[f64; 6]>,
-    /// Acceleration as the trial has it, measured or filtered [m/s2].
-    pub recorded_acceleration: Vec<Vec3>,
-    /// True where the acceleration was measured, not differentiated.
-    pub acceleration_is_measured: bool,
+    /// Noise that is left in the acceleration and the angular acceleration: an estimate of the variance of a sample, which
+    /// scatters about 0 where there is none.
+    pub rate_noise: [f64; 6],
     /// Accelerations, angular accelerations, wetting rate and angular velocities: how far each hangs together.
     pub coherence: [Coherence; 10],
     /// Samples of each bin.
@@ -144,19 +143,18 @@ fn of_trial(
         immersions.push(immersion);
         conditions.push(condition);
     }
+    // before anything is smoothed, or noise would hang together as well
     let mut coherence = [Coherence::default(); 10];
     for axis in 0..3 {
         coherence[axis] = Coherence::of(&trial.t, |i| conditions[i].acceleration[axis]);
         coherence[axis + 3] = Coherence::of(&trial.t, |i| conditions[i].angular_acceleration[axis]);
         coherence[axis + 7] = Coherence::of(&trial.t, |i| conditions[i].angular_velocity[axis]);
     }
-    if !trial.acceleration_is_measured {
-        let linear = acceleration(&trial.t, &trial.velocity, &trial.angular_velocity);
-        let angular = rates(&trial.t, &trial.angular_velocity);
-        for (condition, (linear, angular)) in conditions.iter_mut().zip(linear.into_iter().zip(angular)) {
-            (condition.acceleration, condition.angular_acceleration) = (linear, angular);
-        }
-    }
+    smooth_accelerations(&trial.t, &mut conditions);
+    let rate_noise = std::array::from_fn(|rate| {
+        let squares = conditions.iter().map(|c| accelerations(c)[rate].powi(2)).sum::<f64>();
+        squares / count.max(1) as f64 - coherence[rate].signal
+    });
     let wetting_rate = wetting_rate(&trial.t, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
     let other: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| other_force(trial, c));
@@ -172,8 +170,7 @@ fn of_trial(
         gap: gap.collect(),
         other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
         wetting_rate,
-        recorded_acceleration: trial.acceleration.clone(),
-        acceleration_is_measured: trial.acceleration_is_measured,
+        rate_noise,
         coherence,
         wheels: (0..count)
             .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))

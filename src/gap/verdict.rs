@@ -9,7 +9,7 @@ use super::lasting::lasting;
 use super::report::Verdict;
 use super::select::{Judge, Member};
 use super::series::Series;
-use crate::effects::{Effect, Kind};
+use crate::effects::Effect;
 
 /// Deviates that structure without a name needs.
 pub(super) const STRUCTURE: f64 = 5.0;
@@ -21,15 +21,8 @@ const ENERGY: [f64; 2] = [4.5, 0.8];
 /// normal numbers have heavier tails than they.
 const LASTS: f64 = 7.0;
 
-/// The same for structure where nothing is named; in nulls it reaches 3.
-const SHOWS: f64 = 6.0;
-
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
-
-/// Least share of the structure that faults of the sensor must explain where nothing else is named. Laws of the water hold
-/// in outline; a zero, a gain or a turned axis is exact, and what leaves more of the structure is another thing.
-const EXACT: f64 = 0.8;
 
 /// What the search found.
 pub(super) struct Found {
@@ -60,8 +53,6 @@ impl Found {
         let left = general.structure(design, &judge.setting.components, &residual);
         let whole = design.empty_loss() - judge.floor_loss;
         let coverage = if whole > 0.0 { (design.empty_loss() - loss) / whole } else { 1.0 };
-        let faults = members.iter().all(|member| judge.effect(member).kind() == Kind::Sensor);
-        let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
         let alternatives = judge.alternatives(members, library);
         let mut found =
             Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
@@ -70,7 +61,7 @@ impl Found {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
-        } else if coverage < needed || found.leaves_much(design) {
+        } else if coverage < config.coverage || found.leaves_much(design) {
             Verdict::NoCandidateFits
         } else if found.alternatives.is_empty() {
             Verdict::Named
@@ -105,7 +96,7 @@ impl Found {
         let kept = lasting(design, &design.y);
         structure.deviate > STRUCTURE && size > least
             || deviate > bar && energy > 2.0 * least.max(0.5)
-            || kept.deviate > SHOWS && kept.size > least
+            || kept.deviate > LASTS && kept.size > least
     }
 }
 

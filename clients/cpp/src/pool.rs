@@ -117,7 +117,7 @@ mod tests {
         assert!(!is_ours(&mut Box::new([1; 100])));
         let call = InCall::begin();
         let mut kept: Vec<_> = (0..8_u8).map(|i| Box::new([i; 100])).collect();
-        assert!(POOL.place(Box::new([0_u8; 4 * BLOCK]).as_mut_ptr()).is_none());
+        assert!(POOL.place((&mut [0_u8; 4 * BLOCK]).as_mut_ptr()).is_none());
         drop(call);
         for (i, boxed) in kept.iter_mut().enumerate() {
             assert!(is_ours(boxed) && boxed.iter().all(|&byte| usize::from(byte) == i));

@@ -29,7 +29,7 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 
 import grpc
 import numpy as np
@@ -122,13 +122,13 @@ def message_lengths(address: str) -> dict[str, tuple[int, int]]:
 
 
 @contextmanager
-def child(command: list[Any], cpu: int) -> Iterator[None]:
+def child(command: list[Any], cpu: int) -> Iterator[int]:
     """A process on one CPU, for as long as the block lasts."""
     process = subprocess.Popen(
         list(map(str, command)), preexec_fn=lambda: os.sched_setaffinity(0, {cpu}), stderr=subprocess.DEVNULL
     )
     try:
-        yield
+        yield process.pid
     finally:
         process.terminate()
         process.wait()
@@ -141,19 +141,28 @@ def free_address() -> str:
         return "{}:{}".format(*probe.getsockname())
 
 
+class Place(NamedTuple):
+    """Where a server is, and its process."""
+
+    address: str
+    unix: str
+    namespace: str
+    pid: int
+
+
 @contextmanager
-def served(binary: Path, wait: str, cpu: int) -> Iterator[tuple[str, str, str]]:
-    """Address, socket and namespace of a server of our own."""
+def served(binary: Path, wait: str, cpu: int, vehicles: Path = ROOT / "vehicles") -> Iterator[Place]:
+    """A server of our own."""
     with tempfile.TemporaryDirectory() as folder:
         address, namespace = free_address(), f"bench_{os.getpid()}_{wait}"
         settings = Path(folder) / "wade.toml"
         settings.write_text(f'[shm]\nwait = "{wait}"\nnamespace = "{namespace}"\n[http]\nlisten = ""\n')
-        command = [binary, "serve", "--config", settings, "--vehicles", ROOT / "vehicles"]
+        command = [binary, "serve", "--config", settings, "--vehicles", vehicles]
         command += ["--listen", address, "--unix-socket", f"{folder}/wade.sock", "--log", "error"]
-        with child(command, cpu):
+        with child(command, cpu) as pid:
             until_ready(lambda: wade.GrpcClient(address).evaluate(VEHICLE, STATE))
             until_ready(lambda: wade.ShmClient(namespace).evaluate(VEHICLE, STATE))
-            yield address, f"unix:{folder}/wade.sock", namespace
+            yield Place(address, f"unix:{folder}/wade.sock", namespace, pid)
 
 
 def until_ready(call: Callable[[], object]) -> None:
@@ -173,7 +182,7 @@ def cases(stack: ExitStack, binary: Path, placement: str) -> dict[str, Case]:
     """All cases that make sense with this placement; a server that polls needs a core of its own."""
     server_cpu, client_cpu = PLACEMENTS[placement]
     os.sched_setaffinity(0, {client_cpu})
-    address, unix, namespace = stack.enter_context(served(binary, "block", server_cpu))
+    address, unix, namespace, _ = stack.enter_context(served(binary, "block", server_cpu))
     echo_at = free_address()
     stack.enter_context(child([sys.executable, __file__, "--echo", echo_at], server_cpu))
     channel = stack.enter_context(grpc.insecure_channel(echo_at))
@@ -203,8 +212,8 @@ def cases(stack: ExitStack, binary: Path, placement: str) -> dict[str, Case]:
         f"shared memory batch of {BATCH}": timed(lambda: shm.evaluate_batch(VEHICLE, STATES)),
     }
     if server_cpu != client_cpu:
-        _, _, polling = stack.enter_context(served(binary, "spin", server_cpu))
-        spin = client(wade.ShmClient(polling, wait="spin", timeout_s=60))
+        polling = stack.enter_context(served(binary, "spin", server_cpu))
+        spin = client(wade.ShmClient(polling.namespace, wait="spin", timeout_s=60))
         found["shared memory, polling"] = timed(lambda: spin.evaluate(VEHICLE, STATE))
     return found
 

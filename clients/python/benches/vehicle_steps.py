@@ -48,14 +48,13 @@ def stepping(model: mujoco.MjModel, vehicles: list[mujoco.MjData]) -> Callable[[
 
 def served_one_by_one(client: wade.Client, model: mujoco.MjModel, vehicles: list[mujoco.MjData]) -> Callable[[], None]:
     """One step of each with a call for each."""
-    water = wading.Water(client, model)
-    for data in vehicles:
-        mujoco.mj_forward(model, data)
+    waters = [wading.Water(client, model) for _ in vehicles]
 
     def step() -> None:
-        for data in vehicles:
+        for water, data in zip(waters, vehicles, strict=True):
+            mujoco.mj_step1(model, data)
             water.apply(data)
-            mujoco.mj_step(model, data)
+            mujoco.mj_step2(model, data)
 
     return step
 
@@ -136,7 +135,7 @@ def main() -> None:
     arguments = parser.parse_args()
     cpus, started = sorted(os.sched_getaffinity(0)), machine(arguments.wade)
     with ExitStack() as stack:
-        _, _, namespace = stack.enter_context(served(arguments.wade.resolve(), "block", cpus[0]))
+        namespace = stack.enter_context(served(arguments.wade.resolve(), "block", cpus[0])).namespace
         os.sched_setaffinity(0, {cpus[-1]})
         client = stack.enter_context(wade.ShmClient(namespace, timeout_s=60.0))
         water = 'density="1000" viscosity="0.001"'

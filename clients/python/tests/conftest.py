@@ -25,7 +25,7 @@ class Awaited:
             result = getattr(self._awaited, name)(*arguments, **named)
             if asyncio.iscoroutine(result):
                 return self._loop.run_until_complete(result)
-            return result if result is None else Awaited(result, self._loop)
+            return Awaited(result, self._loop) if hasattr(result, "evaluate") else result
 
         return call
 

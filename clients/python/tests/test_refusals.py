@@ -26,6 +26,10 @@ REFUSED = [
     ("depth_m", 1e39, "finite"),  # more than single precision holds
     ("density_kgpm3", 0.0, "greater than zero"),
     ("density_kgpm3", NAN, "finite"),
+    ("heading_rad", NAN, "finite"),
+    ("depth_rate_mps", -INFINITY, "finite"),
+    ("wheel_speed_radps", (0, 0, NAN, 0), "finite"),
+    ("time_step_s", -0.001, "negative"),
 ]
 
 # a field and a value of the wrong shape, single and batch of two
@@ -40,6 +44,13 @@ MISSHAPEN = [
     ("depth_m", (0.1, 0.1), 0.1),
     ("depth_m", None, []),
     ("depth_m", "deep", [[0.1, 0.2]]),
+    ("heading_rad", (0.1, 0.2), np.zeros(3)),
+    ("depth_rate_mps", "fast", "fast"),
+    ("wheel_speed_radps", (1.0, 2.0, 3.0), np.zeros((2, 3))),
+    ("wheel_speed_radps", 1.0, [1.0, 1.0]),
+    ("time_step_s", None, [0.1, 0.1, 0.1]),
+    ("session", -1, [1, 2, 3]),
+    ("session", 0.5, "first"),
 ]
 
 

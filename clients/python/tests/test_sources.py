@@ -15,7 +15,7 @@ from servers import ROOT
 
 import wade
 from wade import shm_layout
-from wade.state import SCALARS, VECTORS
+from wade.state import SCALARS, TOLD, VECTORS
 from wade.v1 import hydrodynamics_pb2
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -33,10 +33,11 @@ def test_the_generated_files_are_those_of_proto(tmp_path: Path) -> None:
 def test_a_state_has_the_fields_of_the_message_for_batches() -> None:
     message = hydrodynamics_pb2.EvaluateBatchRequest.DESCRIPTOR
     arrays = {field.name for field in message.fields if field.is_repeated}
-    # what effects are told beside the state, which this client does not offer yet
-    told = {"heading_rad", "depth_rate_mps", "wheel_speed_radps"}
-    assert arrays - told == {*SCALARS, *VECTORS}
-    assert {*wade.State.__dataclass_fields__} == {*SCALARS, *VECTORS, "ground_contact"}
+    assert arrays == {*SCALARS, *VECTORS, *TOLD}
+    single = {field.name for field in hydrodynamics_pb2.State.DESCRIPTOR.fields}
+    # an attitude is the direction of gravity here, and a session has a number over shared memory alone
+    fields = {*wade.State.__dataclass_fields__}
+    assert fields == single - {"world_from_body", "roll_pitch"} | {"session"}
 
 
 def members(enumeration: Any, prefix: str) -> dict[str, int]:
@@ -50,6 +51,13 @@ def test_the_enumerations_are_those_of_the_messages() -> None:
     assert {contact.name: contact.value for contact in wade.GroundContact} == contacts
     quantities = members(hydrodynamics_pb2.Quantity, "QUANTITY_")
     assert {quantity.name: quantity.value + 1 for quantity in wade.Quantity} == quantities
+    effects = members(hydrodynamics_pb2.Effect, "EFFECT_")
+    assert {effect.name: effect.value for effect in wade.Effect} == effects
+    assert len(effects) == shm_layout.PHYSICS
+    reasons = members(hydrodynamics_pb2.LeftOut, "LEFT_OUT_")
+    assert {reason.name: reason.value for reason in wade.LeftOut} == reasons
+    boxed = members(hydrodynamics_pb2.BoxQuantity, "BOX_QUANTITY_")
+    assert {quantity.name: quantity.value + 1 for quantity in wade.BoxQuantity} == boxed
 
 
 def rust_fields(struct: str) -> list[tuple[str, str]]:
@@ -98,8 +106,9 @@ def rust_numbers(pattern: str, text: str) -> dict[str, int]:
 
 def test_the_codes_and_limits_are_the_servers() -> None:
     constants = rust_numbers(r"pub const (\w+): \w+ = (\d+);", LAYOUT)
-    for name in ("MAX_BATCH", "DRY_CONTACT", "SERVER_POLLS"):
-        assert getattr(shm_layout, name) == constants[name]
+    assert {name: getattr(shm_layout, name) for name in constants if name != "PROVENANCE_LEN"} == {
+        name: number for name, number in constants.items() if name != "PROVENANCE_LEN"
+    }
     surfaces = (ROOT / "src" / "vehicle.rs", ROOT / "src" / "vehicle" / "mod.rs")
     text = "".join(path.read_text() for path in surfaces if path.exists())
     assert rust_numbers(r"pub const (MAX_SURFACES): \w+ = (\d+);", text) == {"MAX_SURFACES": shm_layout.MAX_SURFACES}
@@ -116,7 +125,9 @@ def test_the_codes_and_limits_are_the_servers() -> None:
 
 
 def test_the_names_are_the_servers() -> None:
-    names = re.findall(r'format!\("\{\}/(.*)", self\.namespace\)', LAYOUT)
+    version = re.search(r'pub const VERSION: &str = "(.*)";', LAYOUT)
+    assert version and version.group(1) == shm_layout.VERSION
+    names = re.findall(r'format!\("\{\}/(.*)", self\.namespace\)', LAYOUT.replace("{VERSION}", shm_layout.VERSION))
     ours = (
         shm_layout.evaluate_name("", "{vehicle}"),
         shm_layout.evaluate_batch_name("", "{vehicle}"),

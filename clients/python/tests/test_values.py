@@ -81,7 +81,8 @@ def test_a_state_has_the_forces_of_the_query_command(client: Any, vehicle: str, 
             named = {quantity(o["quantity"]): o["excess"] for o in expected["outside"]}
             assert outside == pytest.approx(named, rel=1e-6)
             assert bool(forces.in_domain) is expected["in_domain"]
-            assert forces.provenance == expected["provenance"]
+            # over shared memory it is cut to fit
+            assert forces.provenance and expected["provenance"].startswith(forces.provenance)
             assert forces.bundle_version == expected["version"]
             assert 0 < forces.compute_ns < 1e9
 
@@ -161,8 +162,10 @@ def test_a_vehicle_is_described_as_in_its_bundle(server: Server) -> None:
     assert vehicle.length_m == bundle["length_m"] and vehicle.z0_m == bundle["z0_m"]
     assert vehicle.bundle_version == bundle["version"]
     np.testing.assert_array_equal(vehicle.inertia_kgm2, vehicle.inertia_kgm2.T)
-    assert set(vehicle.domain) == set(wade.Quantity) - {wade.Quantity.DISTANCE}
-    assert vehicle.domain[wade.Quantity.DENSITY] == (1000.0, 1900.0)
+    for key, stated in bundle["domain"].items():
+        found = vehicle.domain[wade.Quantity[quantity(key).upper()]]
+        assert found == pytest.approx((stated["min"], stated["max"]), rel=1e-6)
+    assert len(vehicle.domain) >= len(bundle["domain"])
     # binary STL: a header of 84 bytes, 50 a face
     assert len(vehicle.mesh_stl) == 84 + 50 * len(vehicle.face_surface)
     assert vehicle.face_surface.max() == len(vehicle.surfaces) - 1

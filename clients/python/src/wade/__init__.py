@@ -21,24 +21,33 @@ from .errors import (
     Violation,
     WadeError,
 )
-from .forces import Forces, Quantity
+from .forces import BoxQuantity, Effect, Forces, LeftOut, Quantity
+from .latency import Latency, Percentiles
 from .rpc import GrpcClient
 from .state import GroundContact, State
-from .vehicle import Surface, Vehicle
+from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
 
 if TYPE_CHECKING:
     from .shm import ShmClient
 
 __all__ = [
+    "ActiveEffect",
+    "BoxQuantity",
     "Client",
     "DeadlineExceeded",
+    "Effect",
+    "EffectParameter",
     "Forces",
     "GroundContact",
     "GrpcClient",
     "InvalidState",
+    "Latency",
     "LayoutMismatch",
+    "LeftOut",
+    "Percentiles",
     "Quantity",
     "Refused",
+    "Reloaded",
     "ResourceExhausted",
     "ServerUnavailable",
     "ShmClient",

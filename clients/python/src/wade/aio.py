@@ -12,8 +12,9 @@ from .channel import DEFAULT_ADDRESS, Tls, open_channel
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
+from .latency import Latency
 from .state import State
-from .vehicle import Vehicle
+from .vehicle import Reloaded, Vehicle
 
 #: What grpc.aio puts in the place of a call's status where it could not write a message.
 _NOT_WRITTEN = "Internal error from Core"
@@ -52,6 +53,17 @@ class GrpcClient:
     async def vehicle(self, name: str, *, mesh: bool = False, timeout_s: float | None = None) -> Vehicle:
         """Surfaces, dimensions, mass and training domain of a vehicle; the hull's mesh on request."""
         return messages.vehicle(await self._call("GetVehicle", messages.get_vehicle_request(name, mesh), timeout_s))
+
+    async def latency(self, *, timeout_s: float | None = None) -> tuple[Latency, ...]:
+        """How fast the server is by its own clock, for each transport and vehicle that was asked for."""
+        return messages.latencies(await self._call("GetLatency", messages.get_latency_request(), timeout_s))
+
+    async def reload(self, vehicle: str = "", *, timeout_s: float | None = None) -> tuple[Reloaded, ...]:
+        """The administrator's call: the server reads the bundle of a vehicle, or of each, from disk again.
+
+        It swaps in those that are sound; one that is refused leaves the version that is served.
+        """
+        return messages.reloaded(await self._call("Reload", messages.reload_request(vehicle), timeout_s))
 
     async def close(self) -> None:
         """Closes the connection. A call after it connects anew."""
@@ -95,7 +107,10 @@ class GrpcClient:
 
 
 class GrpcStream:
-    """One answer a state, in order. A call that fails ends the stream, and the next opens it anew."""
+    """One answer a state, in order: a run, in which effects remember.
+
+    A call that fails ends the run, and the next begins it anew.
+    """
 
     def __init__(self, client: GrpcClient, vehicle: str):
         self._client, self._vehicle = client, vehicle
@@ -104,9 +119,14 @@ class GrpcStream:
 
     async def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces in one state."""
-        timeout_s = self._client._timeout(timeout_s)
-        request = messages.evaluate_request(self._vehicle, state)
-        if self._call is None:
+        try:
+            timeout_s = self._client._timeout(timeout_s)
+            request = messages.evaluate_request(self._vehicle, state)
+        except WadeError:
+            self.close()
+            raise
+        begins = self._call is None
+        if begins:
             self._calls = self._client._connected()
             self._call = self._calls["Stream"]()
         call = self._call
@@ -133,7 +153,7 @@ class GrpcStream:
             timer.cancel()
         if answer is grpc.aio.EOF:
             raise await self._ended(call, timeout_s)
-        return messages.forces(answer)
+        return messages.forces(answer, begins)
 
     def close(self) -> None:
         """Ends the stream."""

@@ -21,7 +21,10 @@ def checked_timeout(timeout_s: float) -> float:
 
 
 class Stream(Protocol):
-    """One answer a state, in order, for one vehicle. A call that fails ends the stream, and the next opens it anew."""
+    """One answer a state, in order, for one vehicle: a run, in which effects remember and time moves by `time_step_s`.
+
+    A call that fails ends the run, and the next begins it anew.
+    """
 
     def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces in one state."""

@@ -28,27 +28,74 @@ class Quantity(IntEnum):
     VERTICAL_SPEED = 5
     #: [rad/s]
     ANGULAR_SPEED = 6
-    #: Distance to the nearest state that was learnt from, over what is usual among these [-].
+    #: Distance to the nearest state that was learnt from, over what is usual among these [-]. Beyond 1 the learnt part
+    #: of the answer fades, beyond 3 the known physics alone is left.
     DISTANCE = 7
+
+
+class Effect(IntEnum):
+    """A physical effect that can be added to a model; the values are those of the wire."""
+
+    ADDED_MASS = 1
+    LINEAR_DAMPING = 2
+    DRAG_COEFFICIENT_ERROR = 3
+    ROTATION = 4
+    CURRENT = 5
+    WATER_LEVEL_OFFSET = 6
+    DENSITY_ERROR = 7
+    HULL_FLOODING = 8
+    WATER_ENTRY_SLAMMING = 9
+    WAVE_MEMORY = 10
+    CHANNEL_BLOCKAGE = 11
+    SQUAT = 12
+    WHEEL_PADDLE_THRUST = 13
+    BED_MOTION = 14
+
+
+class LeftOut(IntEnum):
+    """Why an effect has no load in an answer; the values are those of the wire, and 0 is that it has one."""
+
+    #: It remembers, and the state belongs to no run: as at rest and dry.
+    NO_SESSION = 1
+    NO_HEADING = 2
+    NO_WHEEL_SPEEDS = 3
+    NO_DEPTH_RATE = 4
+    #: The state has a current of its own.
+    CURRENT_STATED = 5
+
+
+class BoxQuantity(IntEnum):
+    """A quantity of the box in which effects were seen; the columns of `Forces.effects_outside`."""
+
+    #: [m]
+    DEPTH = 0
+    #: Speed through the water [m/s].
+    SPEED = 1
+    #: [m/s2]
+    ACCELERATION = 2
+    #: [rad/s]
+    ANGULAR_SPEED = 3
+    #: [kg/m3]
+    DENSITY = 4
 
 
 @dataclass(slots=True, eq=False)
 class Forces:
     """What the water does to the vehicle, body frame, in single precision; arrays may be read-only.
 
-    Shapes are those of a single state with K surfaces, in the order of `Vehicle.surfaces`; in the answer to a batch
-    each array has N rows of them. The bits are the same whatever the transport, alone or in a batch.
+    Shapes are those of a single state with K surfaces, in the order of `Vehicle.surfaces`, and E effects; in the answer
+    to a batch each array has N rows of them. The bits are the same whatever the transport, alone or in a batch.
     """
 
     #: Net force [N], `[3]`.
     force_n: Array
     #: Net moment about `about_m` [N m], `[3]`.
     moment_nm: Array
-    #: Reference point of the moment, the center of mass [m]: `[3]`, for a batch too.
+    #: Reference point of the moments, the center of mass [m]: `[3]`, for a batch too.
     about_m: Array
     #: One standard deviation of the net force [N], `[3]`.
     uncertainty_n: Array
-    #: Force on each surface [N], `[K, 3]`; K is 0 where the surfaces were left out.
+    #: Force of the model on each surface [N], `[K, 3]`; K is 0 where the surfaces were left out.
     surface_force_n: Array
     #: Point at which it acts [m], `[K, 3]`.
     surface_point_m: Array
@@ -56,9 +103,29 @@ class Forces:
     wetted_fraction: Array
     #: How far each `Quantity` lies outside the training domain, in its unit: negative below, positive above, 0 within.
     outside: Array
+    #: The effects that were added to the model: a number that this client does not know is of a newer server.
+    effects: tuple[Effect | int, ...]
+    #: Force of each effect [N], `[E, 3]`: with those of the surfaces they sum to `force_n`.
+    effect_force_n: Array
+    #: Moment of each effect about `about_m` [N m], `[E, 3]`.
+    effect_moment_nm: Array
+    #: Why an effect has no load: a `LeftOut`, or 0 where it has one; `[E]`.
+    effect_left_out: NDArray[np.uint8]
+    #: Share of the effects' forces that acts on each surface [N], `[K, 3]`: a part of `effect_force_n`, not to be added
+    #: to it. K is 0 where there are no effects.
+    effect_surface_force_n: Array
+    #: How far each `BoxQuantity` lies outside the box in which the effects were seen; above it they are as at its edge.
+    effects_outside: Array
+    #: Added mass and inertia about `about_m` [kg, kg m, kg m2], `[6, 6]`, forces first. The wrench is `-M_A nu_dot`,
+    #: with the rates of the body components of the velocity of the center of mass and of the angular velocity. None
+    #: where the model has no such effect.
+    added_mass: Array | None
+    #: True where a run of states begins with this one: effects remember nothing yet. In the middle of a run it says
+    #: that the server has forgotten it.
+    session_begins: NDArray[np.bool_] | np.bool_
     #: Version of the bundle that answered.
     bundle_version: int
-    #: Where the weights come from, such as "analytic".
+    #: Where the weights come from, such as "analytic"; over shared memory the first 32 bytes of it.
     provenance: str
     #: The server's own time [ns], for the whole batch.
     compute_ns: int
@@ -68,3 +135,11 @@ class Forces:
         """True where no quantity lies outside the training domain: one value, or `[N]` for a batch."""
         inside: NDArray[np.bool_] | np.bool_ = np.logical_not(np.any(self.outside, axis=-1))
         return inside
+
+
+_KNOWN = {int(effect): effect for effect in Effect}
+
+
+def named_effect(code: int) -> Effect | int:
+    """The effect of a number of the wire."""
+    return _KNOWN.get(code, code)

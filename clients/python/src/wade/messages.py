@@ -1,8 +1,8 @@
 """The messages of proto/ to and from the types of this package.
 
 The generated messages would turn every number of an array into a Python object. On the wire a packed array of floats is
-a string of bytes like any other, so the messages here are the generated ones with each such array declared as bytes:
-numpy reads and writes them as they are.
+a string of bytes like any other, and one of enumerations a string of a byte each, so the messages here are those that
+were generated, with each such array declared as bytes: numpy reads and writes them as they are.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ from .errors import (
     Violation,
     WadeError,
 )
-from .forces import Forces, Quantity
-from .state import VECTORS, State
-from .v1 import hydrodynamics_pb2
-from .vehicle import Surface, Vehicle
+from .forces import BoxQuantity, Forces, Quantity, named_effect
+from .latency import Latency, Percentiles
+from .state import TIME_STEP_AT, TOLD_AT, VECTORS, State
+from .v1 import admin_pb2, hydrodynamics_pb2
+from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
 
-_FLOATS = (FieldDescriptor.TYPE_FLOAT, FieldDescriptor.TYPE_DOUBLE)
+# packed enumerations too: a value below 128 is one byte
+_PACKED = (FieldDescriptor.TYPE_FLOAT, FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_ENUM)
 
 
 def _with_arrays_as_bytes(file: FileDescriptor) -> dict[str, type[Message]]:
@@ -39,9 +41,10 @@ def _with_arrays_as_bytes(file: FileDescriptor) -> dict[str, type[Message]]:
     file.CopyToProto(proto)
     for message in proto.message_type:
         for field in message.field:
-            if field.label == FieldDescriptor.LABEL_REPEATED and field.type in _FLOATS:
+            if field.label == FieldDescriptor.LABEL_REPEATED and field.type in _PACKED:
                 field.label = FieldDescriptor.LABEL_OPTIONAL
                 field.type = FieldDescriptor.TYPE_BYTES
+                field.ClearField("type_name")
     # a pool of its own: in the default one the names are taken by the generated messages
     pool = descriptor_pool.DescriptorPool()
     pool.Add(proto)
@@ -49,9 +52,12 @@ def _with_arrays_as_bytes(file: FileDescriptor) -> dict[str, type[Message]]:
     return classes
 
 
-_SERVICE = hydrodynamics_pb2.DESCRIPTOR.services_by_name["Hydrodynamics"]
+_SERVICES = (
+    hydrodynamics_pb2.DESCRIPTOR.services_by_name["Hydrodynamics"],
+    admin_pb2.DESCRIPTOR.services_by_name["Admin"],
+)
 _PACKAGE = hydrodynamics_pb2.DESCRIPTOR.package
-_MESSAGES = _with_arrays_as_bytes(hydrodynamics_pb2.DESCRIPTOR)
+_MESSAGES = _with_arrays_as_bytes(hydrodynamics_pb2.DESCRIPTOR) | _with_arrays_as_bytes(admin_pb2.DESCRIPTOR)
 
 
 def _new(name: str, **fields: Any) -> Any:
@@ -59,37 +65,54 @@ def _new(name: str, **fields: Any) -> Any:
 
 
 def calls(channel: Any) -> dict[str, Any]:
-    """The service's methods by name, on a channel of `grpc` or of `grpc.aio`."""
+    """The methods of the services by name, on a channel of `grpc` or of `grpc.aio`."""
     kinds = {(False, False): "unary_unary", (True, True): "stream_stream"}
     return {
         method.name: getattr(channel, kinds[method.client_streaming, method.server_streaming])(
-            f"/{_SERVICE.full_name}/{method.name}",
+            f"/{service.full_name}/{method.name}",
             request_serializer=_MESSAGES[method.input_type.full_name].SerializeToString,
             response_deserializer=_MESSAGES[method.output_type.full_name].FromString,
         )
-        for method in _SERVICE.methods
+        for service in _SERVICES
+        for method in service.methods
     }
 
 
 def evaluate_request(vehicle: str, state: State) -> Message:
-    """A single state; raises `InvalidState` for a wrong shape."""
-    depth, density, *vectors = state.floats()
+    """A single state; raises `InvalidState` for a wrong shape and for a session."""
+    values = state.floats()
+    _without_session(state)
     request = _new("EvaluateRequest", vehicle=vehicle)
     message = request.state
-    message.depth_m = depth
+    message.depth_m = values[0]
     message.ground_contact = state.ground_contact
     if not state.is_default("density_kgpm3"):
-        message.density_kgpm3 = density
+        message.density_kgpm3 = values[1]
     for i, name in enumerate(VECTORS):
         if not state.is_default(name):
             vector = getattr(message, name)
-            vector.x, vector.y, vector.z = vectors[3 * i : 3 * i + 3]
+            vector.x, vector.y, vector.z = values[2 + 3 * i : 5 + 3 * i]
+    heading, rate, *wheels = values[TOLD_AT:TIME_STEP_AT]
+    if state.heading_rad is not None:
+        message.heading_rad = heading
+    if state.depth_rate_mps is not None:
+        message.depth_rate_mps = rate
+    if state.wheel_speed_radps is not None:
+        with np.errstate(over="ignore"):
+            message.wheel_speed_radps = np.array(wheels, "<f4").tobytes()
+    if values[TIME_STEP_AT] != 0.0:
+        message.time_step_s = values[TIME_STEP_AT]
+    if state.implicit_added_mass:
+        message.implicit_added_mass = True
     return request
 
 
 def evaluate_batch_request(vehicle: str, states: State, surfaces: bool) -> tuple[Message, int]:
-    """A batch and its length; raises `InvalidState` for a wrong shape."""
+    """A batch and its length; raises `InvalidState` for a wrong shape, and for a session and its time step."""
     rows = states.rows()
+    _without_session(states)
+    if rows.pop("time_step_s").any():
+        raise InvalidState([Violation("time_step_s", _NO_SESSION.format("time_step_s"))])
     arrays = {
         name: row.astype("<f4", copy=False).tobytes() for name, row in rows.items() if not states.is_default(name)
     }
@@ -98,9 +121,18 @@ def evaluate_batch_request(vehicle: str, states: State, surfaces: bool) -> tuple
         vehicle=vehicle,
         ground_contact=states.ground_contact,
         omit_surfaces=not surfaces,
+        implicit_added_mass=states.implicit_added_mass,
         **arrays,
     )
     return request, len(rows["depth_m"])
+
+
+_NO_SESSION = "{} must be left out: over gRPC a stream is a run of states, and there is no other; or use shared memory"
+
+
+def _without_session(state: State) -> None:
+    if not state.is_default("session") and np.any(np.asarray(state.session)):
+        raise InvalidState([Violation("session", _NO_SESSION.format("session"))])
 
 
 def list_vehicles_request() -> Message:
@@ -113,11 +145,20 @@ def get_vehicle_request(vehicle: str, mesh: bool) -> Message:
     return _new("GetVehicleRequest", vehicle=vehicle, include_mesh=mesh)
 
 
-def forces(response: Any) -> Forces:
+def get_latency_request() -> Message:
+    """Asks for percentiles."""
+    return _new("GetLatencyRequest")
+
+
+def reload_request(vehicle: str) -> Message:
+    """Asks an administrator's favor: empty is every vehicle."""
+    return _new("ReloadRequest", vehicle=vehicle)
+
+
+def forces(response: Any, session_begins: bool = False) -> Forces:
     """The answer to a single state."""
     wrench = response.wrench
-    vectors = (wrench.force_n, wrench.moment_nm, wrench.about_m, response.uncertainty_n)
-    net = np.array([(v.x, v.y, v.z) for v in vectors], np.float32)
+    net = _vectors((wrench.force_n, wrench.moment_nm, wrench.about_m, response.uncertainty_n))
     return Forces(
         force_n=net[0],
         moment_nm=net[1],
@@ -126,7 +167,15 @@ def forces(response: Any) -> Forces:
         surface_force_n=_floats(response.surface_force_n, -1, 3),
         surface_point_m=_floats(response.surface_point_m, -1, 3),
         wetted_fraction=_floats(response.wetted_fraction, -1),
-        outside=_outside(response.outside, 1)[0],
+        outside=_outside(response.outside, 1, len(Quantity))[0],
+        effects=tuple(named_effect(load.effect) for load in response.effects),
+        effect_force_n=_vectors([load.force_n for load in response.effects]),
+        effect_moment_nm=_vectors([load.moment_nm for load in response.effects]),
+        effect_left_out=np.array([load.left_out for load in response.effects], np.uint8),
+        effect_surface_force_n=_floats(response.effect_surface_force_n, -1, 3),
+        effects_outside=_outside(response.effects_outside, 1, len(BoxQuantity))[0],
+        added_mass=_floats(response.added_mass, 6, 6) if response.added_mass else None,
+        session_begins=np.bool_(session_begins),
         bundle_version=response.bundle_version,
         provenance=response.provenance,
         compute_ns=response.compute_ns,
@@ -136,6 +185,8 @@ def forces(response: Any) -> Forces:
 def batch_forces(response: Any, length: int) -> Forces:
     """The answer to a batch of this length."""
     wetted = _floats(response.wetted_fraction, length, len(response.wetted_fraction) // (4 * length))
+    effects = len(response.effects)
+    moved = _floats(response.effect_surface_force_n, length, len(response.effect_surface_force_n) // (12 * length), 3)
     return Forces(
         force_n=_floats(response.force_n, length, 3),
         moment_nm=_floats(response.moment_nm, length, 3),
@@ -144,7 +195,16 @@ def batch_forces(response: Any, length: int) -> Forces:
         surface_force_n=_floats(response.surface_force_n, *wetted.shape, 3),
         surface_point_m=_floats(response.surface_point_m, *wetted.shape, 3),
         wetted_fraction=wetted,
-        outside=_outside(response.outside, length),
+        outside=_outside(response.outside, length, len(Quantity)),
+        # packed enumerations: a byte each
+        effects=tuple(named_effect(code) for code in response.effects),
+        effect_force_n=_floats(response.effect_force_n, length, effects, 3),
+        effect_moment_nm=_floats(response.effect_moment_nm, length, effects, 3),
+        effect_left_out=np.frombuffer(response.effect_left_out, np.uint8).reshape(length, effects),
+        effect_surface_force_n=moved,
+        effects_outside=_outside(response.effects_outside, length, len(BoxQuantity)),
+        added_mass=_floats(response.added_mass, length, 6, 6) if response.added_mass else None,
+        session_begins=np.zeros(length, bool),
         bundle_version=response.bundle_version,
         provenance=response.provenance,
         compute_ns=response.compute_ns,
@@ -159,8 +219,12 @@ def _vector(v: Any) -> np.ndarray:
     return np.array((v.x, v.y, v.z), np.float32)
 
 
-def _outside(found: Any, length: int) -> np.ndarray:
-    dense = np.zeros((length, len(Quantity)), np.float32)
+def _vectors(vectors: Any) -> np.ndarray:
+    return np.array([(v.x, v.y, v.z) for v in vectors], np.float32).reshape(-1, 3)
+
+
+def _outside(found: Any, length: int, quantities: int) -> np.ndarray:
+    dense = np.zeros((length, quantities), np.float32)
     if found:
         # on the wire 0 stands for no quantity
         columns = np.array([outside.quantity for outside in found]) - 1
@@ -175,6 +239,7 @@ def vehicle(response: Any) -> Vehicle:
     """All about one vehicle."""
     summary = response.summary
     known = {int(quantity) + 1: quantity for quantity in Quantity}
+    boxed = {int(quantity) + 1: quantity for quantity in BoxQuantity}
     return Vehicle(
         name=summary.name,
         bundle_version=summary.bundle_version,
@@ -190,9 +255,40 @@ def vehicle(response: Any) -> Vehicle:
             Surface(s.name, s.kind, _vector(s.centroid_m), _vector(s.normal), s.area_m2) for s in response.surfaces
         ),
         domain={known[r.quantity]: (r.minimum, r.maximum) for r in response.domain if r.quantity in known},
+        effects=tuple(_active_effect(effect) for effect in response.effects),
+        effects_validity={
+            boxed[r.quantity]: (r.minimum, r.maximum) for r in response.effects_validity if r.quantity in boxed
+        },
         mesh_stl=response.mesh_stl,
         face_surface=np.array(response.face_surface, np.int64),
     )
+
+
+def _active_effect(effect: Any) -> ActiveEffect:
+    return ActiveEffect(
+        effect=named_effect(effect.effect),
+        name=effect.name,
+        equation=effect.equation,
+        parameters=tuple(EffectParameter(p.name, p.value, p.std, p.unit) for p in effect.parameters),
+        provisional=effect.provisional,
+    )
+
+
+def latencies(response: Any) -> tuple[Latency, ...]:
+    """Percentiles of each transport and vehicle."""
+
+    def percentiles(p: Any) -> Percentiles:
+        return Percentiles(p.count, p.p50_us, p.p95_us, p.p99_us, p.p99_9_us, p.max_us)
+
+    return tuple(
+        Latency(at.transport, at.vehicle, percentiles(at.since_start), percentiles(at.window), response.window_s)
+        for at in response.latencies
+    )
+
+
+def reloaded(response: Any) -> tuple[Reloaded, ...]:
+    """What each bundle came to."""
+    return tuple(Reloaded(found.vehicle, found.bundle_version, found.refusal) for found in response.vehicles)
 
 
 def error(failure: Any, at: str, timeout_s: float) -> WadeError:

@@ -14,8 +14,9 @@ from .channel import DEFAULT_ADDRESS, Tls, open_channel
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
+from .latency import Latency
 from .state import State
-from .vehicle import Vehicle
+from .vehicle import Reloaded, Vehicle
 
 
 class GrpcClient:
@@ -56,6 +57,17 @@ class GrpcClient:
     def vehicle(self, name: str, *, mesh: bool = False, timeout_s: float | None = None) -> Vehicle:
         """Surfaces, dimensions, mass and training domain of a vehicle; the hull's mesh on request."""
         return messages.vehicle(self._call("GetVehicle", messages.get_vehicle_request(name, mesh), timeout_s))
+
+    def latency(self, *, timeout_s: float | None = None) -> tuple[Latency, ...]:
+        """How fast the server is by its own clock, for each transport and vehicle that was asked for."""
+        return messages.latencies(self._call("GetLatency", messages.get_latency_request(), timeout_s))
+
+    def reload(self, vehicle: str = "", *, timeout_s: float | None = None) -> tuple[Reloaded, ...]:
+        """The administrator's call: the server reads the bundle of a vehicle, or of each, from disk again.
+
+        It swaps in those that are sound; one that is refused leaves the version that is served.
+        """
+        return messages.reloaded(self._call("Reload", messages.reload_request(vehicle), timeout_s))
 
     def close(self) -> None:
         """Closes the connection. A call after it connects anew."""
@@ -103,7 +115,10 @@ class GrpcClient:
 
 
 class GrpcStream:
-    """One answer a state, in order. A call that fails ends the stream, and the next opens it anew."""
+    """One answer a state, in order: a run, in which effects remember.
+
+    A call that fails ends the run, and the next begins it anew.
+    """
 
     def __init__(self, client: GrpcClient, vehicle: str):
         self._client, self._vehicle = client, vehicle
@@ -114,10 +129,15 @@ class GrpcStream:
 
     def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces in one state."""
-        timeout_s = self._client._timeout(timeout_s)
-        request = messages.evaluate_request(self._vehicle, state)
+        try:
+            timeout_s = self._client._timeout(timeout_s)
+            request = messages.evaluate_request(self._vehicle, state)
+        except WadeError:
+            self.close()
+            raise
         end = time.monotonic() + timeout_s
-        if self._call is None:
+        begins = self._call is None
+        if begins:
             self._open()
         self._requests.put(request)
         try:
@@ -132,7 +152,7 @@ class GrpcStream:
         if isinstance(answer, grpc.RpcError):
             self.close()
             raise self._client._failed(self._calls, answer, timeout_s)
-        return messages.forces(answer)
+        return messages.forces(answer, begins)
 
     def close(self) -> None:
         """Ends the stream."""

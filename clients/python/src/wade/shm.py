@@ -7,18 +7,19 @@ ends without an answer gives up the ports: the next call opens new ones and find
 from __future__ import annotations
 
 import ctypes
+import itertools
 import math
 import threading
 import time
 from collections.abc import Callable
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from . import shm_layout as layout
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
-from .forces import Array, Forces
+from .forces import Array, Effect, Forces, named_effect
 from .shm_link import Link, Lost, memory
 from .state import GroundContact, State
 
@@ -48,14 +49,19 @@ class ShmClient:
         self._lock = threading.Lock()
         self._link: Link | None = None
         self._sequence = 0
+        # numbers of streams, above those that a caller is likely to choose
+        self._runs = itertools.count(1 << 63)
 
     def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces on one vehicle in one state."""
+        return self._evaluate(vehicle, state, state.sessions(None), timeout_s)
+
+    def _evaluate(self, vehicle: str, state: State, session: int, timeout_s: float | None) -> Forces:
         timeout_s, end = self._end(timeout_s)
         floats, flags = state.floats(), _flags(state)
 
         def write(address: int, wake_key: int) -> None:
-            ctypes.memmove(address, _query(self._sequence, wake_key, flags, floats), layout.QUERY.itemsize)
+            ctypes.memmove(address, _query(self._sequence, wake_key, session, flags, floats), layout.QUERY.itemsize)
 
         with self._lock:
             answer = self._exchange(vehicle, False, write, _read, end, timeout_s)
@@ -69,6 +75,7 @@ class ShmClient:
         timeout_s, end = self._end(timeout_s)
         rows, flags = states.rows(), _flags(states)
         length = len(rows["depth_m"])
+        sessions = np.broadcast_to(states.sessions(length), length)
         with self._lock:
             forces: Forces | None = None
             start = 0
@@ -76,20 +83,25 @@ class ShmClient:
                 chunk = slice(start, min(start + layout.MAX_BATCH, length))
 
                 def write(address: int, wake_key: int, chunk: slice = chunk) -> None:
-                    _write_batch(address, self._sequence, wake_key, flags, rows, chunk)
+                    _write_batch(address, (self._sequence, wake_key), flags, sessions, rows, chunk)
 
                 def read(address: int, forces: Forces | None = forces, chunk: slice = chunk) -> Forces:
                     return _read_batch(address, forces, length, chunk, surfaces)
 
                 answered = self._exchange(vehicle, True, write, read, end, timeout_s)
-                # a bundle that was exchanged on the way would mix two versions in one answer: from the start again
-                changed = forces is not None and answered is not forces
-                forces, start = (None, 0) if changed else (answered, chunk.stop)
+                if forces is not None and answered is not forces:
+                    # a bundle that was exchanged on the way would mix two versions in one answer: from the start again,
+                    # without moving on those runs that have moved
+                    moved = np.arange(length) < chunk.stop
+                    rows["time_step_s"] = np.where(moved, np.float32(0.0), rows["time_step_s"])
+                    forces, start = None, 0
+                else:
+                    forces, start = answered, chunk.stop
         assert forces is not None, "rows() refuses an empty batch"
         return forces
 
     def stream(self, vehicle: str) -> ShmStream:
-        """A stream of states of one vehicle. Nothing is set up for it: over shared memory a single call is as fast."""
+        """A stream of states of one vehicle: a run of its own, whose states need no session. As fast as a call."""
         return ShmStream(self, vehicle)
 
     def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
@@ -151,17 +163,26 @@ class ShmClient:
 
 
 class ShmStream:
-    """One answer a state, in order."""
+    """One answer a state, in order: a run, in which effects remember.
+
+    A call that fails ends the run, and the next begins it anew.
+    """
 
     def __init__(self, client: ShmClient, vehicle: str):
         self._client, self._vehicle = client, vehicle
+        self._session = next(client._runs)
 
     def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces in one state."""
-        return self._client.evaluate(self._vehicle, state, timeout_s=timeout_s)
+        try:
+            return self._client._evaluate(self._vehicle, state, state.sessions(None) or self._session, timeout_s)
+        except BaseException:
+            self.close()
+            raise
 
     def close(self) -> None:
-        """There is nothing to end."""
+        """Ends the run; the server forgets it in time."""
+        self._session = next(self._client._runs)
 
     def __enter__(self) -> ShmStream:
         return self
@@ -171,17 +192,26 @@ class ShmStream:
 
 
 def _flags(state: State) -> int:
-    return layout.DRY_CONTACT if state.ground_contact == GroundContact.DRY else 0
+    flags = layout.DRY_CONTACT if state.ground_contact == GroundContact.DRY else 0
+    if state.implicit_added_mass:
+        flags |= layout.IMPLICIT_ADDED_MASS
+    if state.heading_rad is not None:
+        flags |= layout.HAS_HEADING
+    if state.depth_rate_mps is not None:
+        flags |= layout.HAS_DEPTH_RATE
+    if state.wheel_speed_radps is not None:
+        flags |= layout.HAS_WHEEL_SPEEDS
+    return flags
 
 
-def _query(sequence: int, wake_key: int, flags: int, floats: list[float]) -> bytes:
+def _query(sequence: int, wake_key: int, session: int, flags: int, floats: list[float]) -> bytes:
     try:
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, layout.NO_SESSION, flags, *floats, *layout.UNTOLD)
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *floats)
     except OverflowError:
         # beyond single precision: infinite, which the server refuses and names
         limit = float(np.finfo(np.float32).max)
         floats = [x if abs(x) <= limit else math.copysign(math.inf, x) for x in floats]
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, layout.NO_SESSION, flags, *floats, *layout.UNTOLD)
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *floats)
 
 
 def _read(address: int) -> np.void:
@@ -189,20 +219,22 @@ def _read(address: int) -> np.void:
     return answer
 
 
-def _write_batch(address: int, sequence: int, wake_key: int, flags: int, rows: dict[str, Array], chunk: slice) -> None:
+def _write_batch(
+    address: int, who: tuple[int, int], flags: int, sessions: Any, rows: dict[str, Array], chunk: slice
+) -> None:
     batch = np.frombuffer(memory(address, layout.BATCH_QUERY.itemsize), layout.BATCH_QUERY)[0]
     count = chunk.stop - chunk.start
-    batch["header"] = (sequence, wake_key, count, 0)
+    batch["header"] = (*who, count, 0)
     queries = batch["queries"][:count]
-    queries["session"] = layout.NO_SESSION
+    queries["session"] = sessions[chunk]
     queries["flags"] = flags
-    queries["time_step_s"] = 0.0
     for name, array in rows.items():
         queries[name] = array[chunk]
 
 
 def _forces(answer: np.void) -> Forces:
-    surfaces = _surface_count(answer)
+    surfaces, flags = _surface_count(answer), int(answer["flags"])
+    effects, effect_force, effect_moment, left_out, effect_surface_force = _effects(answer, surfaces)
     return Forces(
         force_n=answer["force_n"],
         moment_nm=answer["moment_nm"],
@@ -212,10 +244,33 @@ def _forces(answer: np.void) -> Forces:
         surface_point_m=answer["surface_point_m"][:surfaces],
         wetted_fraction=answer["wetted_fraction"][:surfaces],
         outside=answer["outside"],
+        effects=effects,
+        effect_force_n=effect_force,
+        effect_moment_nm=effect_moment,
+        effect_left_out=left_out,
+        effect_surface_force_n=effect_surface_force,
+        effects_outside=answer["effects_outside"],
+        added_mass=answer["added_mass"].reshape(6, 6) if flags & layout.HAS_ADDED_MASS else None,
+        session_begins=_YES if flags & layout.SESSION_BEGINS else _NO,
         bundle_version=int(answer["bundle_version"]),
         provenance=answer["provenance"].decode(errors="ignore"),
         compute_ns=int(answer["compute_ns"]),
     )
+
+
+_YES, _NO = np.True_, np.False_
+_NO_VECTORS = np.empty((0, 3), np.float32)
+_NO_EFFECTS: tuple[Any, ...] = ((), _NO_VECTORS, _NO_VECTORS, np.empty(0, np.uint8), _NO_VECTORS)
+
+
+def _effects(answer: np.void, surfaces: int) -> tuple[Any, ...]:
+    """Names, forces, moments, why left out, shares on surfaces."""
+    effects = answer["effects"][: _effect_count(answer)]
+    if not len(effects):
+        return _NO_EFFECTS
+    left_out = effects["left_out"].astype(np.uint8)
+    on_surfaces = answer["effect_surface_force_n"][:surfaces]
+    return _named(effects), effects["force_n"], effects["moment_nm"], left_out, on_surfaces
 
 
 def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool) -> Forces:
@@ -229,16 +284,33 @@ def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, 
     for name in ("force_n", "moment_nm", "uncertainty_n", "outside"):
         getattr(forces, name)[chunk] = answers[name]
     surfaces = forces.wetted_fraction.shape[1]
-    for name in ("surface_force_n", "surface_point_m", "wetted_fraction"):
+    for name in ("surface_force_n", "surface_point_m", "wetted_fraction") if surfaces else ():
         getattr(forces, name)[chunk] = answers[name][:, :surfaces]
+    _read_effects(answers, forces, chunk)
+    np.asarray(forces.session_begins)[chunk] = answers["flags"] & layout.SESSION_BEGINS != 0
     forces.compute_ns += int(batch["compute_ns"])
     return forces
+
+
+def _read_effects(answers: Any, forces: Forces, chunk: slice) -> None:
+    if not forces.effects:
+        return
+    effects = answers["effects"][:, : len(forces.effects)]
+    forces.effect_force_n[chunk] = effects["force_n"]
+    forces.effect_moment_nm[chunk] = effects["moment_nm"]
+    forces.effect_left_out[chunk] = effects["left_out"]
+    forces.effects_outside[chunk] = answers["effects_outside"]
+    surfaces = forces.effect_surface_force_n.shape[1]
+    forces.effect_surface_force_n[chunk] = answers["effect_surface_force_n"][:, :surfaces]
+    if forces.added_mass is not None:
+        forces.added_mass[chunk] = answers["added_mass"].reshape(-1, 6, 6)
 
 
 def _empty(answer: np.void, length: int, surfaces: int) -> Forces:
     def array(*shape: int) -> Array:
         return np.empty((length, *shape), np.float32)
 
+    effects = _named(answer["effects"][: _effect_count(answer)])
     return Forces(
         force_n=array(3),
         moment_nm=array(3),
@@ -248,10 +320,26 @@ def _empty(answer: np.void, length: int, surfaces: int) -> Forces:
         surface_point_m=array(surfaces, 3),
         wetted_fraction=array(surfaces),
         outside=array(len(answer["outside"])),
+        effects=effects,
+        effect_force_n=array(len(effects), 3),
+        effect_moment_nm=array(len(effects), 3),
+        effect_left_out=np.empty((length, len(effects)), np.uint8),
+        effect_surface_force_n=array(surfaces if effects else 0, 3),
+        effects_outside=np.zeros((length, len(answer["effects_outside"])), np.float32),
+        added_mass=array(6, 6) if int(answer["flags"]) & layout.HAS_ADDED_MASS else None,
+        session_begins=np.empty(length, bool),
         bundle_version=int(answer["bundle_version"]),
         provenance=answer["provenance"].decode(errors="ignore"),
         compute_ns=0,
     )
+
+
+def _named(effects: Any) -> tuple[Effect | int, ...]:
+    return tuple(named_effect(int(code)) for code in effects["effect"])
+
+
+def _effect_count(answer: np.void) -> int:
+    return min(int(answer["effect_count"]), layout.PHYSICS)
 
 
 def _surface_count(answer: np.void) -> int:

@@ -19,8 +19,18 @@ PHYSICS = 14
 
 #: Flag of a query: no water pressure under the contact patches.
 DRY_CONTACT = 1
+#: Flag of a query: the caller integrates added mass.
+IMPLICIT_ADDED_MASS = 2
+#: Flags of a query: these fields hold values.
+HAS_HEADING = 4
+HAS_DEPTH_RATE = 8
+HAS_WHEEL_SPEEDS = 16
 #: Flag of an answer: the server polls, so that waking it is of no use.
 SERVER_POLLS = 1
+#: Flag of an answer: the session begins with this query.
+SESSION_BEGINS = 2
+#: Flag of an answer: it holds a matrix.
+HAS_ADDED_MASS = 4
 
 STATUS_OK = 0
 STATUS_INVALID_STATE = 1
@@ -45,10 +55,6 @@ QUERY = np.dtype(
         ("time_step_s", "<f4"),
     ]
 )
-
-#: What a state has of these without a session and without a word about them.
-NO_SESSION = 0
-UNTOLD = (0.0,) * 7
 
 EFFECT_ANSWER = np.dtype([("effect", "<u4"), ("left_out", "<u4"), ("force_n", "<f4", 3), ("moment_nm", "<f4", 3)])
 

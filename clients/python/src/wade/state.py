@@ -24,8 +24,9 @@ class GroundContact(IntEnum):
 _REST = (0.0, 0.0, 0.0)
 _FRESH_WATER = 1000.0
 _LEVEL = (0.0, 0.0, -1.0)
+_NO_TIME = 0.0
 
-#: Fields with one number a state, and those with three, in the order of `State.floats`.
+#: Fields with one number a state, and those with three.
 SCALARS = ("depth_m", "density_kgpm3")
 VECTORS = (
     "velocity_mps",
@@ -35,6 +36,13 @@ VECTORS = (
     "angular_acceleration_radps2",
     "gravity_direction",
 )
+#: Fields that may be None, which is not the same as 0: how many numbers each has.
+TOLD = {"heading_rad": 1, "depth_rate_mps": 1, "wheel_speed_radps": 4}
+#: Where the numbers of `State.floats` stand.
+TOLD_AT = len(SCALARS) + 3 * len(VECTORS)
+TIME_STEP_AT = TOLD_AT + sum(TOLD.values())
+
+_UNTOLD = (0.0,) * sum(TOLD.values())
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -42,7 +50,7 @@ class State:
     """One state, or N of them for a batch. Body frame: x forward, y left, z up; SI units.
 
     In a single state a vector is any sequence of three numbers. In a batch `depth_m` is `[N]`, a vector is `[N, 3]` or,
-    where all have the same, `[3]`, and the density `[N]` or one number. What is left out has the server's default.
+    where all have the same, `[3]`, and any other number `[N]` or one number. What is left out has the server's default.
     """
 
     #: Undisturbed water surface above the ground-contact plane at the body origin [m].
@@ -63,13 +71,33 @@ class State:
     gravity_direction: ArrayLike = _LEVEL
     #: One for the whole batch.
     ground_contact: GroundContact = GroundContact.WETTED
+    #: Angle from the world's x to the body's x [rad]. None: effects that are fixed in the world are left out.
+    heading_rad: ArrayLike | None = None
+    #: Rate at which the water rises at the body origin [m/s]. None: in a run of states that of the depth, else effects
+    #: that need it are left out.
+    depth_rate_mps: ArrayLike | None = None
+    #: Front left, front right, rear left, rear right [rad/s], `[4]` or `[N, 4]`. None: effects that need them are left
+    #: out.
+    wheel_speed_radps: ArrayLike | None = None
+    #: Time since the state before it in the run [s]. 0: what effects remember stays as it is.
+    time_step_s: ArrayLike = _NO_TIME
+    #: The caller adds `Forces.added_mass` to a mass matrix of his own: the forces leave `-M_A nu_dot` out and keep the
+    #: rest. One for the whole batch.
+    implicit_added_mass: bool = False
+    #: Over shared memory, the number of a run of states that follow each other, for effects that remember (waves,
+    #: flooding): one an environment, `[N]` in a batch. A run in batches is another than that of the same number in
+    #: single calls. 0: none. A stream is a run without a number; over gRPC there is no other.
+    session: ArrayLike = 0
 
     def is_default(self, name: str) -> bool:
         """True where a field was left out, so that it need not travel."""
         return getattr(self, name) is _DEFAULTS.get(name)
 
     def floats(self) -> list[float]:
-        """The numbers of a single state: the scalars, then three a vector. Raises `InvalidState` for a wrong shape."""
+        """The numbers of a single state: the scalars, three a vector, what is told or 0, the time step.
+
+        Raises `InvalidState` for a wrong shape.
+        """
         values = []
         name = ""
         try:
@@ -82,13 +110,20 @@ class State:
                 else:
                     x, y, z = vector
                     values += (float(x), float(y), float(z))
+            if self.heading_rad is self.depth_rate_mps is self.wheel_speed_radps is None:
+                values += _UNTOLD
+            else:
+                for name, count in TOLD.items():
+                    values += _told(getattr(self, name), count)
+            name = "time_step_s"
+            values.append(float(getattr(self, name)))
         except (TypeError, ValueError):
-            expected = "one number" if name in SCALARS else "three numbers"
+            expected = "three numbers" if name in VECTORS else "four numbers" if TOLD.get(name) == 4 else "one number"
             raise _wrong(name, f"must be {expected}, got {_describe(getattr(self, name))}") from None
         return values
 
     def rows(self) -> dict[str, NDArray[np.float32]]:
-        """The arrays of a batch in single precision: `[N]` a scalar, `[N, 3]` a vector, in their order.
+        """The arrays of a batch in single precision: `[N]` a scalar, `[N, 3]` a vector, and what is told.
 
         Raises `InvalidState` for a wrong shape and for an empty batch.
         """
@@ -98,16 +133,38 @@ class State:
                 "depth_m", f"must have one value a state, [N] with N at least 1, got {_describe(self.depth_m)}"
             )
         rows = {"depth_m": depth}
-        for name in (*SCALARS[1:], *VECTORS):
-            shape = (depth.size, 3) if name in VECTORS else (depth.size,)
+        told = [name for name in TOLD if getattr(self, name) is not None]
+        for name in (*SCALARS[1:], *VECTORS, *told, "time_step_s"):
+            count = 3 if name in VECTORS else TOLD.get(name, 1)
+            shape = (depth.size,) if count == 1 else (depth.size, count)
             array = _array(name, getattr(self, name))
             if array.shape not in (shape, shape[1:]):
                 raise _wrong(name, f"must have shape {shape} or {shape[1:]}, got {_describe(getattr(self, name))}")
             rows[name] = np.broadcast_to(array, shape)
         return rows
 
+    def sessions(self, length: int | None) -> Any:
+        """The number of the run of a single state (`length` None), or `[N]` of them. Raises `InvalidState`."""
+        if self.session is _DEFAULTS["session"]:
+            return 0
+        array = np.asarray(self.session)
+        shapes = ((),) if length is None else ((), (length,))
+        if array.shape not in shapes or array.dtype.kind not in "iu" or (array < 0).any():
+            expected = "a whole number, 0 or greater" + ("" if length is None else f", or [{length}] of them")
+            raise _wrong("session", f"must be {expected}, got {_describe(self.session)}")
+        return int(array) if length is None else array.astype(np.uint64)
+
 
 _DEFAULTS: dict[str, Any] = {name: field.default for name, field in State.__dataclass_fields__.items()}
+
+
+def _told(value: Any, count: int) -> tuple[float, ...]:
+    if value is None:
+        return (0.0,) * count
+    if count == 1:
+        return (float(value),)
+    a, b, c, d = value
+    return (float(a), float(b), float(c), float(d))
 
 
 def _array(name: str, value: ArrayLike) -> NDArray[np.float32]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .forces import Quantity
+from .forces import BoxQuantity, Effect, Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +22,42 @@ class Surface:
     #: Mean outward normal, `[3]`.
     normal: NDArray[np.float32]
     area_m2: float
+
+
+@dataclass(frozen=True, slots=True)
+class EffectParameter:
+    """A number of an effect."""
+
+    name: str
+    value: float
+    #: Standard error.
+    std: float
+    #: 1 where it has none.
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveEffect:
+    """An effect that was added to a model, with its numbers."""
+
+    #: A number that this client does not know is of a newer server.
+    effect: Effect | int
+    name: str
+    equation: str
+    parameters: tuple[EffectParameter, ...]
+    #: Seen in one condition only.
+    provisional: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Reloaded:
+    """What a vehicle's bundle on disk came to."""
+
+    vehicle: str
+    #: The version that is served now.
+    bundle_version: int
+    #: Why the bundle on disk was refused; empty where it is served.
+    refusal: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,6 +81,10 @@ class Vehicle:
     surfaces: tuple[Surface, ...]
     #: Range in the training data of each quantity that has one.
     domain: dict[Quantity, tuple[float, float]]
+    #: What was added to the model, in the order of `Forces.effects`.
+    effects: tuple[ActiveEffect, ...]
+    #: The box in which the effects were seen.
+    effects_validity: dict[BoxQuantity, tuple[float, float]]
     #: Binary STL of the hull, empty unless asked for.
     mesh_stl: bytes
     #: Index of the surface of each face, `[faces]`.
