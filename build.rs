@@ -7,7 +7,7 @@ use prost::Message;
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed=proto");
     let out = PathBuf::from(env::var("OUT_DIR")?);
-    let files = ["wade/v1/hydrodynamics.proto", "wade/v1/admin.proto"];
+    let files = ["wade/v1/hydrodynamics.proto", "wade/v1/admin.proto", "inference/grpc_service.proto"];
     let descriptors = protox::compile(files, ["proto"])?;
     fs::write(out.join("descriptors.bin"), descriptors.encode_to_vec())?;
     tonic_prost_build::configure().compile_fds(descriptors)?;

@@ -22,7 +22,7 @@ pub struct Config {
     pub grpc: grpc::Config,
     /// Shared memory.
     pub shm: shm::Config,
-    /// Metrics and probes.
+    /// The page, queries as JSON, metrics and probes.
     pub http: http::Config,
     /// Logs.
     pub log: Log,

@@ -55,6 +55,17 @@ impl Engine {
             vehicles
         });
     }
+
+    /// Serves a vehicle no more.
+    pub fn remove(&self, name: &str) -> Result<(), UnknownVehicle> {
+        self.vehicle(name)?;
+        self.vehicles.rcu(|vehicles| {
+            let mut vehicles = Vehicles::clone(vehicles);
+            vehicles.remove(name);
+            vehicles
+        });
+        Ok(())
+    }
 }
 
 /// Counts what is in flight and refuses what is over the limit.

@@ -21,7 +21,7 @@ const BUCKETS_S: [f64; 22] = [
     500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3,
 ];
 
-/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, or shared memory.
+/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, shared memory, or JSON over HTTP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EncodeLabelValue)]
 #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
 pub enum Transport {
@@ -33,10 +33,13 @@ pub enum Transport {
     uds_stream,
     shm,
     shm_batch,
+    http,
+    grpc_infer,
+    uds_infer,
 }
 
 impl Transport {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 11] = [
         Self::grpc_unary,
         Self::grpc_batch,
         Self::grpc_stream,
@@ -45,6 +48,9 @@ impl Transport {
         Self::uds_stream,
         Self::shm,
         Self::shm_batch,
+        Self::http,
+        Self::grpc_infer,
+        Self::uds_infer,
     ];
 
     /// The value of the label.
@@ -58,6 +64,9 @@ impl Transport {
             Self::uds_stream => "uds_stream",
             Self::shm => "shm",
             Self::shm_batch => "shm_batch",
+            Self::http => "http",
+            Self::grpc_infer => "grpc_infer",
+            Self::uds_infer => "uds_infer",
         }
     }
 }
@@ -89,45 +98,65 @@ struct ReloadLabels {
 /// Latencies of one transport and vehicle.
 #[derive(Debug)]
 pub struct Recorder {
-    histograms: Mutex<Histograms>,
+    /// What came since somebody last looked: all that a query waits for.
+    current: Mutex<Histogram<u64>>,
+    accounts: Mutex<Accounts>,
     buckets: Buckets,
     out_of_domain: Counter,
 }
 
+/// Everything up to when somebody last looked.
 #[derive(Debug)]
-struct Histograms {
+struct Accounts {
     since_start: Histogram<u64>,
-    current: Histogram<u64>,
-    last: Histogram<u64>,
+    window: Histogram<u64>,
+    last_window: Histogram<u64>,
+    /// Empty, to take the place of `current`.
+    spare: Histogram<u64>,
 }
 
 impl Recorder {
     fn new(buckets: Buckets, out_of_domain: Counter) -> Self {
         let histogram =
             || Histogram::new_with_max(HIGHEST_NS, 3).expect("the constants are valid for a histogram");
-        let histograms = Histograms { since_start: histogram(), current: histogram(), last: histogram() };
-        Self { histograms: Mutex::new(histograms), buckets, out_of_domain }
+        let accounts = Accounts {
+            since_start: histogram(),
+            window: histogram(),
+            last_window: histogram(),
+            spare: histogram(),
+        };
+        Self { current: Mutex::new(histogram()), accounts: Mutex::new(accounts), buckets, out_of_domain }
     }
 
     /// Records one answered request: the time from its arrival to its answer, and how many of its states were outside
     /// the training domain.
     pub fn record(&self, elapsed: Duration, out_of_domain: u64) {
         let ns = u64::try_from(elapsed.as_nanos()).unwrap_or(u64::MAX);
-        let mut histograms = lock(&self.histograms);
-        histograms.since_start.saturating_record(ns);
-        histograms.current.saturating_record(ns);
-        drop(histograms);
+        lock(&self.current).saturating_record(ns);
         self.buckets.observe(elapsed.as_secs_f64());
         if out_of_domain > 0 {
             self.out_of_domain.inc_by(out_of_domain);
         }
     }
 
+    /// The accounts with everything in them. What queries write to is exchanged and not copied, so that they never wait
+    /// for whoever looks at the latencies.
+    fn collect(&self) -> MutexGuard<'_, Accounts> {
+        let mut guard = lock(&self.accounts);
+        let accounts = &mut *guard;
+        std::mem::swap(&mut *lock(&self.current), &mut accounts.spare);
+        for account in [&mut accounts.since_start, &mut accounts.window] {
+            account.add(&accounts.spare).expect("both have the same bounds");
+        }
+        accounts.spare.reset();
+        guard
+    }
+
     fn rotate(&self) {
-        let mut histograms = lock(&self.histograms);
-        let histograms = &mut *histograms;
-        std::mem::swap(&mut histograms.current, &mut histograms.last);
-        histograms.current.reset();
+        let mut guard = self.collect();
+        let accounts = &mut *guard;
+        std::mem::swap(&mut accounts.window, &mut accounts.last_window);
+        accounts.window.reset();
     }
 }
 
@@ -263,6 +292,11 @@ impl Metrics {
         self.bundle_version.get_or_create(&labels).set(i64::from(version));
     }
 
+    /// Forgets the version of a vehicle that is not served any more.
+    pub fn forget_bundle_version(&self, vehicle: &str) {
+        self.bundle_version.remove(&VehicleLabels { vehicle: vehicle.to_owned() });
+    }
+
     /// Counts a bundle that was read while serving.
     pub fn count_reload(&self, accepted: bool) {
         let outcome = RELOAD_OUTCOMES[usize::from(!accepted)];
@@ -281,21 +315,14 @@ impl Metrics {
     /// Percentiles of every transport and vehicle that was asked.
     pub fn latencies(&self) -> Vec<Latency> {
         let rows = Transport::ALL.into_iter().zip(&self.recorders).flat_map(|(transport, recorders)| {
-            let recorders = recorders.read().unwrap_or_else(PoisonError::into_inner);
-            let row = |(vehicle, recorder): (&String, &Arc<Recorder>)| {
-                // copied first: a query must not wait while percentiles are looked up
-                let (since_start, window) = {
-                    let histograms = lock(&recorder.histograms);
-                    (histograms.since_start.clone(), histograms.last.clone())
-                };
-                Latency {
-                    transport,
-                    vehicle: vehicle.clone(),
-                    since_start: Percentiles::of(&since_start),
-                    window: Percentiles::of(&window),
-                }
-            };
-            recorders.iter().map(row).collect::<Vec<_>>()
+            // not looked up under the lock: a new vehicle's first query would wait for it, and the others for that one
+            let recorders = recorders.read().unwrap_or_else(PoisonError::into_inner).clone();
+            recorders.into_iter().map(move |(vehicle, recorder)| {
+                let accounts = recorder.collect();
+                let (since_start, window) = (&accounts.since_start, &accounts.last_window);
+                let (since_start, window) = (Percentiles::of(since_start), Percentiles::of(window));
+                Latency { transport, vehicle, since_start, window }
+            })
         });
         rows.collect()
     }

@@ -79,7 +79,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     let (stop, stopped) = watch::channel(false);
     let (stop_http, http_stopped) = watch::channel(false);
     let mut running = Running {
-        grpc: Arc::new(runtime.block_on(grpc::Server::new(config.grpc.clone(), shared))),
+        grpc: Arc::new(runtime.block_on(grpc::Server::new(config.grpc.clone(), shared.clone()))),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         ready: Arc::new(AtomicBool::new(false)),
         stop_shm: Arc::new(AtomicBool::new(false)),
@@ -98,7 +98,13 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         running.spawn_grpc(stopped.clone())?;
     }
     let window = Duration::from_secs_f64(config.latency_window_s);
-    running.spawn_housekeeping(http_listener, window, http_stopped)?;
+    let shared = http::Shared {
+        hosts: config.http.hosts.clone(),
+        grpc: shared,
+        requests: Arc::clone(running.grpc.requests()),
+        ready: Arc::clone(&running.ready),
+    };
+    running.spawn_housekeeping(http_listener, shared, window, http_stopped)?;
     running.reloader.load_all()?;
     if config.shm.enabled {
         running.spawn_shm(config, engine)?;
@@ -185,10 +191,11 @@ impl Running {
     fn spawn_housekeeping(
         &mut self,
         listener: Option<std::net::TcpListener>,
+        shared: http::Shared,
         window: Duration,
         stop: watch::Receiver<bool>,
     ) -> Result<(), StartError> {
-        let (metrics, ready) = (Arc::clone(&self.metrics), Arc::clone(&self.ready));
+        let metrics = Arc::clone(&self.metrics);
         let runtime = runtime()?;
         let thread = self.spawn("wade-http", move || {
             let rotating = async {
@@ -201,7 +208,7 @@ impl Running {
             };
             let serving = async {
                 let Some(listener) = listener else { return };
-                if let Err(error) = http::run(listener, Arc::clone(&metrics), ready, stop.clone()).await {
+                if let Err(error) = http::run(listener, shared, stop.clone()).await {
                     tracing::error!(%error, "HTTP ended");
                 }
             };

@@ -1,21 +1,22 @@
-//! Promise: metrics and probes answer over HTTP.
+//! Promise: metrics, probes and queries as JSON answer over HTTP, the latter with the bits of every other transport and to
+//! nobody's browser but the user's own.
+
+#[path = "common/http.rs"]
+mod http;
 
 mod common;
 
-use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::SocketAddr;
+use std::time::Instant;
 
-use common::Served;
-use wade::client::Method;
+use common::{Numbers, PATIENCE, Served, VEHICLES};
+use http::{Answer, get, post, send};
+use serde_json::{Value, json};
+use wade::client::{Client, GrpcClient, Method};
 use wade::service::wire::State;
 
-fn get(served: &Served, path: &str) -> String {
-    let address = served.running.http_address().expect("HTTP is on");
-    let mut stream = TcpStream::connect(address).expect("connected");
-    write!(stream, "GET {path} HTTP/1.1\r\nHost: wade\r\nConnection: close\r\n\r\n").expect("sent");
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).expect("received");
-    answer
+fn address(served: &Served) -> SocketAddr {
+    served.running.http_address().expect("HTTP is on")
 }
 
 #[test]
@@ -24,11 +25,15 @@ fn a_served_query_shows_in_the_metrics() {
     let mut client = served.tcp("husky", Method::Unary);
     client.evaluate(&State { depth: 0.1, ..State::default() }).expect("answered");
     client.evaluate(&State { depth: -0.1, ..State::default() }).expect_err("refused");
-    let text = get(&served, "/metrics");
+    post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
+    post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": -0.1}}"#);
+    let text = get(address(&served), "/metrics").body;
     for expected in [
         r#"wade_request_duration_seconds_count{transport="grpc_unary",vehicle="husky"} 1"#,
+        r#"wade_request_duration_seconds_count{transport="http",vehicle="husky"} 1"#,
         r#"wade_out_of_domain_total{transport="grpc_unary",vehicle="husky"} 1"#,
         r#"wade_refusals_total{transport="grpc_unary",reason="invalid_argument"} 1"#,
+        r#"wade_refusals_total{transport="http",reason="invalid_argument"} 1"#,
         r#"wade_bundle_version{vehicle="warthog"}"#,
         "# EOF",
     ] {
@@ -39,7 +44,315 @@ fn a_served_query_shows_in_the_metrics() {
 #[test]
 fn probes_say_live_and_ready() {
     let served = Served::start();
-    assert!(get(&served, "/livez").starts_with("HTTP/1.1 200"));
-    assert!(get(&served, "/readyz").starts_with("HTTP/1.1 200"));
-    assert!(get(&served, "/nothing").starts_with("HTTP/1.1 404"));
+    assert_eq!(get(address(&served), "/livez").status, 200);
+    assert_eq!(get(address(&served), "/readyz").status, 200);
+    let nothing = get(address(&served), "/nothing");
+    assert_eq!(nothing.status, 404);
+    assert!(nothing.body.contains("/v1/query"), "{nothing:?}");
+}
+
+/// A query with every field there is.
+fn query(vehicle: &str, state: &State) -> Value {
+    let vector = |[x, y, z]: [f32; 3]| json!({"x": x, "y": y, "z": z});
+    json!({"vehicle": vehicle, "state": {
+        "velocity_mps": vector(state.velocity),
+        "current_mps": vector(state.current),
+        "angular_velocity_radps": vector(state.angular_velocity),
+        "acceleration_mps2": vector(state.acceleration),
+        "angular_acceleration_radps2": vector(state.angular_acceleration),
+        "depth_m": state.depth,
+        "density_kgpm3": state.density,
+        "gravity_direction": vector(state.gravity),
+        "ground_contact": if state.dry_contact { "GROUND_CONTACT_DRY" } else { "GROUND_CONTACT_WETTED" },
+        "heading_rad": state.heading,
+        "depth_rate_mps": state.depth_rate,
+        "wheel_speed_radps": state.wheel_speeds,
+        "time_step_s": state.time_step,
+        "implicit_added_mass": state.implicit_added_mass,
+    }})
+}
+
+fn bits<'v>(values: impl IntoIterator<Item = &'v Value>) -> Vec<u32> {
+    values.into_iter().map(|value| (value.as_f64().expect("a number") as f32).to_bits()).collect()
+}
+
+fn vector_bits(value: &Value) -> Vec<u32> {
+    bits(["x", "y", "z"].map(|axis| &value[axis]))
+}
+
+#[test]
+fn a_query_as_json_has_the_bits_of_grpc_with_every_effect() {
+    let bundles = common::copy_with_every_effect();
+    let served = Served::with(|config| config.vehicles = bundles.path().to_owned());
+    let mut numbers = Numbers::new(6);
+    for vehicle in VEHICLES {
+        let mut client = Client::Grpc(Box::new(served.tcp(vehicle, Method::Unary)));
+        for _ in 0..20 {
+            let state = numbers.state();
+            let expected = client.evaluate(&state).expect("answered");
+            let answer = post(address(&served), "/v1/query", &query(vehicle, &state).to_string());
+            assert_eq!(answer.status, 200, "{answer:?}");
+            let answer = answer.json();
+            let forces = bits(answer["surface_force_n"].as_array().expect("an array"));
+            let points = bits(answer["surface_point_m"].as_array().expect("an array"));
+            let expected_forces: Vec<u32> =
+                expected.surfaces.iter().flat_map(|surface| surface.force.map(f32::to_bits)).collect();
+            let expected_points: Vec<u32> =
+                expected.surfaces.iter().flat_map(|surface| surface.point.map(f32::to_bits)).collect();
+            assert_eq!((forces, points), (expected_forces, expected_points));
+            assert_eq!(vector_bits(&answer["wrench"]["force_n"]), expected.force.map(f32::to_bits));
+            assert_eq!(vector_bits(&answer["wrench"]["moment_nm"]), expected.moment.map(f32::to_bits));
+            assert_eq!(vector_bits(&answer["uncertainty_n"]), expected.uncertainty.map(f32::to_bits));
+            assert_eq!(answer["in_domain"], json!(expected.outside.is_inside()));
+            assert_eq!(answer["bundle_version"], json!(expected.version));
+            let effects = answer["effects"].as_array().expect("an array");
+            assert_eq!(effects.len(), expected.effects.len());
+            for (effect, expected) in effects.iter().zip(&expected.effects) {
+                assert_eq!(vector_bits(&effect["force_n"]), expected.force.map(f32::to_bits));
+            }
+            assert_eq!(
+                bits(answer["added_mass"].as_array().expect("an array")),
+                expected.added_mass.expect("there is such an effect").map(f32::to_bits)
+            );
+        }
+    }
+}
+
+#[test]
+fn a_query_by_parameters_and_by_other_names_is_the_same_query() {
+    let served = Served::start();
+    let without_time = |answer: Answer| {
+        assert_eq!(answer.status, 200, "{answer:?}");
+        let mut answer = answer.json();
+        answer["compute_ns"] = Value::Null;
+        answer
+    };
+    let expected = without_time(post(
+        address(&served),
+        "/v1/query",
+        r#"{"vehicle": "husky", "state": {"depth_m": 0.15, "velocity_mps": {"x": 0.5, "y": -0.25},
+            "roll_pitch": {"pitch_rad": -0.1}, "implicit_added_mass": true, "wheel_speed_radps": [1, 2, 3, 4]}}"#,
+    ));
+    let camel = r#"{"vehicle": "husky", "state": {"depthM": "0.15", "velocityMps": {"x": 0.5, "y": -0.25},
+        "rollPitch": {"pitchRad": -0.1}, "implicitAddedMass": true, "wheelSpeedRadps": [1, 2, 3, 4]}}"#;
+    assert_eq!(without_time(post(address(&served), "/v1/query", camel)), expected);
+    let parameters = "/v1/query?vehicle=husky&state.depth_m=0.15&state.velocity_mps.x=0.5&state.velocity_mps.y=-0.25\
+        &state.roll_pitch.pitch_rad=-0.1&state.implicit_added_mass=true&state.wheel_speed_radps=1\
+        &state.wheel_speed_radps=2&state.wheel_speed_radps=3&state.wheel_speed_radps=4";
+    assert_eq!(without_time(get(address(&served), parameters)), expected);
+}
+
+/// Status, status in words, and field of a refusal.
+fn refusal(answer: &Answer) -> (u16, String, String) {
+    let error = answer.json()["error"].clone();
+    assert_eq!(error["code"], json!(answer.status));
+    assert!(error["message"].as_str().is_some_and(|message| message.len() > 5), "{error}");
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    (answer.status, text(&error["status"]), text(&error["field_violations"][0]["field"]))
+}
+
+#[test]
+fn bad_queries_are_refused_by_field_and_the_next_good_one_is_answered() {
+    let served = Served::start();
+    let invalid = |field: &str| (400, "INVALID_ARGUMENT".to_owned(), field.to_owned());
+    let bodies = [
+        ("", invalid("")),
+        ("{", invalid("")),
+        ("[1]", invalid("")),
+        (r#"{"vehicle": "husky", "state": {"depth_m": 0.1}} x"#, invalid("")),
+        (r#"{"vehicle": "husky"}"#, invalid("state")),
+        (r#"{"vehicle": "husky", "state": {"depth": 0.1}}"#, invalid("state")),
+        (r#"{"vehicle": "husky", "state": {"depth_m": "deep"}}"#, invalid("state.depth_m")),
+        (r#"{"vehicle": "husky", "state": {"depth_m": 1e99}}"#, invalid("state.depth_m")),
+        (r#"{"vehicle": "husky", "state": {"depth_m": "NaN"}}"#, invalid("state.depth_m")),
+        (r#"{"vehicle": "husky", "state": {"depth_m": -0.1}}"#, invalid("state.depth_m")),
+        (r#"{"vehicle": "husky", "state": {"velocity_mps": [1, 2, 3]}}"#, invalid("state.velocity_mps")),
+        (
+            r#"{"vehicle": "husky", "state": {"velocity_mps": {"x": "Infinity"}}}"#,
+            invalid("state.velocity_mps"),
+        ),
+        (r#"{"vehicle": "husky", "state": {"wheel_speed_radps": [1]}}"#, invalid("state.wheel_speed_radps")),
+        (r#"{"vehicle": "husky", "state": {"ground_contact": "WET"}}"#, invalid("state.ground_contact")),
+        (r#"{"vehicle": "tank", "state": {}}"#, (404, "NOT_FOUND".into(), String::new())),
+    ];
+    for (body, expected) in bodies {
+        let answer = post(address(&served), "/v1/query", body);
+        assert_eq!(refusal(&answer), expected, "{body}: {answer:?}");
+    }
+    let parameters = [
+        ("vehicle=husky&depth_m=0.1", invalid("depth_m")),
+        ("vehicle=husky&state=1", invalid("state")),
+        ("vehicle=husky&state.velocity_mps=1", invalid("state.velocity_mps")),
+        ("vehicle=husky&state.depth_m.x=1", invalid("state.depth_m.x")),
+        ("vehicle=husky&state.depth_m=1&state.depth_m=2", invalid("state.depth_m")),
+        ("vehicle=husky&state.depth_m=deep", invalid("state.depth_m")),
+        ("vehicle=husky&vehicle=warthog", invalid("vehicle")),
+        ("", (404, "NOT_FOUND".into(), String::new())),
+    ];
+    for (parameters, expected) in parameters {
+        let answer = get(address(&served), &format!("/v1/query?{parameters}"));
+        assert_eq!(refusal(&answer), expected, "{parameters}: {answer:?}");
+    }
+    let unknown = post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth": 0.1}}"#);
+    assert!(unknown.body.contains("depth_m"), "the way out is named: {unknown:?}");
+    let long = post(address(&served), "/v1/query", &format!("{{\"vehicle\": \"{}\"}}", "x".repeat(1 << 17)));
+    assert_eq!(refusal(&long), (413, "RESOURCE_EXHAUSTED".into(), String::new()));
+    let deep = post(address(&served), "/v1/query", &"[".repeat(60_000));
+    assert_eq!(refusal(&deep), invalid(""));
+    let name = post(address(&served), "/v1/query", &json!({"vehicle": "x".repeat(50_000)}).to_string());
+    assert!(name.status == 404 && name.body.len() < 1000, "{name:?}");
+    let good = post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
+    assert_eq!(good.status, 200);
+}
+
+#[test]
+fn json_is_refused_while_grpc_takes_every_place() {
+    let served = Served::with(|config| {
+        config.grpc.max_requests = 1;
+        config.grpc.max_batch = 1 << 14;
+    });
+    let address = address(&served);
+    // this is about places, on a machine of any speed
+    let patience = 10 * PATIENCE;
+    let mut client =
+        GrpcClient::tcp(&served.url(), "husky", Method::Unary, patience).expect("the server is there");
+    let states = vec![State { depth: 0.1, ..State::default() }; 1 << 13];
+    let long = std::thread::spawn(move || client.evaluate_batch(&states));
+    let start = Instant::now();
+    let refused = loop {
+        let answer = post(address, "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
+        if answer.status != 200 {
+            break answer;
+        }
+        assert!(start.elapsed() < patience && !long.is_finished(), "never refused");
+    };
+    assert_eq!(refusal(&refused), (429, "RESOURCE_EXHAUSTED".into(), String::new()));
+    assert_eq!(refused.header("retry-after"), Some("1"));
+    long.join().expect("joined").expect("the batch is answered");
+}
+
+#[test]
+fn a_hull_has_the_areas_that_the_vehicle_states_and_is_sent_once() {
+    let served = Served::start();
+    for vehicle in VEHICLES {
+        let answer = get(address(&served), &format!("/v1/vehicles/{vehicle}/hull"));
+        let hull = answer.json();
+        let numbers = |key: &str| -> Vec<f64> {
+            hull[key]
+                .as_array()
+                .expect("an array")
+                .iter()
+                .map(|value| value.as_f64().expect("a number"))
+                .collect()
+        };
+        let (vertices, triangles, surface) =
+            (numbers("vertices_m"), numbers("triangles"), numbers("triangle_surface"));
+        let corner = |index: f64| nalgebra::Vector3::from_column_slice(&vertices[3 * index as usize..][..3]);
+        let stated = get(address(&served), &format!("/v1/vehicles/{vehicle}")).json();
+        let stated = stated["surfaces"].as_array().expect("an array").clone();
+        let mut areas = vec![0.0; stated.len()];
+        for (triangle, surface) in triangles.chunks(3).zip(&surface) {
+            let [a, b, c] = [0, 1, 2].map(|k| corner(triangle[k]));
+            areas[*surface as usize] += (b - a).cross(&(c - a)).norm() / 2.0;
+        }
+        for (area, stated) in areas.iter().zip(&stated) {
+            let expected = stated["area_m2"].as_f64().expect("a number");
+            assert!((area / expected - 1.0).abs() < 1e-5, "{}: {area} {expected}", stated["name"]);
+        }
+        let etag = answer.header("etag").expect("a tag").to_owned();
+        let again = send(
+            address(&served),
+            &format!("GET /v1/vehicles/{vehicle}/hull"),
+            &[("If-None-Match", &etag)],
+            "",
+        );
+        assert_eq!((again.status, again.body.as_str()), (304, ""));
+    }
+    assert_eq!(get(address(&served), "/v1/vehicles/tank/hull").status, 404);
+    assert_eq!(get(address(&served), "/v1/vehicles/%2e%2e%2fhusky/hull").status, 404);
+}
+
+#[test]
+fn a_hull_is_written_anew_for_a_new_version() {
+    let bundles = common::copy_of_vehicles();
+    let served = Served::with(|config| config.vehicles = bundles.path().to_owned());
+    let version = || get(address(&served), "/v1/vehicles/husky/hull").json()["bundle_version"].as_u64();
+    let before = version().expect("a number");
+    wade::bundle::apply(&bundles.path().join("husky"), common::every_effect("husky")).expect("applied");
+    served.running.reloader().reload("husky").expect("known");
+    assert_eq!(version(), Some(before + 1));
+}
+
+#[test]
+fn only_those_who_call_the_server_by_a_known_name_and_from_its_own_page_are_answered() {
+    let served = Served::with(|config| config.http.hosts = vec!["rig.lab".into()]);
+    let address = address(&served);
+    let port = address.port();
+    let ask =
+        |path: &str, headers: &[(&str, &str)]| send(address, &format!("GET {path}"), headers, "").status;
+    for host in ["127.0.0.1", "[::1]:80", "localhost", &format!("LOCALHOST:{port}"), "rig.lab:1", "10.1.2.3"]
+    {
+        assert_eq!(ask("/", &[("Host", host)]), 200, "{host}");
+        assert_eq!(ask("/v1/vehicles", &[("Host", host)]), 200, "{host}");
+    }
+    for host in [
+        "evil.example",
+        "127.0.0.1.evil.example",
+        "localhost.evil.example",
+        "rig.lab@evil.example",
+        "",
+        "a b",
+    ] {
+        assert_eq!(ask("/", &[("Host", host)]), 403, "{host:?}");
+        assert_eq!(ask("/v1/vehicles/husky/hull", &[("Host", host)]), 403, "{host:?}");
+        assert_eq!(ask("/readyz", &[("Host", host)]), 200, "probes come by any name: {host:?}");
+    }
+    let ours = format!("http://{address}");
+    for (headers, expected) in [
+        (vec![("Sec-Fetch-Site", "cross-site")], 403),
+        (vec![("Sec-Fetch-Site", "same-site")], 403),
+        (vec![("Sec-Fetch-Site", "same-origin")], 200),
+        (vec![("Sec-Fetch-Site", "none")], 200),
+        (vec![("Origin", "https://evil.example")], 403),
+        (vec![("Origin", "null")], 403),
+        (vec![("Origin", ours.as_str())], 200),
+    ] {
+        assert_eq!(ask("/v1/latency", &headers), expected, "{headers:?}");
+    }
+    assert_eq!(ask("/", &[("Sec-Fetch-Site", "cross-site")]), 200, "a link may lead here");
+    let preflight = send(
+        address,
+        "OPTIONS /v1/query",
+        &[("Origin", "https://evil.example"), ("Access-Control-Request-Method", "POST")],
+        "",
+    );
+    assert!(preflight.status >= 400 && !preflight.headers.to_lowercase().contains("access-control"));
+}
+
+#[test]
+fn the_page_needs_nothing_from_elsewhere() {
+    let served = Served::start();
+    let page = get(address(&served), "/");
+    let policy = page.header("content-security-policy").expect("a policy");
+    assert!(
+        policy.contains("default-src 'none'") && !policy.contains("unsafe") && !policy.contains('*'),
+        "{policy}"
+    );
+    assert!(page.header("access-control-allow-origin").is_none());
+    let mut queue: Vec<String> = quoted(&page.body).filter(|path| path.starts_with("/page/")).collect();
+    assert!(!page.body.contains("://"), "an address of another host");
+    let mut seen = 0;
+    while let Some(path) = queue.pop() {
+        let file = get(address(&served), &path);
+        assert_eq!(file.status, 200, "{path}");
+        assert!(!file.body.contains("://"), "{path} names another host");
+        let imports = file.body.lines().filter(|line| line.starts_with("import"));
+        queue.extend(imports.flat_map(quoted).map(|name| name.replacen("./", "/page/", 1)));
+        seen += 1;
+    }
+    assert!(seen >= 8, "{seen}");
+}
+
+fn quoted(text: &str) -> impl Iterator<Item = String> + '_ {
+    text.split('"').skip(1).step_by(2).map(str::to_owned)
 }

@@ -91,11 +91,8 @@ impl Reloader {
     /// leaves the version before it in service.
     pub fn reload(&self, vehicle: &str) -> Result<Vec<Reload>, UnknownVehicle> {
         let _guard = self.one_at_a_time.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut names: Vec<String> = self.engine.vehicles().keys().cloned().collect();
         // a folder that cannot be listed refuses each vehicle below, by name
-        names.extend(bundle::names_in(&self.directory).unwrap_or_default());
-        names.sort();
-        names.dedup();
+        let mut names = self.names();
         if !vehicle.is_empty() {
             names.retain(|name| name == vehicle);
             if names.is_empty() {
@@ -103,6 +100,24 @@ impl Reloader {
             }
         }
         Ok(names.into_iter().map(|name| self.reload_one(name)).collect())
+    }
+
+    /// Serves a vehicle no more, until it is loaded again.
+    pub fn unload(&self, vehicle: &str) -> Result<(), UnknownVehicle> {
+        let _guard = self.one_at_a_time.lock().unwrap_or_else(PoisonError::into_inner);
+        self.engine.remove(vehicle)?;
+        self.metrics.forget_bundle_version(vehicle);
+        tracing::info!(vehicle, "bundle unloaded");
+        Ok(())
+    }
+
+    /// The vehicles that are served and those in the folder.
+    pub fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.engine.vehicles().keys().cloned().collect();
+        names.extend(bundle::names_in(&self.directory).unwrap_or_default());
+        names.sort();
+        names.dedup();
+        names
     }
 
     fn reload_one(&self, vehicle: String) -> Reload {

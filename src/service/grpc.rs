@@ -2,9 +2,13 @@
 
 mod convert;
 mod handlers;
+mod inference;
 mod stream;
 
 pub use convert::{added_mass, single};
+pub(super) use convert::{latency, summary, vehicle};
+pub(super) use handlers::{Call, answer_state};
+pub use inference::TensorFault;
 
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -28,6 +32,7 @@ use super::admin::Reloader;
 use super::proto;
 use super::proto::admin_server::AdminServer;
 use super::proto::hydrodynamics_server::HydrodynamicsServer;
+use super::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
 use super::wire::Refusal;
 use crate::engine::{Admission, Engine};
 use crate::metrics::Metrics;
@@ -167,8 +172,8 @@ fn bind_unix(path: &Path) -> Result<UnixListener, GrpcError> {
     bind().map_err(|source| GrpcError::Bind { at: path.display().to_string(), source })
 }
 
-/// What a health check may ask about: the server as a whole, and its service.
-const HEALTH_NAMES: [&str; 2] = ["", "wade.v1.Hydrodynamics"];
+/// What a health check may ask about: the server as a whole, and its services.
+const HEALTH_NAMES: [&str; 3] = ["", "wade.v1.Hydrodynamics", "inference.GRPCInferenceService"];
 
 /// What the handlers share.
 #[derive(Debug, Clone)]
@@ -208,6 +213,11 @@ impl Server {
         server
     }
 
+    /// Counts the requests that are being answered, for doors beside gRPC.
+    pub fn requests(&self) -> &Arc<Admission> {
+        &self.requests
+    }
+
     /// Says SERVING to those who ask for our health.
     pub async fn set_serving(&self) {
         self.set_health(tonic_health::ServingStatus::Serving).await;
@@ -245,6 +255,9 @@ impl Server {
             stop: stop.clone(),
         };
         let admin = AdminServer::new(handlers::AdminHandlers { reloader: Arc::clone(&self.shared.reloader) });
+        let inference = inference::InferenceHandlers { handlers: handlers.clone() };
+        let inference = GrpcInferenceServiceServer::new(inference)
+            .max_decoding_message_size(self.config.max_message_bytes);
         let reflection = || {
             tonic_reflection::server::Builder::configure()
                 .register_encoded_file_descriptor_set(proto::DESCRIPTORS)
@@ -257,6 +270,7 @@ impl Server {
             .add_service(
                 HydrodynamicsServer::new(handlers).max_decoding_message_size(self.config.max_message_bytes),
             )
+            .add_service(inference)
             .add_service(admin)
             .add_service(HealthServer::new(HealthService::from_health_reporter(self.health.clone())))
             .add_service(reflection().build_v1()?)

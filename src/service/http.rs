@@ -1,17 +1,28 @@
-//! Metrics and probes over HTTP.
+//! HTTP: a page to look at, queries as JSON, metrics and probes. It has one thread of its own, so that whatever is asked
+//! here takes no time of the threads that answer gRPC and shared memory.
+
+mod guard;
+mod hull;
+mod json;
+mod page;
+mod query;
+mod rejection;
 
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use axum::Router;
+use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
 use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 
-use crate::metrics::Metrics;
+use super::grpc;
+use crate::engine::Admission;
+use rejection::Rejection;
 
 /// Settings of the HTTP server.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,11 +30,13 @@ use crate::metrics::Metrics;
 pub struct Config {
     /// TCP address; an empty string turns HTTP off.
     pub listen: String,
+    /// Names of this machine under which the page and queries are served, beside localhost and plain addresses.
+    pub hosts: Vec<String>,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { listen: "127.0.0.1:9464".into() }
+        Self { listen: "127.0.0.1:9464".into(), hosts: Vec::new() }
     }
 }
 
@@ -62,32 +75,56 @@ pub fn bind(config: &Config) -> Result<Option<TcpListener>, HttpError> {
     bind().map(Some).map_err(|source| HttpError::Bind { listen, source })
 }
 
-/// Serves `/metrics`, `/livez` and `/readyz` until `stop` turns true.
+/// What the handlers share.
+#[derive(Debug)]
+pub struct Shared {
+    /// Names by which the page may be called.
+    pub hosts: Vec<String>,
+    /// What gRPC's handlers share: the models, the metrics.
+    pub grpc: grpc::Shared,
+    /// The places that gRPC's requests take.
+    pub requests: Arc<Admission>,
+    /// Whether queries are answered.
+    pub ready: Arc<AtomicBool>,
+}
+
+/// Serves until `stop` turns true.
 pub async fn run(
     listener: TcpListener,
-    metrics: Arc<Metrics>,
-    ready: Arc<AtomicBool>,
+    shared: Shared,
     mut stop: watch::Receiver<bool>,
 ) -> std::io::Result<()> {
-    let scrape = move || {
-        let content_type = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-        std::future::ready(([(header::CONTENT_TYPE, content_type)], metrics.render()).into_response())
-    };
-    let readyz = move || {
-        std::future::ready(if ready.load(Ordering::Relaxed) {
-            (StatusCode::OK, "ready\n")
-        } else {
-            (StatusCode::SERVICE_UNAVAILABLE, "not ready\n")
-        })
-    };
-    let router = Router::new()
-        .route("/metrics", get(scrape))
-        .route("/livez", get(|| std::future::ready("live\n")))
-        .route("/readyz", get(readyz));
     let stopped = async move {
         // an error means that the sender is gone, and with it the server
         let _ = stop.wait_for(|&stop| stop).await;
     };
     let listener = tokio::net::TcpListener::from_std(listener)?;
-    axum::serve(listener, router).with_graceful_shutdown(stopped).await
+    axum::serve(listener, router(Arc::new(shared))).with_graceful_shutdown(stopped).await
+}
+
+fn router(shared: Arc<Shared>) -> Router {
+    let guarded = |routes: Router<Arc<Shared>>| {
+        routes.layer(axum::middleware::from_fn_with_state(Arc::clone(&shared), guard::check))
+    };
+    let browsed = guarded(page::routes().merge(query::routes()).merge(hull::routes()));
+    Router::new()
+        .route("/metrics", get(metrics))
+        .route("/livez", get(|| std::future::ready("live\n")))
+        .route("/readyz", get(readyz))
+        .merge(browsed)
+        .fallback(|| std::future::ready(Rejection::NoSuchPath))
+        .with_state(shared)
+}
+
+async fn metrics(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
+    let content_type = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+    ([(header::CONTENT_TYPE, content_type)], shared.grpc.metrics.render())
+}
+
+async fn readyz(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
+    if shared.ready.load(Ordering::Relaxed) {
+        (StatusCode::OK, "ready\n")
+    } else {
+        (StatusCode::SERVICE_UNAVAILABLE, "not ready\n")
+    }
 }

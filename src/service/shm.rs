@@ -342,6 +342,10 @@ impl ShmServer {
                 for (arrived, request) in door.batches.drain(..) {
                     self.desk.answer_batch(at, arrived, &request, &door.batch_recorder);
                 }
+            } else {
+                // it was unloaded: a client whose request is dropped hears nothing, as from a server that is gone
+                door.singles.clear();
+                door.batches.clear();
             }
         }
         any

@@ -8,6 +8,7 @@ use crate::condition::{Condition, FRESH_WATER, GroundContact};
 use crate::effects::Circumstances;
 use crate::engine::{Overloaded, UnknownVehicle};
 use crate::frame::Vec3;
+use crate::service::grpc::TensorFault;
 
 /// A state as it travels: single precision, body frame, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -306,9 +307,28 @@ pub enum Refusal {
     /// No such vehicle.
     #[error(transparent)]
     UnknownVehicle(UnknownVehicle),
-    /// The bundles are still being read.
-    #[error("the vehicles are still being loaded")]
+    /// The bundles are still being read, or every vehicle was unloaded.
+    #[error("no vehicle is served: they are still being loaded, or none is left")]
     NotReady,
+    /// Another version of the vehicle is served.
+    #[error("{vehicle} is not served in version \"{version}\"; served: {served}")]
+    UnknownVersion {
+        /// The vehicle.
+        vehicle: String,
+        /// The version asked for.
+        version: String,
+        /// The version served.
+        served: u32,
+    },
+    /// A repository of models by name.
+    #[error("there is no repository \"{name}\": the one there is has no name")]
+    UnknownRepository {
+        /// The name.
+        name: String,
+    },
+    /// A tensor of an inference request is wrong.
+    #[error(transparent)]
+    Tensor(#[from] TensorFault),
     /// A field of the state is wrong; in a batch, of the state with this index.
     #[error("{invalid}{}", .index.map(|i| format!(" (state {i} of the batch)")).unwrap_or_default())]
     Invalid {
@@ -384,11 +404,14 @@ impl Refusal {
     /// The gRPC code.
     pub fn code(&self) -> Code {
         match self {
-            Self::UnknownVehicle(_) => Code::NotFound,
+            Self::UnknownVehicle(_) | Self::UnknownVersion { .. } | Self::UnknownRepository { .. } => {
+                Code::NotFound
+            }
             Self::NotReady => Code::Unavailable,
             Self::Overloaded { .. } | Self::MessageTooLong { .. } => Code::ResourceExhausted,
             Self::DeadlineExceeded { .. } => Code::DeadlineExceeded,
             Self::Invalid { .. }
+            | Self::Tensor(_)
             | Self::MissingState
             | Self::EmptyBatch
             | Self::BatchTooLong { .. }
@@ -407,12 +430,20 @@ impl Refusal {
         }
     }
 
-    fn details(&self) -> ErrorDetails {
+    /// What a program can read of it: the field, or when to try again.
+    pub(super) fn details(&self) -> ErrorDetails {
         let message = self.to_string();
         match self {
             Self::UnknownVehicle(unknown) => {
                 ErrorDetails::with_resource_info("wade.v1.Vehicle", unknown.name.as_str(), "", message)
             }
+            Self::UnknownVersion { vehicle, .. } => {
+                ErrorDetails::with_resource_info("wade.v1.Vehicle", vehicle.as_str(), "", message)
+            }
+            Self::UnknownRepository { name } => {
+                ErrorDetails::with_resource_info("repository", name.as_str(), "", message)
+            }
+            Self::Tensor(fault) => ErrorDetails::with_bad_request_violation(fault.field(), message),
             Self::Overloaded { .. } | Self::NotReady => ErrorDetails::with_retry_info(Some(RETRY_AFTER)),
             // the same message would be refused again, so there is no time to retry after
             Self::DeadlineExceeded { .. } | Self::MessageTooLong { .. } => ErrorDetails::new(),

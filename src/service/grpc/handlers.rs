@@ -33,17 +33,26 @@ pub struct Names {
     unary: Transport,
     batch: Transport,
     stream: Transport,
+    pub(super) infer: Transport,
 }
 
 /// The TCP listener's.
-pub(super) const TCP: Names =
-    Names { unary: Transport::grpc_unary, batch: Transport::grpc_batch, stream: Transport::grpc_stream };
+pub(super) const TCP: Names = Names {
+    unary: Transport::grpc_unary,
+    batch: Transport::grpc_batch,
+    stream: Transport::grpc_stream,
+    infer: Transport::grpc_infer,
+};
 /// The Unix socket's.
-pub(super) const UNIX: Names =
-    Names { unary: Transport::uds_unary, batch: Transport::uds_batch, stream: Transport::uds_stream };
+pub(super) const UNIX: Names = Names {
+    unary: Transport::uds_unary,
+    batch: Transport::uds_batch,
+    stream: Transport::uds_stream,
+    infer: Transport::uds_infer,
+};
 
 /// The handlers of `wade.v1.Hydrodynamics`.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Handlers {
     pub(super) shared: Shared,
     pub(super) names: Names,
@@ -101,7 +110,7 @@ impl Hydrodynamics for Handlers {
                 );
                 Ok(Response::new(answers))
             }
-            Err(refusal) => Err(call.refuse(refusal)),
+            Err(refusal) => Err(call.refuse(refusal).into()),
         }
     }
 
@@ -138,7 +147,16 @@ impl Handlers {
         call: &Call<'_>,
         request: &proto::EvaluateBatchRequest,
     ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
-        let vehicle = self.shared.engine.vehicle(&request.vehicle)?;
+        self.batch_of(call, self.shared.engine.vehicle(&request.vehicle)?, request).await
+    }
+
+    /// Answers a batch for this version of its vehicle.
+    pub(super) async fn batch_of(
+        &self,
+        call: &Call<'_>,
+        vehicle: Arc<ServedVehicle>,
+        request: &proto::EvaluateBatchRequest,
+    ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
         let states = convert::batch(request, self.max_batch)?;
         let with_surfaces = !request.omit_surfaces;
         let mut response = convert::batch_response(&vehicle, states.len(), with_surfaces);
@@ -167,13 +185,13 @@ impl Handlers {
 
 /// What the metrics need to know of an answer.
 #[derive(Debug)]
-pub(super) struct Answered {
+pub(in crate::service) struct Answered {
     vehicle: Arc<ServedVehicle>,
     out_of_domain: u64,
 }
 
 /// Answers one state on the thread that read it.
-pub(super) fn answer_state(
+pub(in crate::service) fn answer_state(
     vehicle: &Arc<ServedVehicle>,
     state: Option<&proto::State>,
     session: Option<&mut Session>,
@@ -188,7 +206,7 @@ pub(super) fn answer_state(
 }
 
 /// One request from its arrival to its answer: deadline, metrics and, where asked for, a line in the log.
-pub(super) struct Call<'s> {
+pub(in crate::service) struct Call<'s> {
     shared: &'s Shared,
     transport: Transport,
     arrived: Instant,
@@ -196,19 +214,27 @@ pub(super) struct Call<'s> {
 }
 
 impl<'s> Call<'s> {
-    fn begin<T>(shared: &'s Shared, transport: Transport, request: &Request<T>) -> Self {
+    pub(super) fn begin<T>(shared: &'s Shared, transport: Transport, request: &Request<T>) -> Self {
         let arrived = Instant::now();
         let timeout = request.metadata().get("grpc-timeout").and_then(|header| header.to_str().ok());
         let deadline = timeout.and_then(convert::timeout).and_then(|timeout| arrived.checked_add(timeout));
         Self { shared, transport, arrived, deadline }
     }
 
-    /// A request within a stream, whose deadline is the stream's.
-    pub(super) fn in_stream(shared: &'s Shared, transport: Transport, deadline: Option<Instant>) -> Self {
+    /// A request that arrives now.
+    pub(in crate::service) fn arriving(
+        shared: &'s Shared,
+        transport: Transport,
+        deadline: Option<Instant>,
+    ) -> Self {
         Self { shared, transport, arrived: Instant::now(), deadline }
     }
 
-    fn admit(&self, requests: &Arc<Admission>) -> Result<crate::engine::Permit, Refusal> {
+    /// A place among the requests that are being answered, over whichever transport they came.
+    pub(in crate::service) fn admit(
+        &self,
+        requests: &Arc<Admission>,
+    ) -> Result<crate::engine::Permit, Refusal> {
         requests.admit().map_err(|overloaded| Refusal::Overloaded { what: "requests", overloaded })
     }
 
@@ -219,26 +245,39 @@ impl<'s> Call<'s> {
         }
     }
 
-    /// Records the outcome.
     pub(super) fn end<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<Response<T>, Status> {
+        Ok(Response::new(self.record(outcome)?))
+    }
+
+    /// Records the outcome.
+    pub(in crate::service) fn record<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<T, Refusal> {
         match outcome {
             Ok((response, answered)) => {
                 let vehicle = &answered.vehicle.model().vehicle().name;
                 let elapsed = self.arrived.elapsed();
                 self.shared.metrics.recorder(self.transport, vehicle).record(elapsed, answered.out_of_domain);
                 tracing::debug!(target: "wade::request", transport = self.transport.name(), vehicle, ?elapsed);
-                Ok(Response::new(response))
+                Ok(response)
             }
             Err(refusal) => Err(self.refuse(refusal)),
         }
     }
 
-    fn refuse(self, refusal: Refusal) -> Status {
+    fn refuse(self, refusal: Refusal) -> Refusal {
         self.shared.metrics.refuse(self.transport, refusal.reason());
         let elapsed_ns = nanoseconds_since(self.arrived);
         tracing::debug!(target: "wade::request", transport = self.transport.name(), %refusal, elapsed_ns);
-        refusal.into()
+        refusal
     }
+}
+
+/// Work with bundles on disk, which takes milliseconds and must not stand before a query.
+pub(super) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Status> {
+    tokio::task::spawn_blocking(work)
+        .await
+        .map_err(|_| Status::internal("the work on the bundles was interrupted"))
 }
 
 /// The handlers of `wade.v1.Admin`.
@@ -255,9 +294,7 @@ impl Admin for AdminHandlers {
     ) -> Result<Response<proto::ReloadResponse>, Status> {
         let vehicle = request.into_inner().vehicle;
         let reloader = Arc::clone(&self.reloader);
-        // reading and checking a bundle takes milliseconds, which must not stand before a query
-        let reloaded = tokio::task::spawn_blocking(move || reloader.reload(&vehicle));
-        let reloaded = reloaded.await.map_err(|_| Status::internal("the reload was interrupted"))?;
+        let reloaded = blocking(move || reloader.reload(&vehicle)).await?;
         let vehicles = reloaded.map_err(Refusal::from)?.into_iter().map(|reload| proto::Reloaded {
             vehicle: reload.vehicle,
             bundle_version: reload.served_version,

@@ -57,7 +57,7 @@ impl Answers {
     }
 
     fn answer(&mut self, request: proto::EvaluateRequest) -> Result<proto::EvaluateResponse, Status> {
-        let call = Call::in_stream(&self.shared, self.transport, self.deadline);
+        let call = Call::arriving(&self.shared, self.transport, self.deadline);
         if !request.vehicle.is_empty() && request.vehicle != self.vehicle {
             self.vehicle = request.vehicle;
             self.session = Session::default();

@@ -1,0 +1,168 @@
+//! Tensors to the batch that they mean.
+
+use std::collections::HashMap;
+
+use super::TensorFault;
+use crate::service::proto;
+use crate::service::proto::inference::infer_parameter::ParameterChoice;
+use crate::service::proto::inference::model_infer_request::InferInputTensor;
+use crate::service::proto::inference::{InferParameter, ModelInferRequest};
+use crate::service::wire::{Field, InvalidState, Problem, Refusal};
+
+/// The inputs with their values a state, by the names of the arrays of a batch. All are FP32.
+pub const INPUTS: [(Field, usize); 11] = [
+    (Field::Depth, 1),
+    (Field::Velocity, 3),
+    (Field::Current, 3),
+    (Field::AngularVelocity, 3),
+    (Field::Acceleration, 3),
+    (Field::AngularAcceleration, 3),
+    (Field::Density, 1),
+    (Field::Gravity, 3),
+    (Field::Heading, 1),
+    (Field::DepthRate, 1),
+    (Field::WheelSpeed, 4),
+];
+
+/// The parameters of a request, which hold for all its states.
+const PARAMETERS: &str = "ground_contact (string), implicit_added_mass (bool)";
+
+/// Longest name that an error repeats.
+const MAX_NAME: usize = 64;
+
+/// A name that fits into an error.
+pub fn short(name: &str) -> String {
+    name.chars().take(MAX_NAME).collect()
+}
+
+/// The shape of a tensor with so many values a state: a scalar has no second dimension.
+pub fn shape(rows: i64, width: usize) -> Vec<i64> {
+    if width == 1 { vec![rows] } else { vec![rows, width as i64] }
+}
+
+/// The batch that a request asks for.
+pub fn batch(request: &ModelInferRequest, max: usize) -> Result<proto::EvaluateBatchRequest, Refusal> {
+    let (inputs, raw) = (&request.inputs, &request.raw_input_contents);
+    if !raw.is_empty() && raw.len() != inputs.len() {
+        return Err(TensorFault::RawCount { raw: raw.len(), inputs: inputs.len() }.into());
+    }
+    let rows = rows(inputs, max)?;
+    let mut batch = proto::EvaluateBatchRequest { vehicle: request.model_name.clone(), ..Default::default() };
+    let mut seen: Vec<&str> = Vec::new();
+    for (index, input) in inputs.iter().enumerate() {
+        let name = || short(&input.name);
+        if seen.contains(&input.name.as_str()) {
+            return Err(TensorFault::Repeated { name: name() }.into());
+        }
+        seen.push(&input.name);
+        let known = INPUTS.into_iter().find(|(field, _)| field.name() == input.name);
+        let (field, width) = known.ok_or_else(|| TensorFault::Unknown { name: name(), known: names() })?;
+        if let Some(parameter) = input.parameters.keys().next() {
+            return Err(TensorFault::Parameter { name: short(parameter), known: "none" }.into());
+        }
+        let values = values(input, raw.get(index).map(Vec::as_slice), rows, width)?;
+        if let Some(array) = array(&mut batch, field) {
+            *array = values;
+        }
+    }
+    parameters(&request.parameters, &mut batch)?;
+    Ok(batch)
+}
+
+fn names() -> String {
+    INPUTS.map(|(field, _)| field.name()).join(", ")
+}
+
+/// The number of states: the rows of depth_m.
+fn rows(inputs: &[InferInputTensor], max: usize) -> Result<usize, Refusal> {
+    let depth = inputs.iter().find(|input| input.name == Field::Depth.name()).ok_or(TensorFault::NoDepth)?;
+    let rows = match depth.shape.as_slice() {
+        &[rows] => usize::try_from(rows).ok(),
+        _ => None,
+    };
+    let expected =
+        || TensorFault::Shape { name: depth.name.clone(), shape: start(&depth.shape), expected: vec![-1] };
+    let rows = rows.ok_or_else(expected)?;
+    match rows {
+        0 => Err(Refusal::EmptyBatch),
+        len if len > max => Err(Refusal::BatchTooLong { len, limit: max }),
+        rows => Ok(rows),
+    }
+}
+
+/// A shape that fits into an error.
+fn start(shape: &[i64]) -> Vec<i64> {
+    shape.iter().take(4).copied().collect()
+}
+
+fn values(
+    input: &InferInputTensor,
+    raw: Option<&[u8]>,
+    rows: usize,
+    width: usize,
+) -> Result<Vec<f32>, TensorFault> {
+    let name = || input.name.clone();
+    if input.datatype != "FP32" {
+        return Err(TensorFault::Datatype { name: name(), datatype: short(&input.datatype) });
+    }
+    let expected = shape(rows as i64, width);
+    if input.shape != expected {
+        return Err(TensorFault::Shape { name: name(), shape: start(&input.shape), expected });
+    }
+    let length = |len, expected, unit| Err(TensorFault::Length { name: name(), len, expected, unit });
+    match (raw, &input.contents) {
+        (Some(_), Some(_)) => Err(TensorFault::Both { name: name() }),
+        (Some(bytes), None) => {
+            let (values, rest) = bytes.as_chunks::<4>();
+            if values.len() != rows * width || !rest.is_empty() {
+                return length(bytes.len(), 4 * rows * width, "bytes");
+            }
+            Ok(values.iter().copied().map(f32::from_le_bytes).collect())
+        }
+        (None, contents) => {
+            let values = contents.as_ref().map_or(&[][..], |contents| &contents.fp32_contents);
+            if values.len() != rows * width {
+                return length(values.len(), rows * width, "values");
+            }
+            Ok(values.to_vec())
+        }
+    }
+}
+
+/// Where a batch has the values of a field; none for the fields that are no inputs.
+fn array(batch: &mut proto::EvaluateBatchRequest, field: Field) -> Option<&mut Vec<f32>> {
+    Some(match field {
+        Field::Depth => &mut batch.depth_m,
+        Field::Velocity => &mut batch.velocity_mps,
+        Field::Current => &mut batch.current_mps,
+        Field::AngularVelocity => &mut batch.angular_velocity_radps,
+        Field::Acceleration => &mut batch.acceleration_mps2,
+        Field::AngularAcceleration => &mut batch.angular_acceleration_radps2,
+        Field::Density => &mut batch.density_kgpm3,
+        Field::Gravity => &mut batch.gravity_direction,
+        Field::Heading => &mut batch.heading_rad,
+        Field::DepthRate => &mut batch.depth_rate_mps,
+        Field::WheelSpeed => &mut batch.wheel_speed_radps,
+        Field::Quaternion | Field::RollPitch | Field::GroundContact | Field::TimeStep => return None,
+    })
+}
+
+fn parameters(
+    parameters: &HashMap<String, InferParameter>,
+    batch: &mut proto::EvaluateBatchRequest,
+) -> Result<(), Refusal> {
+    for (name, parameter) in parameters {
+        match (name.as_str(), &parameter.parameter_choice) {
+            ("ground_contact", Some(ParameterChoice::StringParam(value))) => {
+                let unknown = InvalidState { field: Field::GroundContact, problem: Problem::Unknown };
+                let contact = proto::GroundContact::from_str_name(value).ok_or(unknown)?;
+                batch.ground_contact = contact as i32;
+            }
+            ("implicit_added_mass", Some(ParameterChoice::BoolParam(value))) => {
+                batch.implicit_added_mass = *value;
+            }
+            _ => return Err(TensorFault::Parameter { name: short(name), known: PARAMETERS }.into()),
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,116 @@
+// Everything in words and numbers.
+
+import { css, short } from "./scale.js";
+
+const UNITS = {
+  SPEED: "m/s", ANGLE: "rad", DENSITY: "kg/m³", DEPTH: "m", TILT: "rad", VERTICAL_SPEED: "m/s", ANGULAR_SPEED: "rad/s",
+  DISTANCE: "", ACCELERATION: "m/s²",
+};
+const TRANSPORTS = {
+  grpc_unary: "gRPC, TCP", grpc_batch: "gRPC batch, TCP", grpc_stream: "gRPC stream, TCP", uds_unary: "gRPC, Unix socket",
+  uds_batch: "gRPC batch, Unix socket", uds_stream: "gRPC stream, Unix socket", shm: "shared memory",
+  shm_batch: "shared memory batch", http: "this page (JSON)", grpc_infer: "inference protocol, TCP",
+  uds_infer: "inference protocol, Unix socket",
+};
+
+const element = (id) => document.getElementById(id);
+const fixed = (value) => value.toFixed(2).replace(/^-(0\.00)$/, "$1");
+const words = (name, prefix) => name.slice(prefix.length).toLowerCase().replaceAll("_", " ");
+
+function cell(tag, content, className = "") {
+  const made = Object.assign(document.createElement(tag), { className });
+  made.append(...[content].flat());
+  return made;
+}
+
+function row(tag, cells, className) {
+  const made = cell("tr", cells.map((content) => cell(tag, content)));
+  if (className) made.className = className;
+  return made;
+}
+
+function swatch(color) {
+  const made = document.createElement("i");
+  made.style.background = css(color);
+  return made;
+}
+
+export function showWrench(answer, vehicle) {
+  const { force_n: force, moment_nm: moment, about_m: about } = answer.wrench;
+  for (const axis of "xyz") {
+    element(`force-${axis}`).textContent = fixed(force[axis]);
+    element(`std-${axis}`).textContent = fixed(answer.uncertainty_n[axis]);
+    element(`moment-${axis}`).textContent = fixed(moment[axis]);
+  }
+  const weight = 9.81 * vehicle.mass_kg;
+  const center = ["x", "y", "z"].map((axis) => about[axis].toFixed(3)).join(", ");
+  element("about").textContent = `Moment about the center of mass (${center}) m. The vertical force is ` +
+    `${Math.round((100 * force.z) / weight)} % of the weight (${weight.toFixed(0)} N). Computed in ${(answer.compute_ns * 1e-3).toFixed(0)} µs.`;
+}
+
+export function showFlags(answer) {
+  element("bundle").textContent = `bundle version ${answer.bundle_version}, weights: ${answer.provenance}`;
+  const excess = ({ quantity, excess }, prefix) => {
+    const name = quantity.slice(prefix.length);
+    return `${words(quantity, prefix)} by ${excess > 0 ? "+" : ""}${short(excess)} ${UNITS[name] ?? ""}`.trim();
+  };
+  const flag = (text, className) => cell("span", text, `flag ${className}`);
+  const outside = answer.outside.map((entry) => excess(entry, "QUANTITY_")).join(", ");
+  const flags = [answer.in_domain ? flag("inside the training domain", "pass") : flag(`outside the training domain: ${outside}`, "notice")];
+  if (answer.effects.length > 0) flags.push(flag(`${answer.effects.length} effects added`, ""));
+  const far = answer.effects_outside.map((entry) => excess(entry, "BOX_QUANTITY_")).join(", ");
+  if (far) flags.push(flag(`outside what the effects were seen in: ${far}`, "notice"));
+  element("flags").replaceChildren(...flags);
+}
+
+export function showRemarks(answer) {
+  const remarks = answer.effects.filter((effect) => effect.left_out !== "LEFT_OUT_UNSPECIFIED")
+    .map((effect) => `${words(effect.effect, "EFFECT_")} left out: ${words(effect.left_out, "LEFT_OUT_")}`);
+  if (!answer.in_domain) remarks.push("Outside the training domain the standard deviation is a lower bound.");
+  if (answer.provenance === "analytic") remarks.push("The weights were learnt from loads by formula, not from CFD.");
+  element("remarks").replaceChildren(...remarks.map((text) => cell("li", text)));
+}
+
+/** The forces of each surface; `pointed` is told the surface under the mouse. */
+export function showSurfaces(surfaces, answer, pointed) {
+  const numbers = (force) => force.map(fixed);
+  const head = row("th", ["surface", "wet", "Fx [N]", "Fy [N]", "Fz [N]", "|F| [N]"]);
+  const lines = surfaces.map((surface, index) => {
+    const made = row("td", [
+      [swatch(surface.color), surface.name], `${Math.round(100 * surface.wet)} %`, ...numbers(surface.force), fixed(Math.hypot(...surface.force)),
+    ]);
+    made.addEventListener("mouseenter", () => pointed(index));
+    made.addEventListener("mouseleave", () => pointed(undefined));
+    return made;
+  });
+  const effects = answer.effects.map((effect) => {
+    const { x, y, z } = effect.force_n;
+    return row("td", [`+ ${words(effect.effect, "EFFECT_")}`, "", ...numbers([x, y, z]), fixed(Math.hypot(x, y, z))]);
+  });
+  const { x, y, z } = answer.wrench.force_n;
+  const sum = row("td", ["net force", "", ...numbers([x, y, z]), fixed(Math.hypot(x, y, z))], "sum");
+  element("surfaces").replaceChildren(head, ...lines, ...effects, sum);
+}
+
+export function markSurface(index) {
+  [...element("surfaces").rows].slice(1).forEach((line, at) => line.classList.toggle("pointed", at === index));
+}
+
+/** Percentiles of each transport: of the last full window, and of all since the start. */
+export function showLatency({ latencies, window_s: window }) {
+  const head = row("th", ["transport", "vehicle", "last", "p50 [µs]", "p99 [µs]", "all", "p50 [µs]", "p99 [µs]"]);
+  const micros = (percentiles, name) => (percentiles.count > 0 ? percentiles[name].toFixed(1) : "–");
+  const part = (percentiles) => [String(percentiles.count), micros(percentiles, "p50_us"), micros(percentiles, "p99_us")];
+  const lines = latencies.filter((entry) => entry.since_start.count > 0).map((entry) => {
+    const name = TRANSPORTS[entry.transport] ?? entry.transport;
+    return row("td", [name, entry.vehicle, ...part(entry.window), ...part(entry.since_start)]);
+  });
+  element("latency").replaceChildren(head, ...lines);
+  element("window").textContent = `From a request's arrival to its answer. Last: requests in the last full window of ` +
+    `${window} s; all: since the server started.`;
+}
+
+export function showCurl(request) {
+  const body = JSON.stringify(request, (_, value) => (typeof value === "number" ? +value.toPrecision(6) : value));
+  element("curl").textContent = `curl -d '${body}' ${location.origin}/v1/query`;
+}

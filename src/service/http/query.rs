@@ -1,0 +1,83 @@
+//! Queries, vehicles and latencies as JSON: the messages of `wade.v1.Hydrodynamics`.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::{Body, to_bytes};
+use axum::extract::{Path, RawQuery, State};
+use axum::response::Response;
+use axum::routing::get;
+
+use super::Shared;
+use super::json;
+use super::rejection::Rejection;
+use crate::metrics::Transport;
+use crate::service::grpc::{self, Call, answer_state};
+use crate::service::proto;
+use crate::service::wire::Refusal;
+
+/// Longest body [bytes]: a query with every field takes about one kilobyte.
+const MAX_BODY: usize = 64 << 10;
+/// Longest wait for the rest of a body.
+const BODY_TIME: Duration = Duration::from_secs(10);
+
+/// The paths of this module.
+pub fn routes() -> Router<Arc<Shared>> {
+    Router::new()
+        .route("/v1/query", get(by_parameters).post(by_body))
+        .route("/v1/vehicles", get(vehicles))
+        .route("/v1/vehicles/{name}", get(vehicle))
+        .route("/v1/latency", get(latency))
+}
+
+async fn by_parameters(
+    State(shared): State<Arc<Shared>>,
+    RawQuery(parameters): RawQuery,
+) -> Result<Response, Rejection> {
+    let text = json::from_parameters("wade.v1.EvaluateRequest", &parameters.unwrap_or_default())?;
+    evaluate(&shared, &text)
+}
+
+async fn by_body(State(shared): State<Arc<Shared>>, body: Body) -> Result<Response, Rejection> {
+    let late = |_| Refusal::DeadlineExceeded { answered: None };
+    let text = tokio::time::timeout(BODY_TIME, to_bytes(body, MAX_BODY)).await.map_err(late)?;
+    // the other errors are those of a connection that is gone, whom no answer reaches
+    let text = text.map_err(|_| Rejection::TooLong { limit: MAX_BODY })?;
+    evaluate(&shared, &text)
+}
+
+/// Answers on this thread, as gRPC does on its own.
+fn evaluate(shared: &Shared, text: &[u8]) -> Result<Response, Rejection> {
+    let call = Call::arriving(&shared.grpc, Transport::http, None);
+    let request: proto::EvaluateRequest = match json::read("wade.v1.EvaluateRequest", text) {
+        Ok(request) => request,
+        Err(rejection) => {
+            shared.grpc.metrics.refuse(Transport::http, "invalid_argument");
+            return Err(rejection);
+        }
+    };
+    let answer = call.admit(&shared.requests).and_then(|_permit| {
+        let vehicle = shared.grpc.engine.vehicle(&request.vehicle)?;
+        answer_state(&vehicle, request.state.as_ref(), None)
+    });
+    let response = call.record(answer)?;
+    Ok(json::write("wade.v1.EvaluateResponse", &response))
+}
+
+async fn vehicles(State(shared): State<Arc<Shared>>) -> Response {
+    let vehicles = shared.grpc.engine.vehicles();
+    let vehicles = vehicles.values().map(|vehicle| grpc::summary(vehicle)).collect();
+    json::write("wade.v1.ListVehiclesResponse", &proto::ListVehiclesResponse { vehicles })
+}
+
+async fn vehicle(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Rejection> {
+    let vehicle = shared.grpc.engine.vehicle(&name).map_err(Refusal::from)?;
+    Ok(json::write("wade.v1.GetVehicleResponse", &grpc::vehicle(&vehicle, false)))
+}
+
+async fn latency(State(shared): State<Arc<Shared>>) -> Response {
+    let latencies = shared.grpc.metrics.latencies().into_iter().map(grpc::latency).collect();
+    let response = proto::GetLatencyResponse { latencies, window_s: shared.grpc.window_s };
+    json::write("wade.v1.GetLatencyResponse", &response)
+}

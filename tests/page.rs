@@ -1,0 +1,150 @@
+//! Promise: the page shows in a real browser what the server answers, in numbers and as a picture. Pictures are left in
+//! target/page for people to look at.
+
+#[path = "common/http.rs"]
+mod http;
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use common::Served;
+use serde_json::json;
+
+/// Settings that a picture needs without a graphics card, and time for the page to ask and to draw.
+const BROWSER: [&str; 9] = [
+    "180",
+    "chromium",
+    "--headless",
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--hide-scrollbars",
+    "--virtual-time-budget=6000",
+];
+
+/// Runs the browser; none, with a printed reason, where there is none.
+fn browse(arguments: &[String]) -> Option<Output> {
+    let found = Command::new("chromium").arg("--version").output();
+    if let Err(error) = found {
+        println!("skipped: chromium cannot be run here: {error}");
+        return None;
+    }
+    let profile = tempfile::TempDir::new().expect("a temporary folder");
+    let output = Command::new("timeout")
+        .args(BROWSER)
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .args(arguments)
+        .output()
+        .expect("timeout is part of coreutils");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(output)
+}
+
+fn address(served: &Served) -> SocketAddr {
+    served.running.http_address().expect("HTTP is on")
+}
+
+/// The text of the element with this id, without tags.
+fn text_of(page: &str, id: &str) -> String {
+    let start = page.find(&format!("id=\"{id}\"")).unwrap_or_else(|| panic!("no {id} in\n{page}"));
+    let rest = &page[start..];
+    let inner = &rest[rest.find('>').expect("a tag") + 1..];
+    inner[..inner.find('<').expect("a tag")].to_owned()
+}
+
+#[test]
+fn the_numbers_of_the_page_are_those_of_the_query() {
+    let served = Served::start();
+    let address = address(&served);
+    let url = format!(
+        "http://{address}/#vehicle=warthog&speed=1.5&direction=30&depth=0.3&roll=4&pitch=-6&density=1025&dry=1&color=fz"
+    );
+    let Some(output) = browse(&["--dump-dom".into(), url]) else { return };
+    let page = String::from_utf8(output.stdout).expect("text");
+    let (direction, roll, pitch) = (30_f64.to_radians(), 4_f64.to_radians(), -6_f64.to_radians());
+    let query = json!({"vehicle": "warthog", "state": {
+        "velocity_mps": {"x": 1.5 * direction.cos(), "y": 1.5 * direction.sin()},
+        "depth_m": 0.3,
+        "density_kgpm3": 1025,
+        "roll_pitch": {"roll_rad": roll, "pitch_rad": pitch},
+        "ground_contact": "GROUND_CONTACT_DRY",
+    }});
+    let answer = http::post(address, "/v1/query", &query.to_string()).json();
+    for axis in ["x", "y", "z"] {
+        for (id, value) in [
+            ("force", &answer["wrench"]["force_n"]),
+            ("moment", &answer["wrench"]["moment_nm"]),
+            ("std", &answer["uncertainty_n"]),
+        ] {
+            let expected = format!("{:.2}", value[axis].as_f64().expect("a number"));
+            assert_eq!(text_of(&page, &format!("{id}-{axis}")), expected, "{id}-{axis}");
+        }
+    }
+    assert!(page.contains("outside the training domain: tilt by"), "tilted by 7 degrees");
+    assert!(page.contains("weights: analytic"), "the provenance is told");
+    for name in ["wheel_fl", "underbody_left"] {
+        assert!(page.contains(name), "surfaces are listed: {name}");
+    }
+    // the page's own query is among the latencies
+    assert!(page.contains("this page (JSON)"), "latencies are listed");
+    let trouble = page.find("id=\"trouble\"").map(|at| &page[at..at + 60]);
+    assert!(trouble.is_some_and(|trouble| trouble.contains("hidden")), "{trouble:?}");
+}
+
+/// The picture of a page of this size as rows of red, green and blue.
+fn picture(url: &str, name: &str, width: usize, height: usize) -> Option<Vec<Vec<[u8; 3]>>> {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../page");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join(name);
+    browse(&[
+        format!("--screenshot={}", path.display()),
+        format!("--window-size={width},{height}"),
+        url.to_owned(),
+    ])?;
+    let file = std::io::BufReader::new(std::fs::File::open(&path).expect("a picture"));
+    let mut reader = png::Decoder::new(file).read_info().expect("PNG");
+    let mut data = vec![0; reader.output_buffer_size().expect("a size")];
+    let info = reader.next_frame(&mut data).expect("PNG");
+    let channels = info.color_type.samples();
+    let row = |line: &[u8]| line.chunks(channels).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    Some(data[..info.buffer_size()].chunks(info.line_size).map(row).collect())
+}
+
+/// Where the hull is drawn at both sizes, as shares of the width and of the height.
+fn middle(picture: &[Vec<[u8; 3]>], x: [f64; 2], y: [f64; 2]) -> Vec<[u8; 3]> {
+    let span = |[from, to]: [f64; 2], size: usize| (from * size as f64) as usize..(to * size as f64) as usize;
+    picture[span(y, picture.len())].iter().flat_map(|line| line[span(x, line.len())].to_vec()).collect()
+}
+
+#[test]
+fn the_picture_shows_the_hull_and_follows_the_state() {
+    let served = Served::start();
+    let base = format!("http://{}/#vehicle=husky&speed=0.8&direction=0", address(&served));
+    let Some(wide) = picture(&format!("{base}&depth=0.18"), "husky-1440.png", 1440, 900) else { return };
+    let pixels = middle(&wide, [0.1, 0.55], [0.2, 0.6]);
+    let colors: BTreeSet<[u8; 3]> = pixels.iter().copied().collect();
+    assert!(colors.len() > 300, "a blank picture has few colors: {}", colors.len());
+    // dry surfaces are a bluish gray, arrows red, also where they shine through the hull
+    let share = |value: u8, of: u8| f64::from(value) / f64::from(of.max(1));
+    let is_gray = |[r, g, b]: [u8; 3]| {
+        b < 190 && (share(r, b) - 0.933).abs() < 0.06 && (share(g, b) - 0.96).abs() < 0.06
+    };
+    let is_red = |[r, g, b]: [u8; 3]| r > 60 && share(r, g) > 1.7 && share(r, b) > 1.7;
+    let count =
+        |pixels: &[[u8; 3]], is: &dyn Fn([u8; 3]) -> bool| pixels.iter().filter(|pixel| is(**pixel)).count();
+    assert!(count(&pixels, &is_gray) > 2000 && count(&pixels, &is_red) > 150, "surfaces and arrows");
+    let Some(dry) = picture(&format!("{base}&depth=0"), "husky-dry-1440.png", 1440, 900) else { return };
+    let dry = middle(&dry, [0.1, 0.55], [0.2, 0.6]);
+    assert!(count(&dry, &is_gray) > 20_000 && count(&dry, &is_red) == 0, "out of the water nothing acts");
+    let changed = dry.iter().zip(&pixels).filter(|(a, b)| a != b).count();
+    assert!(changed * 20 > pixels.len(), "the water and the colors change: {changed} of {}", pixels.len());
+    let url = format!("http://{}/#vehicle=warthog&speed=2&direction=40&depth=0.35&pitch=8", address(&served));
+    let Some(narrow) = picture(&url, "warthog-800.png", 800, 1300) else { return };
+    let colors: BTreeSet<[u8; 3]> = middle(&narrow, [0.2, 0.8], [0.15, 0.4]).into_iter().collect();
+    assert!(colors.len() > 300, "{}", colors.len());
+}
