@@ -72,7 +72,7 @@ fn sample(model: &Model, case: &Case, section: u32, added: f64, flutter: f64) ->
             }
         })
         .collect();
-    let sign = if section % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if section.is_multiple_of(2) { 1.0 } else { -1.0 };
     let force = condition.acceleration * -added + Vec3::x() * (flutter * sign);
     surfaces[0].force += force;
     surfaces[0].moment = surfaces[0].moment.map(|moment| moment + Vec3::from(POINT).cross(&force));
