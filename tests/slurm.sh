@@ -8,6 +8,8 @@ place=$(mktemp -d)
 pids=""
 finish() {
     for pid in $pids; do kill "$pid" 2>/dev/null || true; done
+    # slurmctld writes its state once more when it ends
+    for pid in $pids; do wait "$pid" 2>/dev/null || true; done
     rm -rf "$place"
 }
 trap finish EXIT INT TERM
