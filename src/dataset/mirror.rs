@@ -10,7 +10,7 @@ use nalgebra::UnitVector3;
 use super::{Dataset, Image, Rest, Sample, SurfaceLoad};
 use crate::condition::Condition;
 use crate::frame::Vec3;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Surface, Vehicle};
 
 /// A plane through the body origin that images are reflected across.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,14 +64,24 @@ impl Plane {
         }
     }
 
-    fn polar(self, v: &Vec3) -> Vec3 {
+    /// The image of a velocity or force.
+    pub(crate) fn polar(self, v: &Vec3) -> Vec3 {
         let mut image = *v;
         image[self.axis()] = -v[self.axis()];
         image
     }
 
-    fn axial(self, v: &Vec3) -> Vec3 {
+    /// The image of an angular velocity or moment.
+    pub(crate) fn axial(self, v: &Vec3) -> Vec3 {
         -self.polar(v)
+    }
+
+    /// Where the image of a surface lies, by its number.
+    pub(crate) fn partner(self, surface: &Surface) -> Option<usize> {
+        match self {
+            Self::LeftRight => Some(surface.mirror_left_right),
+            Self::FrontRear => surface.mirror_front_rear,
+        }
     }
 
     fn condition(self, c: &Condition) -> Condition {
@@ -125,10 +135,7 @@ impl Partners {
         }
         let partner = |surface: &String| {
             let index = vehicle.surface_index(surface).ok_or_else(|| unknown(surface))?;
-            let partner = match plane {
-                Plane::LeftRight => Some(vehicle.surfaces[index].mirror_left_right),
-                Plane::FrontRear => vehicle.surfaces[index].mirror_front_rear,
-            };
+            let partner = plane.partner(&vehicle.surfaces[index]);
             let no_partner = || MirrorError::NoPartner { vehicle: name(), surface: surface.clone() };
             let partner = &vehicle.surfaces[partner.ok_or_else(no_partner)?].name;
             here(partner).ok_or_else(|| unknown(partner))

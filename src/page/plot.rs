@@ -3,7 +3,11 @@
 use std::io;
 use std::ops::Range;
 
-use plotters::{coord::Shift, drawing::DrawingAreaErrorKind, prelude::*};
+use plotters::chart::MeshStyle;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::Ranged;
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::*;
 
 use super::escape;
 
@@ -26,6 +30,7 @@ pub const GRAY: RGBColor = RGBColor(0x77, 0x7d, 0x85);
 /// In the order in which a figure takes them.
 const COLORS: [RGBColor; 6] = [BLUE, ORANGE, GREEN, PURPLE, RED, GRAY];
 const GRID: RGBColor = RGBColor(0xe3, 0xe6, 0xea);
+const LETTERS: (&str, u32) = ("sans-serif", 13);
 
 /// Points of one color, with the name in the legend.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,143 +43,111 @@ pub struct Series {
 
 /// Points over two linear axes.
 pub fn scatter(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotError> {
-    let mut svg = String::new();
-    {
-        let area = canvas(&mut svg, (470, 320))?;
+    figure((470, 320), series, |area| {
         let range =
             |of: fn(&(f64, f64)) -> f64| padded(extent(series.iter().flat_map(|s| &s.points).map(of)));
-        let mut chart = ChartBuilder::on(&area)
-            .margin(8)
-            .margin_right(16)
-            .x_label_area_size(42)
-            .y_label_area_size(62)
-            .build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;
-        chart
-            .configure_mesh()
-            .light_line_style(WHITE)
-            .bold_line_style(GRID)
-            .x_labels(7)
-            .y_labels(7)
-            .x_desc(x_title)
-            .y_desc(y_title)
-            .label_style(("sans-serif", 13))
-            .axis_desc_style(("sans-serif", 13))
-            .draw()?;
+        let mut chart = chart(area, 62).build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;
+        styled(&mut chart.configure_mesh(), [x_title, y_title]).x_labels(7).y_labels(7).draw()?;
         for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
             chart.draw_series(s.points.iter().map(|&p| Circle::new(p, 2, color.filled())))?;
         }
-        area.present()?;
-    }
-    Ok(format!("<figure>{}{svg}</figure>", legend(series)))
+        Ok(())
+    })
 }
 
 /// Lines over a linear axis; the other is logarithmic and leaves out what is not positive.
 pub fn curves(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotError> {
     let positive = |s: &Series| s.points.iter().copied().filter(|p| p.1 > 0.0).collect::<Vec<_>>();
     let lines: Vec<Vec<(f64, f64)>> = series.iter().map(positive).collect();
-    let mut svg = String::new();
-    {
-        let area = canvas(&mut svg, (720, 320))?;
+    figure((720, 320), series, |area| {
         let x = extent(lines.iter().flatten().map(|p| p.0)).unwrap_or((0.0, 1.0));
         let y = extent(lines.iter().flatten().map(|p| p.1)).unwrap_or((1e-3, 1.0));
         let x = x.0..x.1.max(x.0 + 1.0);
         let y = (y.0 / 1.2..y.1 * 1.2).log_scale();
-        let mut chart = ChartBuilder::on(&area)
-            .margin(8)
-            .margin_right(16)
-            .x_label_area_size(42)
-            .y_label_area_size(74)
-            .build_cartesian_2d(x, y)?;
-        chart
-            .configure_mesh()
-            .light_line_style(WHITE)
-            .bold_line_style(GRID)
-            .y_label_formatter(&|value| format!("{value:.0e}"))
-            .x_desc(x_title)
-            .y_desc(y_title)
-            .label_style(("sans-serif", 13))
-            .axis_desc_style(("sans-serif", 13))
-            .draw()?;
+        let mut chart = chart(area, 74).build_cartesian_2d(x, y)?;
+        let power = |value: &f64| format!("{value:.0e}");
+        styled(&mut chart.configure_mesh(), [x_title, y_title]).y_label_formatter(&power).draw()?;
         for (points, color) in lines.into_iter().zip(COLORS.iter().cycle()) {
             chart.draw_series(LineSeries::new(points, color.stroke_width(2)))?;
         }
-        area.present()?;
-    }
-    Ok(format!("<figure>{}{svg}</figure>", legend(series)))
+        Ok(())
+    })
 }
 
 /// Lines over linear axes, and a gray band from `-band` to `band`.
 pub fn traces(x_title: &str, y_title: &str, band: f64, series: &[Series]) -> Result<String, PlotError> {
-    let mut svg = String::new();
-    {
-        let area = canvas(&mut svg, (960, 250))?;
+    figure((960, 250), series, |area| {
         let points = || series.iter().flat_map(|s| &s.points);
         let (start, end) = extent(points().map(|p| p.0)).unwrap_or((0.0, 1.0));
         let y = padded(extent(points().map(|p| p.1).chain([-1.2 * band, 1.2 * band])));
-        let mut chart = ChartBuilder::on(&area)
-            .margin(8)
-            .margin_right(16)
-            .x_label_area_size(42)
-            .y_label_area_size(66)
-            .build_cartesian_2d(start..end.max(start + 1e-3), y)?;
+        let mut chart = chart(area, 66).build_cartesian_2d(start..end.max(start + 1e-3), y)?;
         chart.draw_series([Rectangle::new([(start, -band), (end, band)], GRAY.mix(0.25).filled())])?;
-        chart
-            .configure_mesh()
-            .light_line_style(WHITE.mix(0.0))
-            .bold_line_style(GRID)
+        let mut mesh = chart.configure_mesh();
+        // lines between the labelled ones would hide the band
+        styled(&mut mesh, [x_title, y_title])
+            .light_line_style(TRANSPARENT)
             .x_labels(11)
             .y_labels(7)
-            .x_desc(x_title)
-            .y_desc(y_title)
-            .label_style(("sans-serif", 13))
-            .axis_desc_style(("sans-serif", 13))
             .draw()?;
         for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
             chart.draw_series(LineSeries::new(s.points.iter().copied(), color.stroke_width(2)))?;
         }
-        area.present()?;
-    }
-    Ok(format!("<figure>{}{svg}</figure>", legend(series)))
+        Ok(())
+    })
 }
 
 /// Points over equal axes with the line on which both agree.
 pub fn parity(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotError> {
-    let mut svg = String::new();
-    {
-        let area = canvas(&mut svg, (400, 380))?;
+    figure((400, 380), series, |area| {
         let values = series.iter().flat_map(|s| &s.points).flat_map(|p| [p.0, p.1]);
         let range = padded(extent(values));
-        let mut chart = ChartBuilder::on(&area)
-            .margin(8)
-            .margin_right(16)
-            .x_label_area_size(42)
-            .y_label_area_size(66)
-            .build_cartesian_2d(range.clone(), range.clone())?;
-        chart
-            .configure_mesh()
-            .light_line_style(WHITE)
-            .bold_line_style(GRID)
-            .x_labels(5)
-            .y_labels(6)
-            .x_desc(x_title)
-            .y_desc(y_title)
-            .label_style(("sans-serif", 13))
-            .axis_desc_style(("sans-serif", 13))
-            .draw()?;
+        let mut chart = chart(area, 66).build_cartesian_2d(range.clone(), range.clone())?;
+        styled(&mut chart.configure_mesh(), [x_title, y_title]).x_labels(5).y_labels(6).draw()?;
         let diagonal = [(range.start, range.start), (range.end, range.end)];
         chart.draw_series(DashedLineSeries::new(diagonal, 5, 4, BLACK.stroke_width(1)))?;
         for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
             chart.draw_series(s.points.iter().map(|&p| Circle::new(p, 2, color.mix(0.6).filled())))?;
         }
+        Ok(())
+    })
+}
+
+type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// What is drawn on a white canvas, under the legend.
+fn figure(
+    size: (u32, u32),
+    series: &[Series],
+    draw: impl FnOnce(&Canvas<'_>) -> Result<(), PlotError>,
+) -> Result<String, PlotError> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        area.fill(&WHITE)?;
+        draw(&area)?;
         area.present()?;
     }
     Ok(format!("<figure>{}{svg}</figure>", legend(series)))
 }
 
-fn canvas(svg: &mut String, size: (u32, u32)) -> Result<DrawingArea<SVGBackend<'_>, Shift>, PlotError> {
-    let area = SVGBackend::with_string(svg, size).into_drawing_area();
-    area.fill(&WHITE)?;
-    Ok(area)
+/// With room for the labels; those of the y axis are `width` wide.
+fn chart<'a, 'b>(area: &'a Canvas<'b>, width: u32) -> ChartBuilder<'a, 'a, SVGBackend<'b>> {
+    let mut chart = ChartBuilder::on(area);
+    chart.margin(8).margin_right(16).x_label_area_size(42).y_label_area_size(width);
+    chart
+}
+
+/// The grid and letters of every figure.
+fn styled<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
+    mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
+    [x_title, y_title]: [&str; 2],
+) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {
+    mesh.light_line_style(WHITE)
+        .bold_line_style(GRID)
+        .x_desc(x_title)
+        .y_desc(y_title)
+        .label_style(LETTERS)
+        .axis_desc_style(LETTERS)
 }
 
 fn legend(series: &[Series]) -> String {

@@ -59,7 +59,7 @@ pub struct AnchoredConfig {
 
 impl Default for AnchoredConfig {
     fn default() -> Self {
-        Self { between: 16, loss: AnchoredLoss::default() }
+        Self { between: 40, loss: AnchoredLoss::default() }
     }
 }
 
@@ -126,7 +126,7 @@ impl Config {
 
     /// For the anchored network, which learns from one state a case and some between the cases.
     pub fn anchored() -> Self {
-        Self { epochs: 300, patience: 10, least_learning_rate: 1e-6, weight_decay: 0.01, ..Self::default() }
+        Self { epochs: 150, patience: 5, least_learning_rate: 1e-6, weight_decay: 0.01, ..Self::default() }
     }
 
     /// Refuses numbers that make no sense.

@@ -1,6 +1,7 @@
 //! Between what crosses the boundary and what travels.
 
 use std::ffi::c_char;
+use std::time::Instant;
 
 use wade::client::Reply;
 use wade::service::shm_layout::{self, Answer, Status};
@@ -11,6 +12,7 @@ use crate::abi::{
     WADE_IMPLICIT_ADDED_MASS, WADE_IN_DOMAIN, WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE,
     WADE_NEVER, WADE_SESSION_BEGINS, WadeEffectLoad, WadeForces, WadeState, WadeStatus,
 };
+use crate::last::nanoseconds_since;
 
 impl From<&WadeState> for State {
     fn from(state: &WadeState) -> Self {
@@ -72,6 +74,14 @@ impl WadeForces {
         effects: [NO_LOAD; WADE_MAX_EFFECTS],
         provenance: [0; WADE_NAME_SIZE],
     };
+
+    /// Copies the answers to a batch to its caller, all as old as its question.
+    pub fn copy_batch(answers: &[Self], asked: Instant, to: &mut [Self]) {
+        let age_ns = nanoseconds_since(asked);
+        for (forces, answer) in to.iter_mut().zip(answers) {
+            *forces = Self { age_ns, ..*answer };
+        }
+    }
 
     /// Names what is wrong with the state that was asked about.
     pub fn blame(&mut self, invalid: InvalidState) {

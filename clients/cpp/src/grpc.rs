@@ -12,7 +12,7 @@ use crate::abi::{WADE_SESSION_BEGINS, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};
 use crate::connection::{Connection, RETRY, status_of};
 use crate::event::Event;
-use crate::last::{Last, nanoseconds_since};
+use crate::last::Last;
 use crate::skipped::Skipped;
 
 /// A question that is open for longer than this has no server any more; also how long connecting may take.
@@ -166,10 +166,7 @@ impl Grpc {
             return status;
         }
         let Some(batch) = lock_until(&shared.batch, deadline) else { return WadeStatus::Timeout };
-        let age_ns = nanoseconds_since(start);
-        for (forces, answer) in forces.iter_mut().zip(&batch.forces) {
-            *forces = WadeForces { age_ns, ..*answer };
-        }
+        WadeForces::copy_batch(&batch.forces, start, forces);
         WadeStatus::Ok
     }
 

@@ -14,7 +14,7 @@ use crate::abi::{WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};
 use crate::connection::{Connection, RETRY};
 use crate::convert::answered;
-use crate::last::{Last, nanoseconds_since};
+use crate::last::Last;
 use crate::skipped::Skipped;
 
 /// A question that is open for longer than this has no server any more. iceoryx2 says nothing of one that was killed.
@@ -123,10 +123,7 @@ impl Shm {
         let status = turn.evaluate_batch(&self.shared, states, deadline);
         self.wake_keeper(&turn);
         if status == WadeStatus::Ok {
-            let age_ns = nanoseconds_since(start);
-            for (forces, answer) in forces.iter_mut().zip(&turn.batch) {
-                *forces = WadeForces { age_ns, ..*answer };
-            }
+            WadeForces::copy_batch(&turn.batch, start, forces);
         }
         status
     }

@@ -1,12 +1,13 @@
 //! States between the cases, in which the network is taught what the cases say together.
 
+use nalgebra::UnitVector3;
+
 use super::known::{Known, Prepared};
 use super::teacher::Teacher;
 use crate::anchor::{COORDINATES, Reading};
 use crate::condition::Condition;
 use crate::frame::Vec3;
 use crate::random::Random;
-use nalgebra::UnitVector3;
 
 /// Neighbors among which the other end is drawn.
 const NEIGHBORS: usize = 8;

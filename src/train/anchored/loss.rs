@@ -36,7 +36,7 @@ pub struct AnchoredLoss {
 
 impl Default for AnchoredLoss {
     fn default() -> Self {
-        Self { net_weight: 1.0, moment_weight: 0.1, delta: 0.1, exponent: 0.5, floor: 0.01 }
+        Self { net_weight: 10.0, moment_weight: 0.1, delta: 0.1, exponent: 0.5, floor: 0.01 }
     }
 }
 

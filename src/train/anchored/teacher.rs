@@ -3,8 +3,8 @@
 //!
 //! A hundred cases are few for a network of 76,000 weights, which may do anything between them, and every case carries the
 //! scatter of its own flow and mesh. A regression on the few coordinates that a state has knows which of them matter over
-//! which distance, and how much of a case is noise. Measured on 68 Husky and 72 Warthog cases, five folds: the network
-//! alone misses Fx of the Warthog by 120 N in the mean, the regression by 38 N.
+//! which distance, and how much of a case is noise. Measured in five folds: a network on 61 cases of the Warthog missed its Fx
+//! by 120 N in the mean, a regression through 72 by 38 N.
 //!
 //! Its answers are `q W d` (dynamic pressure, width, depth) times functions of the coordinates. All surfaces share the
 //! lengths and noise that the net force along each axis asks for, so that the sum over surfaces is what it would say of the
@@ -22,6 +22,7 @@ use super::known::{Known, Load, Prepared};
 use crate::anchor::{COORDINATES, Reading};
 use crate::condition::Condition;
 use crate::dataset::Image;
+use crate::dataset::mirror::Plane;
 use crate::features::direction;
 use crate::frame::Vec3;
 
@@ -166,13 +167,22 @@ fn scale(condition: &Condition, reading: &Reading, prepared: &Prepared) -> f64 {
     reading.pressure * prepared.vehicle.dimensions.width * condition.depth
 }
 
-/// Signs of x and y as a state is seen: -1 in the mirror.
+/// The mirrors in which a state is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct View([f64; 2]);
+struct View([Option<Plane>; 2]);
 
 impl View {
     fn of(condition: &Condition, mirrors: [bool; 2]) -> Self {
-        Self([0, 1].map(|axis| if mirrors[axis] && condition.velocity[axis] < 0.0 { -1.0 } else { 1.0 }))
+        let planes = [Plane::FrontRear, Plane::LeftRight];
+        Self([0, 1].map(|i| (mirrors[i] && condition.velocity[i] < 0.0).then_some(planes[i])))
+    }
+
+    fn polar(self, v: Vec3) -> Vec3 {
+        self.0.into_iter().flatten().fold(v, |v, plane| plane.polar(&v))
+    }
+
+    fn axial(self, v: Vec3) -> Vec3 {
+        self.0.into_iter().flatten().fold(v, |v, plane| plane.axial(&v))
     }
 
     /// Coordinates of the state as it is seen.
@@ -183,29 +193,22 @@ impl View {
         unit: &[f64; COORDINATES],
     ) -> [f64; COORDINATES] {
         let mut place = reading.coordinates;
-        let ahead = direction(&condition.velocity);
+        let (ahead, up) = (self.polar(direction(&condition.velocity)), self.polar(*condition.up));
         for axis in [0, 1] {
-            place[DIRECTION[axis]] = ahead[axis] * self.0[axis];
-            place[UP[axis]] = condition.up[axis] * self.0[axis];
+            place[DIRECTION[axis]] = ahead[axis];
+            place[UP[axis]] = up[axis];
         }
         std::array::from_fn(|i| place[i] / unit[i])
     }
 
     /// Loads as they are seen, and those that are seen so as they are.
     fn loads(self, loads: &[Load], prepared: &Prepared) -> Vec<Load> {
-        let [x, y] = self.0;
-        let image = |mut index: usize| {
-            let surfaces = &prepared.vehicle.surfaces;
-            if x < 0.0 {
-                index = surfaces[index].mirror_front_rear.unwrap_or(index);
-            }
-            if y < 0.0 {
-                index = surfaces[index].mirror_left_right;
-            }
-            let (force, moment) = loads[index];
-            // a moment is no vector: in a mirror the components across its plane keep their sign
-            let turn = |m: Vec3| Vec3::new(m.x * y, m.y * x, m.z * x * y);
-            (Vec3::new(force.x * x, force.y * y, force.z), moment.map(turn))
+        let surfaces = &prepared.vehicle.surfaces;
+        let image = |index: usize| {
+            let seen = self.0.into_iter().flatten();
+            let from = seen.fold(index, |at, plane| plane.partner(&surfaces[at]).unwrap_or(at));
+            let (force, moment) = loads[from];
+            (self.polar(force), moment.map(|m| self.axial(m)))
         };
         (0..loads.len()).map(image).collect()
     }
