@@ -23,7 +23,7 @@ fn address(served: &Served) -> SocketAddr {
 fn a_served_query_shows_in_the_metrics() {
     let served = Served::start();
     let mut client = served.tcp("husky", Method::Unary);
-    client.evaluate(&State { depth: 0.1, ..State::default() }).expect("answered");
+    client.evaluate(&State { depth: 0.3, ..State::default() }).expect("answered");
     client.evaluate(&State { depth: -0.1, ..State::default() }).expect_err("refused");
     post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
     post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": -0.1}}"#);

@@ -2,19 +2,31 @@
 
 mod common;
 
-use common::{Numbers, VEHICLES, model_on};
+use common::{Numbers, VEHICLES, model_on, paper_on};
 use wade::condition::Condition;
 use wade::features;
 use wade::forces::Forces;
-use wade::frame::Vec3;
+use wade::frame::{GRAVITY, Vec3};
 use wade::model::kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, WetSurface};
-use wade::model::{Form, Workspace};
+use wade::model::{Form, Model, Workspace};
+
+/// Size of the terms that a surface's force is a sum of, by which its rounding is measured [N].
+fn size_of_terms(model: &Model, condition: &Condition, surface: usize) -> f64 {
+    match &model.weights().form {
+        Form::Paper(form) => condition.density * f64::from(form.scaling.target_std[2]),
+        Form::Anchored(_) => {
+            let (speed, depth) = (condition.velocity.norm(), condition.depth);
+            condition.density * (speed.powi(2) + GRAVITY * depth) * model.vehicle().surfaces[surface].area
+        }
+    }
+}
 
 #[test]
 fn every_instruction_set_agrees_with_the_reference() {
     for isa in Isa::available() {
-        for vehicle in VEHICLES {
-            let model = model_on(vehicle, isa);
+        for model in VEHICLES.into_iter().flat_map(|vehicle| [model_on(vehicle, isa), paper_on(vehicle, isa)])
+        {
+            let name = format!("{} {} {}", isa.name(), model.vehicle().name, model.weights().form.name());
             let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
             let mut numbers = Numbers::new(7);
             let mut wet = 0;
@@ -22,12 +34,11 @@ fn every_instruction_set_agrees_with_the_reference() {
                 let mut condition = numbers.state().check().expect("a valid state");
                 condition.ground_contact = model.weights().ground_contact().unwrap_or_default();
                 model.evaluate(&condition, &mut workspace, &mut forces);
-                // the error of a sum is measured by the size of its terms: the spread of the targets
-                let Form::Paper(form) = &model.weights().form else { panic!("the paper's weights") };
-                let scale = condition.density * f64::from(form.scaling.target_std[2]);
-                for (load, expected) in forces.surfaces.iter().zip(model.reference(&condition)) {
+                let both = forces.surfaces.iter().zip(model.reference(&condition));
+                for (surface, (load, expected)) in both.enumerate() {
+                    let scale = size_of_terms(&model, &condition, surface);
                     let error = (load.force - expected).norm() / (expected.norm() + scale);
-                    assert!(error < 1e-5, "{} {vehicle}: {} against {expected}", isa.name(), load.force);
+                    assert!(error < 1e-5, "{name}: {} against {expected}", load.force);
                     wet += usize::from(load.wetted_fraction > 0.0);
                 }
             }
@@ -38,7 +49,7 @@ fn every_instruction_set_agrees_with_the_reference() {
 
 #[test]
 fn a_row_has_the_same_bits_alone_and_in_any_company() {
-    let model = model_on("husky", Isa::available()[0]);
+    let model = paper_on("husky", Isa::available()[0]);
     let (vehicle, weights) = (model.vehicle(), model.weights());
     for isa in Isa::available() {
         let kernel = Kernel::new(&weights.network, (features::STATIC, features::DYNAMIC), isa);

@@ -3,13 +3,11 @@
 mod common;
 
 use common::{Numbers, VEHICLES, model};
-use wade::analytic;
 use wade::condition::{Condition, GroundContact};
+use wade::domain::Quantity;
 use wade::forces::Forces;
 use wade::frame::{GRAVITY, Vec3};
-use wade::model::{Form, Model, Workspace};
-use wade::random::Random;
-use wade::train::plan::Table;
+use wade::model::{Model, Workspace};
 
 fn evaluate(model: &Model, condition: &Condition) -> Forces {
     let mut forces = Forces::default();
@@ -97,30 +95,10 @@ fn states_beyond_the_training_domain_are_answered_and_marked() {
     let outside = Condition { depth: 0.30, ..inside };
     let forces = evaluate(&model, &outside);
     let (quantity, excess) = forces.outside.iter().next().expect("the depth is outside");
-    assert_eq!(quantity, wade::domain::Quantity::Depth);
-    assert!((excess - 0.10).abs() < 1e-9);
+    assert_eq!(quantity, Quantity::Depth);
+    let deepest = model.domain().range(Quantity::Depth).expect("a range").max;
+    assert!((excess - (0.30 - deepest)).abs() < 1e-9 && (deepest - 0.20).abs() < 0.01, "{excess}");
     assert!(forces.wrench.force.z > 0.0);
-}
-
-#[test]
-fn the_shipped_weights_answer_what_they_were_taught() {
-    let tables = [Table::HUSKY, Table::WARTHOG];
-    for (vehicle, table) in VEHICLES.into_iter().zip(tables) {
-        let model = model(vehicle);
-        assert_eq!(model.weights().provenance, analytic::PROVENANCE);
-        // cases of another seed than those of the training
-        let cases = table.latin_hypercube(100, &mut Random::new(99));
-        let Form::Paper(form) = &model.weights().form else { panic!("the paper's weights") };
-        let stated = Vec3::from(form.held_out_rms);
-        let within = cases.iter().filter(|condition| {
-            let taught: Vec3 = analytic::loads(model.vehicle(), condition).iter().sum();
-            let error = (evaluate(&model, condition).wrench.force - taught) / condition.density;
-            error.iter().zip(&stated).all(|(error, stated)| error.abs() < 3.0 * stated)
-        });
-        // a case or two in the fast, deep corners of the table are worse than what was held out
-        let within = within.count();
-        assert!(within >= 90, "{vehicle}: {within} of 100 cases are within three times the stated error");
-    }
 }
 
 #[test]

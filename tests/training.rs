@@ -83,8 +83,10 @@ fn reports_each_vehicle_with_its_domain_and_error() {
         assert_eq!(vehicle.score.samples, 16);
         assert!(vehicle.held_out_rms.iter().all(|rms| rms.is_finite() && *rms > 0.0));
         let depth = vehicle.domain.depth_m;
-        assert!(depth.min >= table.depth_m.min && depth.max <= table.depth_m.max);
-        assert!(depth.max - depth.min > 0.8 * (table.depth_m.max - table.depth_m.min));
+        let range = table.depth_m.max - table.depth_m.min;
+        // wider than where the cases lie by two of their mean distances: 16 or 32 cases were learnt from
+        assert!(depth.min >= table.depth_m.min - range / 7.5 && depth.max <= table.depth_m.max + range / 7.5);
+        assert!(depth.max - depth.min > 0.8 * range);
     }
 }
 

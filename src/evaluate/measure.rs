@@ -53,9 +53,11 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Of pairs of error and stated deviation; `None` without any, or where a deviation is zero.
+    /// Of pairs of error and stated deviation; those are left out of which nothing is stated, as of hydrostatics at rest, and
+    /// `None` where there are no others.
     pub fn of(pairs: &[(Vec3, Vec3)]) -> Option<Self> {
-        if pairs.is_empty() || pairs.iter().any(|(_, stated)| stated.min() <= 0.0) {
+        let pairs: Vec<&(Vec3, Vec3)> = pairs.iter().filter(|(_, stated)| stated.min() > 0.0).collect();
+        if pairs.is_empty() {
             return None;
         }
         let count = pairs.len() as f64;
@@ -102,7 +104,9 @@ mod tests {
 
     #[test]
     fn deviations_that_are_half_the_errors_are_seen_as_such() {
-        let pairs: Vec<_> = (0..4).map(|_| (Vec3::new(2.0, -1.0, 0.5), Vec3::new(1.0, 1.0, 1.0))).collect();
+        let mut pairs: Vec<_> =
+            (0..4).map(|_| (Vec3::new(2.0, -1.0, 0.5), Vec3::new(1.0, 1.0, 1.0))).collect();
+        pairs.push((Vec3::new(9.0, 9.0, 9.0), Vec3::zeros()));
         let calibration = Calibration::of(&pairs).unwrap();
         assert_eq!(calibration.error_over_stated, [2.0, 1.0, 0.5]);
         assert_eq!((calibration.within_one, calibration.within_two), ([0.0, 1.0, 1.0], [1.0, 1.0, 1.0]));
