@@ -256,7 +256,7 @@ impl ActiveEffects {
             }
             if entry.effect == Effect::AddedMass {
                 let k = std::array::from_fn(|axis| entry.values[axis]);
-                *added_mass = Some(added_mass_matrix(&self.body, immersion, state.density, &k));
+                *added_mass = Some(added_mass_matrix(&entry.shape, &self.body, immersion, state.density, &k));
             }
             loads.push(EffectLoad { effect: entry.effect, wrench, left_out });
         }

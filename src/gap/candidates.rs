@@ -83,7 +83,13 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::Rotation => vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
         Effect::Current => vec![[0.0; 3], [0.0, 0.0, 1.0]],
         Effect::DragCoefficientError => [0.0, 1.0, 2.0].map(|law| [law, 0.0, 0.0]).into(),
-        Effect::Squat | Effect::BedMotion => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::AddedMass | Effect::WheelPaddleThrust => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::BedMotion => [0.0, 1.0, 2.0].map(|area| [area, 0.0, 0.0]).into(),
+        Effect::Squat => {
+            let in_channel = [0.7, 1.0].map(|faded| [faded, 0.0, 0.0]);
+            let walls = if setting.channel_width.is_some() { &in_channel[..] } else { &[] };
+            [&[[0.0; 3], [0.0, 1.0, 0.0]][..], walls].concat()
+        }
         Effect::WaterEntrySlamming => {
             // a bottom without deadrise, and of 10, 20 and 30 degrees
             [0.0, 0.18, 0.36, 0.58].map(|slope| [0.5 * slope * setting.body.width, 0.0, 0.0]).into()

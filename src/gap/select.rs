@@ -241,6 +241,10 @@ impl<'a> Judge<'a> {
         fitted: &Fitted,
     ) -> Option<Refusal> {
         let effect = self.effect(member);
+        // what comes with an effect does not come without it
+        if effect.needs_its_first() && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
+            return Some(Refusal::NotSignificant);
+        }
         // a moving bed changes drag and lift; drag alone is the drag coefficient's
         let held = &self.design.candidates[member.candidate].columns;
         if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
