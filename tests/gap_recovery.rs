@@ -113,6 +113,24 @@ fn wheels_that_spin_thrust_by_what_they_slip() {
 }
 
 #[test]
+fn a_load_in_shallow_water_alone_is_described_there_and_not_applied() {
+    let (trials, _) = pushed(|motion| {
+        let shallow = |(load, s): ([f64; 6], &State)| if s.depth < 0.15 { load } else { [0.0; 6] };
+        plant("drag_coefficient_error", motion).into_iter().zip(motion).map(shallow).collect()
+    });
+    let report = run(&trials);
+    assert_eq!(report.verdict, Verdict::NoCandidateFits, "{} {:?}", report.summary, names(&report));
+    let text = report.gap.unexplained.clone().unwrap_or_default();
+    assert!(text.contains("where depth <=") && report.effects.is_empty(), "{text}");
+    let border = |region: &gap::Region| match &region.conditions[..] {
+        [one] if one.quantity == "depth" => one.at_most,
+        _ => None,
+    };
+    let borders: Vec<f64> = report.regions.iter().filter_map(border).collect();
+    assert!(borders.iter().any(|border| (0.1..0.2).contains(border)), "{:?}", report.regions);
+}
+
+#[test]
 fn faults_of_sensors_are_named_as_such_and_never_applied() {
     for (name, parameter, value) in [
         ("sensor_bias", "fz", 1.0),
