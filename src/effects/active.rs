@@ -263,7 +263,7 @@ impl ActiveEffects {
     }
 }
 
-/// The same state with velocities that do not change in body axes.
+/// The same state with velocities over ground that do not change in body axes: those are what an integration changes.
 fn still(state: &Condition) -> Condition {
     Condition {
         acceleration: state.angular_velocity.cross(&state.ground_velocity),

@@ -4,7 +4,8 @@
 //! displaced: `k rho V` along the axes and `k rho V (a^2 + b^2) / 12` about them, the inertia of the displaced box. A flat
 //! bottom near the surface moves as much water however deep it is, half of a plate's `rho pi a^2` a meter (Newman): with
 //! the shape 1 heave, roll and pitch have `rho pi b A_wp / 8` in the place of `rho V`.
-//! `nu_dot` is the rate in body axes; the cross terms are Kirchhoff's (Newman, Marine Hydrodynamics, section 4.14).
+//! `nu` is the velocity through the water and `nu_dot` its rate in body axes, `a - omega x nu` in a steady current; the cross
+//! terms are Kirchhoff's (Newman, Marine Hydrodynamics, section 4.14).
 //!
 //! Deep-water values of `k` for bodies as long as high lie between 0.05 along a slender body and 1.5 across a flat one;
 //! shallow water raises sway more than heave (Zhou, Lo, Tan, J. Eng. Mech. 2005), by a factor of a few. Valid while the
@@ -50,8 +51,7 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
     let (v, omega) = (state.velocity, state.angular_velocity);
     let center = input.immersion.center_of_buoyancy;
     let u = v + omega.cross(&center);
-    let rate =
-        state.acceleration - omega.cross(&state.ground_velocity) + state.angular_acceleration.cross(&center);
+    let rate = state.acceleration - omega.cross(&v) + state.angular_acceleration.cross(&center);
     let unit = coefficients(shape, input.body, input.immersion, state.density);
     for axis in 0..3 {
         let e = Vec3::ith(axis, 1.0);
