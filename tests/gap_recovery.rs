@@ -10,7 +10,7 @@ use planted::{Noise, State, motions, planted as plant, pushes, rms, trials};
 use wade::effects::Effect;
 use wade::frame::Vec3;
 use wade::gap::{self, Config, GapError, Predicted, Report, Verdict};
-use wade::trials::Trials;
+use wade::trials::{Method, Trials};
 
 const NOISE: [f64; 6] = [8.0, 8.0, 12.0, 4.0, 4.0, 4.0];
 const TRIALS: usize = 20;
@@ -128,6 +128,26 @@ fn a_load_in_shallow_water_alone_is_described_there_and_not_applied() {
     };
     let borders: Vec<f64> = report.regions.iter().filter_map(border).collect();
     assert!(borders.iter().any(|border| (0.1..0.2).contains(border)), "{:?}", report.regions);
+}
+
+#[test]
+fn a_wrong_mass_is_found_by_pushes_of_half_a_second() {
+    let motions = pushes(TRIALS, SAMPLES, 23);
+    let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| vec![[0.0; 6]; motion.len()]).collect();
+    let mut trials = trials(&motions, &nothing, &Noise::white(NOISE), 23);
+    trials.manifest.measured.method = Some(Method::InverseDynamics);
+    // a tenth of the true mass too much
+    trials.manifest.mass = Some(1.1 * planted::MASS);
+    for (trial, motion) in trials.trials.iter_mut().zip(&motions) {
+        let drive = |s: &State| planted::MASS * s.a.x - planted::simulate(s)[0];
+        trial.other_forces.insert("drive_fx".into(), motion.iter().map(drive).collect());
+        trial.measured = Default::default();
+        trial.simulated = std::array::from_fn(|c| trial.simulated[c].take().filter(|_| c == 0));
+    }
+    let report = run(&trials);
+    assert_eq!(names(&report), ["mass_error"], "{} {:?}", report.summary, report.rejected);
+    let found = report.effects[0].parameters["relative_error"].value;
+    assert!((found / (-0.1 / 1.1) - 1.0).abs() < 0.05, "{found}");
 }
 
 #[test]

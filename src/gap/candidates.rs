@@ -200,7 +200,8 @@ fn chain(
             }
             Effect::DriveGain => columns[0][sample] = series.other[sample],
             Effect::MassError => {
-                let inertia = (state.acceleration + up * GRAVITY) * -setting.mass;
+                // the acceleration that the wrench was inferred with
+                let inertia = (series.recorded_acceleration[sample] + up * GRAVITY) * -setting.mass;
                 (0..3).for_each(|axis| columns[0][sample][axis] = inertia[axis]);
             }
             _ => {}
