@@ -131,6 +131,17 @@ fn a_load_in_shallow_water_alone_is_described_there_and_not_applied() {
 }
 
 #[test]
+fn pushes_of_half_a_second_hardly_bias_a_delay() {
+    let motions = pushes(TRIALS, SAMPLES, 22);
+    let late: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| plant("sensor_delay", motion)).collect();
+    let report = run(&planted::trials(&motions, &late, &Noise::white(NOISE), 22));
+    assert_eq!(names(&report), ["sensor_delay"], "{} {:?}", report.summary, report.rejected);
+    let delay = report.effects[0].parameters["delay"].value;
+    // the differences of the prediction still take a few hundredths off such pushes
+    assert!((delay / 0.08 - 1.0).abs() < 0.08, "{delay}");
+}
+
+#[test]
 fn a_wrong_mass_is_found_by_pushes_of_half_a_second() {
     let motions = pushes(TRIALS, SAMPLES, 23);
     let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| vec![[0.0; 6]; motion.len()]).collect();
