@@ -162,6 +162,22 @@ fn a_wrong_mass_is_found_by_pushes_of_half_a_second() {
 }
 
 #[test]
+fn an_effect_of_all_trials_is_not_provisional_for_a_part_of_it_that_two_show() {
+    let mut motions = pushes(TRIALS, SAMPLES, 24);
+    for motion in &mut motions[4..6] {
+        motion.iter_mut().for_each(|s| s.v.y = 0.5 * (1.3 * s.t).sin());
+    }
+    let damping: Vec<Vec<[f64; 6]>> = motions
+        .iter()
+        .map(|motion| plant("linear_damping", motion).into_iter().map(|w| w.map(|x| 0.05 * x)).collect())
+        .collect();
+    let report = run(&trials(&motions, &damping, &Noise::white(NOISE), 24));
+    assert_eq!(names(&report), ["linear_damping"], "{} {:?}", report.summary, report.rejected);
+    let effect = &report.effects[0];
+    assert!(effect.parameters.contains_key("sway") && !effect.provisional, "{effect:?}");
+}
+
+#[test]
 fn faults_of_sensors_are_named_as_such_and_never_applied() {
     for (name, parameter, value) in [
         ("sensor_bias", "fz", 1.0),

@@ -117,8 +117,10 @@ pub(super) fn fit(
     }
     let provisional = (0..set.len())
         .map(|m| {
-            let own = used.iter().zip(&errors).filter(|((member, ..), _)| *member == m);
-            own.map(|(_, e)| e.trials).fold(f64::INFINITY, f64::min) < ONE_CONDITION
+            // by the column that carries most of the load; the others state their own uncertainty
+            let own = used.iter().zip(&errors).zip(beta.iter()).filter(|(((member, ..), _), _)| *member == m);
+            let strongest = own.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+            strongest.is_some_and(|((_, error), _)| error.trials < ONE_CONDITION)
         })
         .collect();
     Some(Fit { values, covariance, intervals, provisional, shape_std })
