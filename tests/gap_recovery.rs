@@ -7,10 +7,12 @@
 mod planted;
 
 use planted::{Noise, State, motions, planted as plant, pushes, rms, trials};
+use wade::condition::Condition;
 use wade::effects::Effect;
 use wade::frame::Vec3;
 use wade::gap::{self, Config, GapError, Predicted, Report, Verdict};
 use wade::trials::{Method, Trials};
+use wade::wrench::Wrench;
 
 const NOISE: [f64; 6] = [8.0, 8.0, 12.0, 4.0, 4.0, 4.0];
 const TRIALS: usize = 20;
@@ -175,6 +177,46 @@ fn an_effect_of_all_trials_is_not_provisional_for_a_part_of_it_that_two_show() {
     assert_eq!(names(&report), ["linear_damping"], "{} {:?}", report.summary, report.rejected);
     let effect = &report.effects[0];
     assert!(effect.parameters.contains_key("sway") && !effect.provisional, "{effect:?}");
+}
+
+/// Loads of half the error that the model states: `load` of a unit effect, and a bias of the model's drag beside it.
+fn within_the_model_s_error(name: &str, bias: f64) -> (Report, f64) {
+    let motions = motions(TRIALS, SAMPLES, 25);
+    let unit: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| plant(name, motion)).collect();
+    let factor = 3.0 * NOISE[0] / rms(&unit)[0];
+    let drag: Vec<Vec<[f64; 6]>> =
+        motions.iter().map(|motion| plant("drag_coefficient_error", motion)).collect();
+    let wrong = bias * factor * rms(&unit)[0] / rms(&drag)[0];
+    let added: Vec<Vec<[f64; 6]>> = unit
+        .iter()
+        .zip(&drag)
+        .map(|(unit, drag)| {
+            let sum = |(u, d): (&[f64; 6], &[f64; 6])| std::array::from_fn(|c| factor * u[c] + wrong * d[c]);
+            unit.iter().zip(drag).map(sum).collect()
+        })
+        .collect();
+    let mut trials = trials(&motions, &added, &Noise::white(NOISE), 25);
+    trials.trials.iter_mut().for_each(|trial| trial.simulated = Default::default());
+    let body = gap::body_of(&trials).expect("a body");
+    let mut model = |condition: &Condition| {
+        let [fx, fy, fz, mx, my, mz] = planted::simulate_at(condition.velocity, condition.depth);
+        let wrench = Wrench { force: Vec3::new(fx, fy, fz), moment: Vec3::new(mx, my, mz) };
+        Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise) }
+    };
+    (gap::run(&trials, &body, &mut model, &Config::default()).expect("runs"), factor)
+}
+
+#[test]
+fn what_the_model_is_not_told_is_named_however_wrong_the_model_says_it_is_and_what_it_is_told_is_not() {
+    for bias in [0.0, 0.2] {
+        let (report, factor) = within_the_model_s_error("added_mass", bias);
+        assert_eq!(names(&report), ["added_mass"], "{} {:?}", report.summary, report.rejected);
+        let found = report.effects[0].parameters["surge"].value;
+        assert!((found / factor - 1.0).abs() < 0.2, "{found}, planted {factor}");
+    }
+    // a drag of that size is what the model said of itself
+    let (report, _) = within_the_model_s_error("drag_coefficient_error", 0.0);
+    assert!(report.effects.is_empty(), "{} {:?}", report.summary, names(&report));
 }
 
 #[test]

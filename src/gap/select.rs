@@ -12,8 +12,9 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 use super::design::{Design, Fitted};
+use super::features::General;
 use super::noise::Floor;
-use super::robust::{Error, contribution, errors, group, noise_of};
+use super::robust::{Error, contribution, errors, group, noise_of, of_column};
 use super::shared::outlasts_noise;
 use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
@@ -83,6 +84,7 @@ pub(super) struct Judge<'a> {
     pub setting: &'a Setting<'a>,
     pub config: &'a Config,
     pub floors: &'a [Floor; 6],
+    pub general: &'a General,
     /// Loss that nothing explains.
     pub floor_loss: f64,
     passed: RefCell<Verdicts>,
@@ -94,9 +96,10 @@ impl<'a> Judge<'a> {
         setting: &'a Setting<'a>,
         config: &'a Config,
         floors: &'a [Floor; 6],
+        general: &'a General,
         floor_loss: f64,
     ) -> Self {
-        Self { design, setting, config, floors, floor_loss, passed: RefCell::default() }
+        Self { design, setting, config, floors, general, floor_loss, passed: RefCell::default() }
     }
 
     /// Columns of a set.
@@ -250,7 +253,7 @@ impl<'a> Judge<'a> {
         if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
             return Some(Refusal::NotSignificant);
         }
-        if !self.relevant(member, base.len(), fitted) {
+        if !self.relevant(member, base, fitted) {
             return Some(Refusal::Irrelevant);
         }
         if before - fitted.loss < self.least_gain(set, before) {
@@ -260,8 +263,8 @@ impl<'a> Judge<'a> {
     }
 
     /// Size of what a member adds, against the noise of a sample and the model's uncertainty, in any component.
-    fn relevant(&self, member: &Member, first: usize, fitted: &Fitted) -> bool {
-        let design = self.design;
+    fn relevant(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        let (design, first) = (self.design, base.len());
         let mut squares = [0.0; 6];
         let mut count = [0.0; 6];
         for (row, place) in design.rows.rows.iter().enumerate() {
@@ -272,11 +275,33 @@ impl<'a> Judge<'a> {
             squares[place.component] += (value * design.noise.bin[place.component]).powi(2);
             count[place.component] += 1.0;
         }
-        self.setting.components.iter().any(|&c| {
-            let size = (squares[c] / f64::max(count[c], 1.0)).sqrt();
-            let floor = &self.floors[c];
-            size > self.config.relevance * floor.sample && size > floor.model
-        })
+        let size = |c: usize| (squares[c] / f64::max(count[c], 1.0)).sqrt();
+        let components = &self.setting.components;
+        let audible = |&&c: &&usize| size(c) > self.config.relevance * self.floors[c].sample;
+        components.iter().filter(audible).any(|&c| size(c) > self.floors[c].model)
+            || components.iter().any(|c| audible(&c)) && self.is_beyond_model(member, base, fitted)
+    }
+
+    /// True where no error of the model can stand for a member. That error is a function of what the model is told, velocity,
+    /// depth and attitude, the same in every trial: what goes with the same must be larger than it. What is left of a member
+    /// beyond all smooth functions of those is judged by the trials alone, whatever its size.
+    fn is_beyond_model(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        /// Share of the member that must be left, and of its coefficient.
+        const MOST: f64 = 0.5;
+        let design = self.design;
+        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
+        let Some(sum) = contribution(design, base, &own, &fitted.beta.as_slice()[base.len()..]) else {
+            return false;
+        };
+        let left = self.general.untold(&sum, design);
+        if left.norm_squared() < MOST * sum.norm_squared() {
+            return false;
+        }
+        let columns: Vec<usize> = base.iter().chain(&own).copied().collect();
+        let residual = design.residual(&columns, &fitted.beta);
+        let kept = left.dot(&(&residual + &sum)) / left.norm_squared();
+        let error = of_column(design, &left, &residual);
+        kept > MOST && error.probability(kept) <= self.config.significance
     }
 
     fn stable(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
