@@ -454,7 +454,12 @@ impl<'a> Judge<'a> {
 
     /// The best form of an effect beside a set, by every gate.
     pub fn weighed(&self, set: &[Member], effect: Effect) -> Option<Judged> {
-        let mut judged = self.judge(set, effect)?;
+        let judged = self.judge(set, effect)?;
+        self.beyond_chance(set, judged)
+    }
+
+    /// The gates that look at a form once it has passed the others: its placebos, and the noise that it shares with the gap.
+    fn beyond_chance(&self, set: &[Member], mut judged: Judged) -> Option<Judged> {
         if judged.refused.is_some() {
             return Some(judged);
         }
@@ -608,15 +613,16 @@ impl<'a> Judge<'a> {
             let without = self.design.solve(&self.columns(&others)).map_or(fitted.loss, |(_, loss)| loss);
             let explained = (without - fitted.loss).max(0.0);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
-                let Some(judged) = self.passes(&others, effect) else { continue };
-                // what needs many more numbers to say the same is no rival
-                if self.numbers(&judged.member) > self.numbers(&out) + 1 {
-                    continue;
-                }
-                let mut rival = others.clone();
-                rival.push(judged.member);
-                let Some((difference, open)) = self.difference(&rival, set, explained) else { continue };
-                if difference <= open {
+                let rivals = self.passing(&others, effect).into_iter().filter_map(|judged| {
+                    if !self.is_rival(&judged.member, &out, &others) {
+                        return None;
+                    }
+                    let mut rival = others.clone();
+                    rival.push(judged.member);
+                    let (difference, open) = self.difference(&rival, set, explained)?;
+                    (difference <= open).then_some((difference, rival))
+                });
+                if let Some((difference, mut rival)) = rivals.min_by(|a, b| a.0.total_cmp(&b.0)) {
                     rival.sort_by_key(|member| self.effect(member));
                     found.push((difference, rival));
                 }
@@ -631,6 +637,47 @@ impl<'a> Judge<'a> {
             rivals.extend(self.both(ours, theirs));
         }
         rivals
+    }
+
+    /// Forms of an effect that pass every gate beside a set: the best one by losses, and that of the fewest columns, since
+    /// what many numbers say of each channel one may say of all.
+    fn passing(&self, set: &[Member], effect: Effect) -> Vec<Judged> {
+        let best = self.passes(set, effect);
+        let base = self.columns(set);
+        let plain = || -> Option<Judged> {
+            let before = self.design.solve(&base)?.1;
+            let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
+            let (candidate, _) = forms.min_by_key(|(index, c)| (c.columns.len(), *index))?;
+            if best.as_ref().is_some_and(|best| best.member.candidate == candidate) {
+                return None;
+            }
+            let judged = self.judge_form(set, &base, before, candidate)?;
+            self.beyond_chance(set, judged).filter(|judged| judged.refused.is_none())
+        };
+        let plain = if effect == Effect::SensorGain { plain() } else { None };
+        best.into_iter().chain(plain).collect()
+    }
+
+    /// True where an effect may stand in another's place: with one number more at most, and none that nobody has ever measured.
+    fn is_rival(&self, member: &Member, out: &Member, others: &[Member]) -> bool {
+        self.numbers(member) <= self.numbers(out) + 1 && self.is_published(member, others)
+    }
+
+    /// True where every coefficient that has a band of published values lies in it, or a quarter beyond.
+    fn is_published(&self, member: &Member, others: &[Member]) -> bool {
+        const BEYOND: f64 = 1.25;
+        let mut columns = self.columns(others);
+        let first = columns.len();
+        columns.extend(member.columns.iter().map(|(column, _)| *column));
+        let Some((beta, _)) = self.design.solve(&columns) else { return false };
+        member.columns.iter().enumerate().all(|(i, &(column, coefficient))| {
+            let value = beta[first + i] / self.design.scale[column];
+            let band = self.effect(member).coefficients()[coefficient].literature;
+            // a band ends where nothing was measured, on either side of 0
+            let reach =
+                |end: f64, outwards: f64| if end * outwards > 0.0 { end * BEYOND } else { end / BEYOND };
+            band.is_none_or(|[low, high]| value >= reach(low, -1.0) && value <= reach(high, 1.0))
+        })
     }
 
     fn effects(&self, set: &[Member]) -> Vec<Effect> {
