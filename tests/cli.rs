@@ -212,3 +212,17 @@ fn the_readme_is_finished() {
         std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).expect("readable");
     assert!(!readme.contains("@@"), "a figure is missing");
 }
+
+#[test]
+fn a_reason_is_told_once() {
+    for arguments in [
+        ["vehicle", "check", "/nowhere/husky"].as_slice(),
+        &["eval", "--data", "analytic", "--trained", "/nowhere"],
+        &["dataset", "describe", "/nowhere/a.parquet"],
+    ] {
+        let output = wade(arguments);
+        let error = String::from_utf8(output.stderr).expect("text");
+        assert!(!output.status.success() && error.contains("/nowhere"), "{error}");
+        assert_eq!(error.matches("os error 2").count(), 1, "{error}");
+    }
+}

@@ -356,3 +356,29 @@ fn the_page_needs_nothing_from_elsewhere() {
 fn quoted(text: &str) -> impl Iterator<Item = String> + '_ {
     text.split('"').skip(1).step_by(2).map(str::to_owned)
 }
+
+#[test]
+fn connections_that_say_nothing_do_not_keep_others_out() {
+    use std::io::{Read, Write};
+    let served = Served::start();
+    let address = address(&served);
+    let silent: Vec<_> = (0..200)
+        .map(|index| {
+            let mut stream = std::net::TcpStream::connect(address).expect("connected");
+            // half a request is no more than none
+            if index % 2 == 0 {
+                stream.write_all(b"GET /livez HTTP/1.1\r\nHost: local").expect("sent");
+            }
+            stream
+        })
+        .collect();
+    // of the machine's queue and the server's places all are taken before this one
+    assert_eq!(get(address, "/livez").status, 200);
+    let mut first = &silent[0];
+    first.set_read_timeout(Some(PATIENCE)).expect("set");
+    let mut answer = Vec::new();
+    // closed, with an answer (408) or without
+    first.read_to_end(&mut answer).expect("closed before long");
+    let answer = String::from_utf8_lossy(&answer).into_owned();
+    assert!(answer.is_empty() || answer.starts_with("HTTP/1.1 408"), "{answer}");
+}

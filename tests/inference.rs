@@ -37,6 +37,11 @@ fn tensor(name: &str, width: usize, values: Vec<f32>) -> InferInputTensor {
     }
 }
 
+/// The version of a shipped bundle.
+fn version(vehicle: &str) -> String {
+    common::model(vehicle).version().to_string()
+}
+
 /// Every tensor there is.
 fn request(vehicle: &str, states: &[State]) -> ModelInferRequest {
     let rows = |of: &dyn Fn(&State) -> Vec<f32>| states.iter().flat_map(of).collect::<Vec<f32>>();
@@ -161,9 +166,9 @@ fn the_metadata_are_those_of_the_answers() {
         let server =
             inference.server_metadata(ServerMetadataRequest {}).await.expect("answered").into_inner();
         assert_eq!(server.name, "wade");
-        let metadata = ModelMetadataRequest { name: "husky".into(), version: "2".into() };
+        let metadata = ModelMetadataRequest { name: "husky".into(), version: version("husky") };
         let metadata = inference.model_metadata(metadata).await.expect("answered").into_inner();
-        assert_eq!(metadata.versions, ["2"]);
+        assert_eq!(metadata.versions, [version("husky")]);
         let depth = [0.1, 0.15];
         let request = ModelInferRequest {
             model_name: "husky".into(),
@@ -192,8 +197,9 @@ fn the_metadata_are_those_of_the_answers() {
         let net = ModelInferRequest { outputs: vec![asked("force_n")], ..request };
         let net = inference.model_infer(net).await.expect("answered").into_inner();
         assert_eq!(outputs(&net)["force_n"], outputs(&response)["force_n"]);
+        let served = version("husky");
         for (name, version, expected) in
-            [("husky", "", true), ("husky", "2", true), ("husky", "1", false), ("tank", "", false)]
+            [("husky", "", true), ("husky", &served, true), ("husky", "1", false), ("tank", "", false)]
         {
             let ready = ModelReadyRequest { name: name.into(), version: version.into() };
             let ready = inference.model_ready(ready).await.expect("answered").into_inner().ready;
@@ -327,16 +333,16 @@ fn an_administrator_loads_and_unloads() {
                 .map(|model| format!("{} {} {}", model.name, model.version, model.state))
                 .collect::<Vec<_>>()
         };
-        let both = ["husky 2 READY", "warthog 2 READY"];
-        assert_eq!(index(&mut inference, false).await, both);
+        let ready = VEHICLES.map(|vehicle| format!("{vehicle} {} READY", version(vehicle)));
+        assert_eq!(index(&mut inference, false).await, ready);
         inference.repository_model_unload(unload("husky")).await.expect("unloaded");
-        assert_eq!(index(&mut inference, false).await, ["husky  UNAVAILABLE", "warthog 2 READY"]);
-        assert_eq!(index(&mut inference, true).await, ["warthog 2 READY"]);
+        assert_eq!(index(&mut inference, false).await, ["husky  UNAVAILABLE", &ready[1]]);
+        assert_eq!(index(&mut inference, true).await, [ready[1].as_str()]);
         assert!(!answers(&served, "husky") && answers(&served, "warthog"));
         let again = inference.repository_model_unload(unload("husky")).await.expect_err("it is gone");
         assert_eq!(again.code(), Code::NotFound);
         inference.repository_model_load(load("husky")).await.expect("loaded");
-        assert_eq!(index(&mut inference, false).await, both);
+        assert_eq!(index(&mut inference, false).await, ready);
         // every vehicle is served again over shared memory too
         let mut shm = served.shm("husky", wade::service::shm::Wait::Block);
         shm.evaluate(&State { depth: 0.1, ..State::default() }).expect("answered");

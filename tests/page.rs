@@ -86,7 +86,8 @@ fn the_numbers_of_the_page_are_those_of_the_query() {
         }
     }
     assert!(page.contains("outside the training domain: tilt by"), "tilted by 7 degrees");
-    assert!(page.contains("weights: analytic"), "the provenance is told");
+    let weights = common::model("warthog").provenance().to_owned();
+    assert!(page.contains(&format!("weights: {weights}")), "the provenance is told: {weights}");
     for name in ["wheel_fl", "underbody_left"] {
         assert!(page.contains(name), "surfaces are listed: {name}");
     }

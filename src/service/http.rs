@@ -1,6 +1,7 @@
 //! HTTP: a page to look at, queries as JSON, metrics and probes. It has one thread of its own, so that whatever is asked
 //! here takes no time of the threads that answer gRPC and shared memory.
 
+mod connections;
 mod guard;
 mod hull;
 mod json;
@@ -89,17 +90,10 @@ pub struct Shared {
 }
 
 /// Serves until `stop` turns true.
-pub async fn run(
-    listener: TcpListener,
-    shared: Shared,
-    mut stop: watch::Receiver<bool>,
-) -> std::io::Result<()> {
-    let stopped = async move {
-        // an error means that the sender is gone, and with it the server
-        let _ = stop.wait_for(|&stop| stop).await;
-    };
+pub async fn run(listener: TcpListener, shared: Shared, stop: watch::Receiver<bool>) -> std::io::Result<()> {
     let listener = tokio::net::TcpListener::from_std(listener)?;
-    axum::serve(listener, router(Arc::new(shared))).with_graceful_shutdown(stopped).await
+    connections::serve(listener, router(Arc::new(shared)), stop).await;
+    Ok(())
 }
 
 fn router(shared: Arc<Shared>) -> Router {
