@@ -184,9 +184,9 @@ impl Effect {
             }
             Self::WaterEntrySlamming => "F = -C rho (dV/dt)+ u, on entry only",
             Self::WaveMemory => "F = -k rho V Re z, z' = -(1/T - i W) z + motion",
-            Self::ChannelBlockage => "W = k D ((1 - m)^-2 - 1), m = V / (L w d), at most b / w",
+            Self::ChannelBlockage => "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d)",
             Self::Squat => {
-                "Fz = -c rho g A_wp s, s = v^2 / 2g (or / sqrt(|1 - Fr_h^2|), at most twice), in a channel s / d = Fr_h^2 / 2 (((1 - m)(1 - s / d))^-2 - 1) up to Schijf's limit and from there to 0 at faded_at, m = V / (L w d), and a trim"
+                "Fz = -c rho g A_wp s, s = v^2 / 2g (or / sqrt(|1 - Fr_h^2|), at most twice), in a channel s / d = Fr_h^2 / 2 (((1 - m)(1 - s / d))^-2 - 1) up to Schijf's limit and from there to 0 at faded_at, m = V / (L w d) but at most b / w, and a trim"
             }
             Self::WheelPaddleThrust => {
                 "F = 1/2 rho C pi r^2 wet |omega r| (omega r - v_x) on each wheel, or F = 1/2 rho C r^2 int |u| u cos(phi) dphi over its wet lugs, u = omega r - v_x cos(phi); torque -1/2 rho C_t r^3 of the same without the cosine"
