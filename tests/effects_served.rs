@@ -93,6 +93,28 @@ fn an_effect_that_acts_on_surfaces_says_on_which() {
 }
 
 #[test]
+fn a_hull_that_turns_and_drifts_with_a_current_feels_no_more_inertia_than_one_that_turns_in_still_water() {
+    let turning =
+        Condition { angular_velocity: Vec3::new(0.0, 0.0, 0.8), ..Condition::level(Vec3::zeros(), 0.17) };
+    // straight over ground and unaccelerated, at the velocity of the water
+    let drifting = Condition { ground_velocity: Vec3::new(0.9, -0.4, 0.0), ..turning };
+    let in_turn = |name: Effect, condition: &Condition| {
+        let served = only("warthog", name, 0.3);
+        let mut session = Session::default();
+        let (mut loads, mut last) = (Loads::default(), Wrench::default());
+        for _ in 0..3 {
+            let told = Circumstances { time_step: 0.1, ..told() };
+            served.evaluate(condition, &told, Some(&mut session), &mut Workspace::new(), &mut loads);
+            last = load(&loads, name).wrench;
+        }
+        last
+    };
+    for name in [Effect::AddedMass, Effect::WaveMemory] {
+        assert_eq!(in_turn(name, &drifting), in_turn(name, &turning), "{}", name.name());
+    }
+}
+
+#[test]
 fn without_effects_the_answer_is_the_model_s_own() {
     let bare = ServedVehicle::new(model("husky"), None);
     let mut forces = Forces::default();

@@ -256,14 +256,14 @@ impl ActiveEffects {
             }
             if entry.effect == Effect::AddedMass {
                 let k = std::array::from_fn(|axis| entry.values[axis]);
-                *added_mass = Some(added_mass_matrix(&self.body, immersion, state.density, &k));
+                *added_mass = Some(added_mass_matrix(&entry.shape, &self.body, immersion, state.density, &k));
             }
             loads.push(EffectLoad { effect: entry.effect, wrench, left_out });
         }
     }
 }
 
-/// The same state with velocities that do not change in body axes.
+/// The same state with velocities over ground that do not change in body axes: those are what an integration changes.
 fn still(state: &Condition) -> Condition {
     Condition {
         acceleration: state.angular_velocity.cross(&state.ground_velocity),

@@ -1,8 +1,11 @@
 //! E6, added mass: the inertia of the water that moves with the hull.
 //!
 //! `W = -(M_A nu_dot + C_A(nu) nu)` about the center of buoyancy, with a diagonal `M_A` that scales with the water
-//! displaced: `k rho V` along the axes and `k rho V (a^2 + b^2) / 12` about them, the inertia of the displaced box.
-//! `nu_dot` is the rate in body axes; the cross terms are Kirchhoff's (Newman, Marine Hydrodynamics, section 4.14).
+//! displaced: `k rho V` along the axes and `k rho V (a^2 + b^2) / 12` about them, the inertia of the displaced box. A flat
+//! bottom near the surface moves as much water however deep it is, half of a plate's `rho pi a^2` a meter (Newman): with
+//! the shape 1 heave, roll and pitch have `rho pi b A_wp / 8` in the place of `rho V`.
+//! `nu` is the velocity through the water and `nu_dot` its rate in body axes, `a - omega x nu` in a steady current; the cross
+//! terms are Kirchhoff's (Newman, Marine Hydrodynamics, section 4.14).
 //!
 //! Deep-water values of `k` for bodies as long as high lie between 0.05 along a slender body and 1.5 across a flat one;
 //! shallow water raises sway more than heave (Zhou, Lo, Tan, J. Eng. Mech. 2005), by a factor of a few. Valid while the
@@ -13,20 +16,24 @@ use nalgebra::{Matrix3, Matrix6};
 use super::body::Body;
 use super::immersion::Immersion;
 use super::input::{Input, Part};
+use super::library::Shape;
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
 /// Added mass and inertia of the six coefficients at 1 [kg, kg m2].
-pub fn coefficients(body: &Body, immersion: &Immersion, density: f64) -> [f64; 6] {
+pub fn coefficients(shape: &Shape, body: &Body, immersion: &Immersion, density: f64) -> [f64; 6] {
     let mass = density * immersion.volume;
+    // of the bottom, as half a plate
+    let plate = density * std::f64::consts::PI / 8.0 * body.width * immersion.waterplane_area;
+    let heaved = if shape[0] > 0.5 { plate } else { mass };
     let [l, w, h] = [body.length, body.width, immersion.depth].map(|side| side * side / 12.0);
-    [mass, mass, mass, mass * (w + h), mass * (l + h), mass * (l + w)]
+    [mass, mass, heaved, heaved * (w + h), heaved * (l + h), mass * (l + w)]
 }
 
 /// The 6x6 matrix about the center of mass [kg, kg m, kg m2], forces first: `W = -M nu_dot` for a body at rest, which an
 /// implicit integration takes instead of the explicit force.
-pub fn matrix(body: &Body, immersion: &Immersion, density: f64, k: &[f64; 6]) -> Matrix6<f64> {
-    let unit = coefficients(body, immersion, density);
+pub fn matrix(shape: &Shape, body: &Body, immersion: &Immersion, density: f64, k: &[f64; 6]) -> Matrix6<f64> {
+    let unit = coefficients(shape, body, immersion, density);
     let linear = Matrix3::from_diagonal(&Vec3::from_fn(|i, _| k[i] * unit[i]));
     let angular = Matrix3::from_diagonal(&Vec3::from_fn(|i, _| k[i + 3] * unit[i + 3]));
     let arm = (immersion.center_of_buoyancy - body.center_of_mass).cross_matrix();
@@ -39,14 +46,13 @@ pub fn matrix(body: &Body, immersion: &Immersion, density: f64, k: &[f64; 6]) ->
     matrix
 }
 
-pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let state = input.condition;
     let (v, omega) = (state.velocity, state.angular_velocity);
     let center = input.immersion.center_of_buoyancy;
     let u = v + omega.cross(&center);
-    let rate =
-        state.acceleration - omega.cross(&state.ground_velocity) + state.angular_acceleration.cross(&center);
-    let unit = coefficients(input.body, input.immersion, state.density);
+    let rate = state.acceleration - omega.cross(&v) + state.angular_acceleration.cross(&center);
+    let unit = coefficients(shape, input.body, input.immersion, state.density);
     for axis in 0..3 {
         let e = Vec3::ith(axis, 1.0);
         let momentum = e * (unit[axis] * u[axis]);

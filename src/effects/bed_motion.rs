@@ -1,12 +1,15 @@
 //! E18, driving over the bed instead of standing on it in a current.
 //!
 //! A model learnt from parked hulls has the slow water near the bed under the hull; a hull that drives through still water
-//! has not. `F = 1/2 rho A |v_g| (-C_D v_g + C_L |v_g| up)` with the velocity over ground `v_g`. The paper's CFD is of
-//! parked hulls. The shape says which area carries it: 0 the wet front, 1 the wet underside, which does not grow with the
-//! depth. Coefficients come from paired CFD cases; there is no published band.
+//! has not. `F = 1/2 rho A |v_g| (-C_D v_g + C_L |v_g| up)` with the velocity over ground `v_g`. The slow layer is thin, so
+//! the drag changes at the foot of the hull and the lift under its middle. The paper's CFD is of parked hulls. The shape
+//! says which area carries it: 0 the wet front, 1 the wet underside, which does not grow with the depth, 2 the area that the
+//! model's own drag speaks of, `|D| / (1/2 rho K v^2)` with its coefficient `K` ahead. Coefficients come from paired CFD
+//! cases; there is no published band.
 
 use super::input::{Input, Part};
 use super::library::Shape;
+use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
 pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
@@ -15,11 +18,32 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
     let ground = state.ground_velocity;
     let ground = ground - up * ground.dot(&up);
     let speed = ground.norm();
+    let at_bed = |point: Vec3| Vec3::new(point.x, point.y, input.body.z0);
+    let middle = at_bed(input.immersion.center_of_buoyancy);
+    if shape[0] > 1.5 {
+        let load = input.half_density() * area_of_drag(input) * speed;
+        emit(0, Part::Hull, input.at(ground * -load, &middle));
+        emit(1, Part::Hull, input.at(up * (load * speed), &middle));
+        return;
+    }
     for (index, panel) in input.body.panels.iter().enumerate() {
         let part = &input.immersion.panels[index];
         let facing = if shape[0] > 0.5 { panel.facing_minus.z } else { panel.windward(&ground).x };
         let load = input.half_density() * facing * part.fraction * speed;
-        emit(0, Part::Panel(index), input.at(ground * -load, &part.point));
-        emit(1, Part::Panel(index), input.at(up * (load * speed), &part.point));
+        emit(0, Part::Panel(index), input.at(ground * -load, &at_bed(part.point)));
+        emit(1, Part::Panel(index), input.at(up * (load * speed), &middle));
     }
+}
+
+/// Area that meets the flow as the model's drag across gravity has it [m2]; none where there is hardly a flow.
+fn area_of_drag(input: &Input) -> f64 {
+    const SLOWEST: f64 = 0.1;
+    let state = input.condition;
+    let up = state.up.into_inner();
+    let force = input.predicted.force;
+    let pressure = input.half_density() * state.velocity.norm_squared() * input.base_drag.x;
+    if state.velocity.norm() < SLOWEST || input.base_drag.x < 1e-3 {
+        return 0.0;
+    }
+    (force - up * force.dot(&up)).norm() / pressure
 }

@@ -63,6 +63,14 @@ pub struct Block {
     pub displaced_volume: f64,
     /// Center of mass [m] in a frame whose origin lies amidships, half a draft above the ground-contact plane.
     pub center_of_mass: [f64; 3],
+    /// Radius of a wheel [m], where it is known.
+    pub wheel_radius: Option<f64>,
+}
+
+impl Block {
+    fn wheel_radius(&self) -> f64 {
+        self.wheel_radius.unwrap_or(BOX_WHEELS[0] * self.length)
+    }
 }
 
 /// A hull prepared for the effects; body frame.
@@ -133,7 +141,7 @@ impl Body {
             mass: block.mass,
             center_of_mass: Vec3::from(block.center_of_mass),
             z0: -0.5 * block.draft,
-            wheel_radius: BOX_WHEELS[0] * block.length,
+            wheel_radius: block.wheel_radius(),
             panels: box_panels(&block, height),
             hull: Hull::Block { block, height },
         }
@@ -240,14 +248,15 @@ fn box_panels(block: &Block, height: f64) -> Vec<Panel> {
         let bottom = Vec3::z() * (strip * width);
         panels.push(panel("bottom", Vec3::new(x, 0.0, z0), spread, zero(), bottom));
     }
-    let [radius, base, track] = BOX_WHEELS;
+    let [_, base, track] = BOX_WHEELS;
+    let radius = block.wheel_radius();
     for (front, left) in [(true, true), (true, false), (false, true), (false, false)] {
         let sign = |positive: bool| if positive { 1.0 } else { -1.0 };
-        let center = Vec3::new(sign(front) * base * length, sign(left) * track * width, z0 + radius * length);
+        let center = Vec3::new(sign(front) * base * length, sign(left) * track * width, z0 + radius);
         // a wheel of a box has no drag of its own: that is the box's
         let mut wheel = panel("wheel", center, zero(), zero(), zero());
         wheel.wheel = Some(wheel_at(front, left));
-        wheel.spread = Vec3::z() * (radius * length);
+        wheel.spread = Vec3::z() * radius;
         panels.push(wheel);
     }
     panels

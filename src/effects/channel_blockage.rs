@@ -24,3 +24,13 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
         emit(0, Part::Panel(index), input.at(force, &part.point));
     }
 }
+
+/// Share of the channel's section that the hull's mean section takes [-], at most `b / w` since no hull stands deeper in the
+/// water than the water is; none without walls or water.
+pub(super) fn blockage(input: &Input) -> Option<f64> {
+    const MOST: f64 = 0.8;
+    let immersion = input.immersion;
+    let width = input.channel_width.filter(|_| immersion.depth > 1e-3)?;
+    let section = immersion.volume / input.body.length;
+    Some((section / (width * immersion.depth)).min(input.body.width / width).min(MOST))
+}

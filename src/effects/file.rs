@@ -235,7 +235,13 @@ impl ActiveEffect {
         must(self.base_drag.iter().all(|x| (0.0..=10.0).contains(x)), "base_drag", "between 0 and 10")?;
         let width = self.channel_width.is_none_or(|width| width.is_finite() && width > 0.0);
         must(width, "channel_width", "greater than 0")?;
-        let in_channel = self.name != Effect::ChannelBlockage || self.channel_width.is_some();
+        let walls = match self.name {
+            Effect::ChannelBlockage => true,
+            // a channel's law, and not that of open water
+            Effect::Squat => self.shape[0] > 0.0,
+            _ => false,
+        };
+        let in_channel = !walls || self.channel_width.is_some();
         must(in_channel, "channel_width", "there: this effect depends on it")?;
         self.check_coefficients(&must)?;
         self.check_parameters(&must)

@@ -169,7 +169,7 @@ impl Effect {
     pub fn equation(self) -> &'static str {
         match self {
             Self::AddedMass => {
-                "W = -(M_A nu_dot + C_A(nu) nu), M_A = rho V diag(surge, sway, heave, roll (b2+d2)/12, pitch (l2+d2)/12, yaw (l2+b2)/12)"
+                "W = -(M_A nu_dot + C_A(nu) nu), M_A = rho V diag(surge, sway, heave, roll (b2+d2)/12, pitch (l2+d2)/12, yaw (l2+b2)/12), or heave, roll, pitch with rho pi b A_wp / 8 for rho V"
             }
             Self::LinearDamping => "f_i = -c_i rho sqrt(g L) A_i u_i, u = v + omega x r",
             Self::DragCoefficientError => "f_i = -1/2 rho C_i A_i |v| v_i",
@@ -185,9 +185,15 @@ impl Effect {
             Self::WaterEntrySlamming => "F = -C rho (dV/dt)+ u, on entry only",
             Self::WaveMemory => "F = -k rho V Re z, z' = -(1/T - i W) z + motion",
             Self::ChannelBlockage => "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d)",
-            Self::Squat => "Fz = -c 1/2 rho v^2 A_wp g(Fr_h), and a trim",
-            Self::WheelPaddleThrust => "F = 1/2 rho C A |omega r| (omega r - v_x) on each wet wheel",
-            Self::BedMotion => "F = 1/2 rho A |v_g| (-C_D v_g + C_L |v_g| up)",
+            Self::Squat => {
+                "Fz = -c rho g A_wp s, s = v^2 / 2g (or / sqrt(|1 - Fr_h^2|), at most twice), in a channel s / d = Fr_h^2 / 2 (((1 - m)(1 - s / d))^-2 - 1) up to Schijf's limit and from there to 0 at faded_at, m = V / (L w d) but at most b / w, and a trim"
+            }
+            Self::WheelPaddleThrust => {
+                "F = 1/2 rho C pi r^2 wet |omega r| (omega r - v_x) on each wheel, or F = 1/2 rho C r^2 int |u| u cos(phi) dphi over its wet lugs, u = omega r - v_x cos(phi); torque -1/2 rho C_t r^3 of the same without the cosine"
+            }
+            Self::BedMotion => {
+                "F = 1/2 rho A |v_g| (-C_D v_g + C_L |v_g| up), A the wet front or underside or |D| / (1/2 rho K v^2) with the model's drag D; the drag at the bed, the lift under the center of buoyancy"
+            }
             _ => "",
         }
     }
@@ -204,6 +210,12 @@ impl Effect {
             Self::RollingResistance | Self::DriveGain | Self::MassError => Kind::Drive,
             _ => Kind::Physics,
         }
+    }
+
+    /// True where the coefficients after the first say more of the same load: its arm, its trim, its torque, the blow backwards
+    /// that comes with one upwards.
+    pub fn needs_its_first(self) -> bool {
+        matches!(self, Self::HullFlooding | Self::Squat | Self::WheelPaddleThrust | Self::WaterEntrySlamming)
     }
 
     /// True where the load depends on the past, so that a server keeps a state.
@@ -261,7 +273,9 @@ impl Effect {
             }
             Self::ChannelBlockage => const { &[l("strength", 0.0, 5.0, [0.5, 1.5])] },
             Self::Squat => const { &[l("sinkage", 0.0, 4.0, [0.1, 1.5]), c("trim", "1", -2.0, 2.0)] },
-            Self::WheelPaddleThrust => const { &[l("thrust", 0.0, 6.0, [0.1, 2.0])] },
+            Self::WheelPaddleThrust => {
+                const { &[l("thrust", 0.0, 6.0, [0.1, 2.0]), c("torque", "1", -12.0, 12.0)] }
+            }
             Self::BedMotion => const { &[c("drag", "1", -4.0, 4.0), c("lift", "1", -4.0, 4.0)] },
             Self::SensorDelay => const { &[c("delay", "s", 0.0, 1.0)] },
             Self::SensorBias | Self::SensorBiasStep => {
@@ -321,6 +335,7 @@ impl Effect {
     pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::HullFlooding => &[("opening_ratio", "1")],
+            Self::Squat => &[("faded_at", "1")],
             Self::WaterEntrySlamming => &[("wet_at", "m")],
             Self::WaveMemory => &[("time_constant", "s"), ("frequency", "rad/s")],
             _ => &[],

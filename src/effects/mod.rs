@@ -59,7 +59,7 @@ pub fn basis(
     mut emit: impl FnMut(usize, Part, Wrench),
 ) {
     match effect {
-        Effect::AddedMass => added_mass::basis(input, &mut emit),
+        Effect::AddedMass => added_mass::basis(shape, input, &mut emit),
         Effect::LinearDamping => linear_damping::basis(input, &mut emit),
         Effect::DragCoefficientError => drag_coefficient_error::basis(shape, input, &mut emit),
         Effect::Rotation => rotation::basis(shape, input, &mut emit),
@@ -71,7 +71,7 @@ pub fn basis(
         Effect::WaveMemory => wave_memory::basis(shape, memory, input, &mut emit),
         Effect::ChannelBlockage => channel_blockage::basis(input, &mut emit),
         Effect::Squat => squat::basis(shape, input, &mut emit),
-        Effect::WheelPaddleThrust => wheel_paddle_thrust::basis(input, &mut emit),
+        Effect::WheelPaddleThrust => wheel_paddle_thrust::basis(shape, input, &mut emit),
         Effect::BedMotion => bed_motion::basis(shape, input, &mut emit),
         Effect::SensorDelay
         | Effect::SensorBias

@@ -15,7 +15,8 @@ use crate::wrench::Wrench;
 
 pub(super) fn advance(shape: &Shape, memory: &mut Memory, input: &Input, dt: f64) {
     let state = input.condition;
-    let motion = state.acceleration - state.angular_velocity.cross(&state.ground_velocity);
+    // the rate in body axes of the velocity through the water, in a steady current
+    let motion = state.acceleration - state.angular_velocity.cross(&state.velocity);
     let decay = (-dt / shape[0].max(1e-6)).exp();
     let (sine, cosine) = (shape[1] * dt).sin_cos();
     let (real, imaginary) = (memory.real, memory.imaginary);

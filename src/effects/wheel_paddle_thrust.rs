@@ -1,21 +1,71 @@
 //! E13, turning wheels throw water backwards.
 //!
-//! `F = 1/2 rho C A |omega r| (omega r - v_x)` forwards on each wet wheel with `A` its wet disc, `pi r^2` times the wet
-//! share: momentum of the water that lugs carry along, in proportion to the slip. C is of the order of 1 (M).
+//! Two laws. `F = 1/2 rho C A |omega r| (omega r - v_x)` forwards on each wheel with the wet part `A` of its disc: momentum of
+//! the water that is carried along, in proportion to the slip. Or lugs, plates across the rim: one at the angle `phi` from
+//! the foot of the wheel meets the water with `u = omega r - v_x cos(phi)`, so that
+//! `F = 1/2 rho C r^2 int |u| u cos(phi) dphi` over the wet arc, which is not zero where the wheel rolls. C is of the order
+//! of 1 (M). The thrust acts at the hub; a second coefficient has the torque of the lugs, `-1/2 rho C r^3 int |u| u dphi`.
+//! The shape is 0 for the disc and 1 for the lugs.
 
 use super::input::{Input, Part};
+use super::library::Shape;
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
-pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+/// Points of the wet arc of a wheel, from its foot to the surface; both sides are alike.
+const POINTS: usize = 6;
+
+pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let radius = input.body.wheel_radius;
-    let disc = std::f64::consts::PI * radius * radius;
+    let scale = input.half_density() * radius * radius;
     for (index, panel) in input.body.panels.iter().enumerate() {
         let Some(speed) = panel.wheel.and_then(|wheel| input.wheel_speeds[wheel]) else { continue };
-        let part = &input.immersion.panels[index];
+        let wet = input.immersion.panels[index].fraction;
+        if wet <= 0.0 {
+            continue;
+        }
         let rim = speed * radius;
-        let slip = rim - input.local_velocity(&panel.centroid).x;
-        let force = input.half_density() * disc * part.fraction * rim.abs() * slip;
-        emit(0, Part::Panel(index), input.at(Vec3::x() * force, &part.point));
+        let through = input.local_velocity(&panel.centroid).x;
+        let (push, turn) = if shape[0] > 0.5 {
+            lugs(rim, through, wet)
+        } else {
+            let push = std::f64::consts::PI * wet * rim.abs() * (rim - through);
+            (push, push)
+        };
+        emit(0, Part::Panel(index), input.at(Vec3::x() * (scale * push), &panel.centroid));
+        let torque = Vec3::y() * (-scale * radius * turn);
+        emit(1, Part::Panel(index), Wrench { force: Vec3::zeros(), moment: torque });
+    }
+}
+
+/// `int |u| u cos(phi) dphi` and `int |u| u dphi` over the wet arc, by midpoints.
+fn lugs(rim: f64, through: f64, wet: f64) -> (f64, f64) {
+    let half = (1.0 - 2.0 * wet).clamp(-1.0, 1.0).acos();
+    let step = half / POINTS as f64;
+    let (mut push, mut turn) = (0.0, 0.0);
+    for point in 0..POINTS {
+        let cosine = ((point as f64 + 0.5) * step).cos();
+        let u = rim - through * cosine;
+        let pressure = 2.0 * step * u * u.abs();
+        push += pressure * cosine;
+        turn += pressure;
+    }
+    (push, turn)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lugs_push_where_a_wheel_spins_and_a_little_where_it_rolls() {
+        // half a wheel wet, at rest: 2 (omega r)^2, and pi (omega r)^2 about the hub
+        let (push, turn) = lugs(1.5, 0.0, 0.5);
+        assert!(
+            (push / 4.5 - 1.0).abs() < 0.01 && (turn / (2.25 * std::f64::consts::PI) - 1.0).abs() < 1e-12
+        );
+        // rolling: int (1 - cos)^2 cos dphi = 2 - pi + 4/3 over half a turn
+        let (push, _) = lugs(1.0, 1.0, 0.5);
+        assert!((push / 0.1917 - 1.0).abs() < 0.03, "{push}");
     }
 }

@@ -4,11 +4,20 @@ use nalgebra::{DMatrix, DVector};
 
 use super::candidates::Setting;
 use super::series::Series;
-use crate::effects::{self, Effect, Memory};
+use crate::effects::{self, Effect, Memory, Shape};
 use crate::frame::{GRAVITY, Vec3};
 
-/// Drag of the prediction as coefficients on windward areas: least squares over forces beside buoyancy and lift.
+/// Drag of the prediction as coefficients on windward areas: least squares over forces beside buoyancy and lift, by the law
+/// that leaves less, with the whole speed or the speed along each axis. The wrong one has no drag across a hull that
+/// drives ahead and only seems to move sideways.
 pub(super) fn base_drag(all: &[Series], setting: &Setting) -> Vec3 {
+    let fits = [0.0, 1.0].map(|law| of_law(all, setting, &[law, 0.0, 0.0]));
+    let best = fits.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or_else(Vec3::zeros, |(drag, _)| drag)
+}
+
+/// Coefficients, and the change of the sum of squares.
+fn of_law(all: &[Series], setting: &Setting, law: &Shape) -> Option<(Vec3, f64)> {
     const COLUMNS: usize = 5;
     let mut xx = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
     let mut xy = DVector::<f64>::zeros(COLUMNS);
@@ -19,7 +28,7 @@ pub(super) fn base_drag(all: &[Series], setting: &Setting) -> Vec3 {
             let mut rows = [[0.0; COLUMNS]; 3];
             effects::basis(
                 Effect::DragCoefficientError,
-                &[0.0; 3],
+                law,
                 &Memory::default(),
                 &input,
                 |coefficient, _, load| (0..3).for_each(|axis| rows[axis][coefficient] += load.force[axis]),
@@ -47,8 +56,8 @@ pub(super) fn base_drag(all: &[Series], setting: &Setting) -> Vec3 {
         xx[(i, j)] / (scale[i] * scale[j]) + if i == j { 1e-6 } else { 0.0 }
     });
     let right = DVector::from_fn(COLUMNS, |i, _| xy[i] / scale[i]);
-    let Some(factor) = scaled.cholesky() else { return Vec3::zeros() };
-    let solved = factor.solve(&right);
+    let solved = scaled.cholesky()?.solve(&right);
     // a drag that is not excited is taken as none
-    Vec3::from_fn(|i, _| (solved[i] / scale[i]).clamp(0.0, 5.0))
+    let drag = Vec3::from_fn(|i, _| (solved[i] / scale[i]).clamp(0.0, 5.0));
+    Some((drag, -solved.dot(&right)))
 }

@@ -83,7 +83,13 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::Rotation => vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
         Effect::Current => vec![[0.0; 3], [0.0, 0.0, 1.0]],
         Effect::DragCoefficientError => [0.0, 1.0, 2.0].map(|law| [law, 0.0, 0.0]).into(),
-        Effect::Squat | Effect::BedMotion => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::AddedMass | Effect::WheelPaddleThrust => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::BedMotion => [0.0, 1.0, 2.0].map(|area| [area, 0.0, 0.0]).into(),
+        Effect::Squat => {
+            let in_channel = [0.7, 1.0].map(|faded| [faded, 0.0, 0.0]);
+            let walls = if setting.channel_width.is_some() { &in_channel[..] } else { &[] };
+            [&[[0.0; 3], [0.0, 1.0, 0.0]][..], walls].concat()
+        }
         Effect::WaterEntrySlamming => {
             // a bottom without deadrise, and of 10, 20 and 30 degrees
             [0.0, 0.18, 0.36, 0.58].map(|slope| [0.5 * slope * setting.body.width, 0.0, 0.0]).into()
@@ -194,7 +200,8 @@ fn chain(
             }
             Effect::DriveGain => columns[0][sample] = series.other[sample],
             Effect::MassError => {
-                let inertia = (state.acceleration + up * GRAVITY) * -setting.mass;
+                // the acceleration that the wrench was inferred with
+                let inertia = (series.recorded_acceleration[sample] + up * GRAVITY) * -setting.mass;
                 (0..3).for_each(|axis| columns[0][sample][axis] = inertia[axis]);
             }
             _ => {}
@@ -205,20 +212,28 @@ fn chain(
     }
 }
 
-/// `-(p(t - tau/2 + h) - p(t - tau/2 - h)) / 2h` from bin means: the change per second of delay.
+/// Change per second of delay, `-dp/dt` at `t - tau/2`, from bin means: `-(4 D_h - D_2h) / 3` with the central differences
+/// `D_h = (p(+h) - p(-h)) / 2h`, which follow a change within half a second where `D_h` alone takes a quarter off.
 fn delayed(series: &Series, delay: f64, column: &mut Column) {
     let centers = series.binned(|sample| series.t[sample]);
-    let at = |shift: f64| -> Vec<f64> { series.t.iter().map(|t| t + shift).collect() };
-    let (early, late) = (at(-0.5 * delay - DELAY_ARM), at(-0.5 * delay + DELAY_ARM));
     let (first, last) = (centers[0], centers[centers.len() - 1]);
+    // beyond the ends nothing is known of the prediction
+    let at = |shift: f64| -> Vec<f64> {
+        series.t.iter().map(|t| (t - 0.5 * delay + shift).clamp(first, last)).collect()
+    };
+    let arms = [DELAY_ARM, 2.0 * DELAY_ARM].map(|arm| [at(-arm), at(arm)]);
     for component in 0..6 {
         let values = series.binned(|sample| series.predicted[sample][component]);
-        let before = crate::signal::interpolate(&centers, &values, &early);
-        let after = crate::signal::interpolate(&centers, &values, &late);
-        for (sample, value) in column.iter_mut().enumerate() {
-            // beyond the ends nothing is known of the prediction
-            let span = late[sample].clamp(first, last) - early[sample].clamp(first, last);
-            value[component] = if span > DELAY_ARM { -(after[sample] - before[sample]) / span } else { 0.0 };
+        let [near, far] = arms.each_ref().map(|[early, late]| {
+            let [before, after] = [early, late].map(|t| crate::signal::interpolate(&centers, &values, t));
+            let slope = |i: usize| {
+                let span = late[i] - early[i];
+                if span > DELAY_ARM { (after[i] - before[i]) / span } else { 0.0 }
+            };
+            (0..series.t.len()).map(slope).collect::<Vec<f64>>()
+        });
+        for (value, (near, far)) in column.iter_mut().zip(near.iter().zip(&far)) {
+            value[component] = -(4.0 * near - far) / 3.0;
         }
     }
 }

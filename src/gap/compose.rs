@@ -9,6 +9,7 @@ use super::design::Design;
 use super::detect::{self, Excitation};
 use super::experiment::separating;
 use super::fit::{Fit, Parameter, fit};
+use super::gated::{Gated, gated};
 use super::holdout::{closures, explained, worse};
 use super::noise::{Floor, floors_of};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
@@ -58,9 +59,13 @@ pub(super) fn compose(
         _ => Vec::new(),
     };
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
+    let gated = match found.verdict {
+        Verdict::NoCandidateFits => gated(all, judge, library),
+        _ => None,
+    };
     let (regions, regions_tried) = match found.verdict {
         Verdict::NothingMissing => (Vec::new(), 0),
-        _ => locate::locate(all, &design.trials, gap_excess, config),
+        _ => locate::locate(all, &design.trials, gap_excess, gated.map(|gated| gated.limits), config),
     };
     let excitation =
         detect::excitations(design, all, setting, &trials.manifest, &found.residual, &config.library, config);
@@ -74,7 +79,7 @@ pub(super) fn compose(
         separating(&effects(&found.members), &effects(rival))
     });
     let held_floors = floors_of(all, &held, judge.floors, &setting.components);
-    let unexplained = unexplained(judge, &found);
+    let unexplained = unexplained(judge, &found, gated);
     let gap = GapReport {
         held_out: closures(&named, all, &held, setting, &held_floors, config),
         size: detect::sizes(all, judge.floors, &setting.components, config),
@@ -236,7 +241,7 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
     ])
 }
 
-fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
+fn unexplained(judge: &Judge, found: &Found, gated: Option<Gated>) -> Option<String> {
     let left = &found.left;
     let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
     let share = left.gain / whole;
@@ -250,11 +255,20 @@ fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
     }
     let functions: Vec<String> =
         left.strongest.iter().map(|(name, share)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
-    Some(format!(
+    let mut text = format!(
         "{:.0} % of the gap above the floor can be predicted from the state beyond the named effects; it goes most with {}",
         (100.0 * share).clamp(0.0, 100.0),
         functions.join(", ")
-    ))
+    );
+    if let Some(gated) = gated {
+        text += &format!(
+            "; where {} it is like {}, and {:.0} % of it goes with that there",
+            locate::in_words(&gated.limits),
+            gated.effect.name().replace('_', " "),
+            100.0 * gated.share.min(1.0)
+        );
+    }
+    Some(text)
 }
 
 /// Squared standardised gap of each bin less that of noise.

@@ -1,6 +1,6 @@
 //! What a region or a structure is described in.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::candidates::Column;
 use super::design::{Design, to_rows};
@@ -60,8 +60,16 @@ fn time_in_water(series: &Series) -> Vec<f64> {
 /// predicts of blocks that it has not seen is structure, whatever its name.
 #[derive(Debug, Clone)]
 pub(super) struct General {
-    /// Columns, each over all rows.
-    columns: Vec<(String, Vec<f64>)>,
+    columns: Vec<Smooth>,
+}
+
+/// One of the functions over all rows.
+#[derive(Debug, Clone)]
+struct Smooth {
+    name: String,
+    values: Vec<f64>,
+    /// True where it is one of what a model is told: velocity, depth, attitude.
+    told: bool,
 }
 
 /// What the general model finds in the rows.
@@ -79,9 +87,8 @@ pub(super) struct Structure {
 
 impl General {
     pub fn new(all: &[Series], design: &Design, components: &[usize]) -> Self {
-        let functions = functions();
         let mut columns = Vec::new();
-        let mut add = |name: String, function: &dyn Fn(&Series, usize, f64) -> f64| {
+        let mut add = |name: String, told: bool, function: &dyn Fn(&Series, usize, f64) -> f64| {
             let of = |trial: usize| -> Column {
                 let series = &all[trial];
                 let time = time_in_water(series);
@@ -89,14 +96,14 @@ impl General {
             };
             let values = to_rows(all, &design.rows, &design.trials, components, &design.noise, of);
             if values.iter().any(|v| v.abs() > 1e-12) {
-                columns.push((name, values));
+                columns.push(Smooth { name, values, told });
             }
         };
-        for (name, function) in functions {
-            add(name.to_owned(), &function);
+        for (told, functions) in [(true, of_the_state()), (false, of_the_motion())] {
+            functions.into_iter().for_each(|(name, function)| add(name.to_owned(), told, &function));
         }
         // hats over the range of a quantity follow any shape that a polynomial does not
-        for (name, quantity) in quantities() {
+        for (name, told, quantity) in quantities() {
             let mut values: Vec<f64> =
                 all.iter().flat_map(|s| (0..s.t.len()).step_by(7).map(|i| quantity(s, i))).collect();
             let (low, high) = (quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995));
@@ -104,7 +111,7 @@ impl General {
             for hat in (0..=HATS).filter(|_| width > 1e-6) {
                 let middle = low + hat as f64 * width;
                 let height = move |value: f64| (1.0 - ((value - middle) / width).abs()).max(0.0);
-                add(format!("{name} near {middle:.2}"), &|s, i, _| height(quantity(s, i)));
+                add(format!("{name} near {middle:.2}"), told, &|s, i, _| height(quantity(s, i)));
             }
         }
         Self { columns }
@@ -132,8 +139,25 @@ impl General {
         let mut order: Vec<usize> = (0..self.columns.len()).collect();
         order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
         sum.strongest =
-            order.into_iter().take(3).map(|i| (self.columns[i].0.clone(), shares[i] / whole)).collect();
+            order.into_iter().take(3).map(|i| (self.columns[i].name.clone(), shares[i] / whole)).collect();
         sum
+    }
+
+    /// What smooth functions of what a model is told leave of a target that has the rows of the design.
+    pub fn untold(&self, target: &DVector<f64>, design: &Design) -> DVector<f64> {
+        let told: Vec<&Smooth> = self.columns.iter().filter(|column| column.told).collect();
+        let mut left = target.clone();
+        for place in 0..design.rows.width {
+            let rows: Vec<usize> = (place..target.len()).step_by(design.rows.width).collect();
+            let mut x = DMatrix::from_fn(rows.len(), told.len(), |i, j| told[j].values[rows[i]]);
+            x.column_iter_mut().for_each(|mut column| column /= column.norm().max(1e-12));
+            let y = DVector::from_fn(rows.len(), |i, _| target[rows[i]]);
+            let matrix = x.tr_mul(&x) + DMatrix::identity(told.len(), told.len()) * RIDGE;
+            let Some(factor) = matrix.cholesky() else { continue };
+            let rest = &y - &x * factor.solve(&x.tr_mul(&y));
+            rows.iter().zip(rest.iter()).for_each(|(&row, value)| left[row] = *value);
+        }
+        left
     }
 
     #[expect(clippy::too_many_arguments, reason = "sums of one pass")]
@@ -147,19 +171,18 @@ impl General {
         sum: &mut Structure,
         shares: &mut [f64],
     ) {
-        use nalgebra::DMatrix;
         let count = self.columns.len();
         // whole trials are left out: parts of one would teach the zero of the others
         let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
         let fold_of_trial: Vec<usize> =
             (0..gains.len()).map(|trial| place(trial) % folds.min(design.trials.len())).collect();
         let fold_of = |row: usize| fold_of_trial[design.rows.rows[row].trial];
-        let x = DMatrix::from_fn(rows.len(), count, |i, j| self.columns[j].1[rows[i]]);
+        let x = DMatrix::from_fn(rows.len(), count, |i, j| self.columns[j].values[rows[i]]);
         let scale: Vec<f64> =
             (0..count).map(|j| (x.column(j).norm_squared() / rows.len() as f64).sqrt().max(1e-12)).collect();
         let x = DMatrix::from_fn(rows.len(), count, |i, j| x[(i, j)] / scale[j]);
         let y = DVector::from_fn(rows.len(), |i, _| target[rows[i]]);
-        let ridge = 1e-3 * rows.len() as f64;
+        let ridge = RIDGE * rows.len() as f64;
         let solve = |xx: &DMatrix<f64>, xy: &DVector<f64>| {
             let mut matrix = xx.clone();
             (0..count).for_each(|i| matrix[(i, i)] += ridge);
@@ -187,16 +210,20 @@ impl General {
     }
 }
 
+/// Ridge over the square of a column: functions of the state that hardly differ.
+const RIDGE: f64 = 1e-3;
+
 /// Hats over the range of a quantity.
 const HATS: usize = 12;
 
 type Quantity = fn(&Series, usize) -> f64;
 
-fn quantities() -> [(&'static str, Quantity); 3] {
+/// Each with whether a model is told of it.
+fn quantities() -> [(&'static str, bool, Quantity); 3] {
     [
-        ("forward velocity", |s, i| s.conditions[i].velocity.x),
-        ("depth", |s, i| s.conditions[i].depth),
-        ("yaw rate", |s, i| s.conditions[i].angular_velocity.z),
+        ("forward velocity", true, |s, i| s.conditions[i].velocity.x),
+        ("depth", true, |s, i| s.conditions[i].depth),
+        ("yaw rate", false, |s, i| s.conditions[i].angular_velocity.z),
     ]
 }
 
@@ -273,7 +300,8 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 
 type Function = fn(&Series, usize, f64) -> f64;
 
-fn functions() -> Vec<(&'static str, Function)> {
+/// Functions of what a model is told.
+fn of_the_state() -> Vec<(&'static str, Function)> {
     vec![
         ("a constant", |_, _, _| 1.0),
         ("forward velocity", |s, i, _| s.conditions[i].velocity.x),
@@ -299,6 +327,14 @@ fn functions() -> Vec<(&'static str, Function)> {
             s.conditions[i].depth * s.conditions[i].velocity.x * s.conditions[i].velocity.norm()
         }),
         ("depth times forward velocity", |s, i, _| s.conditions[i].depth * s.conditions[i].velocity.x),
+        ("pitch", |s, i, _| s.roll_pitch[i][1]),
+        ("roll", |s, i, _| s.roll_pitch[i][0]),
+    ]
+}
+
+/// Functions of how the vehicle moves and moved, and of where it heads.
+fn of_the_motion() -> Vec<(&'static str, Function)> {
+    vec![
         ("forward acceleration", |s, i, _| s.conditions[i].acceleration.x),
         ("lateral acceleration", |s, i, _| s.conditions[i].acceleration.y),
         ("vertical acceleration", |s, i, _| s.conditions[i].acceleration.z),
@@ -320,8 +356,6 @@ fn functions() -> Vec<(&'static str, Function)> {
         ("entry speed squared", |s, i, _| s.wetting_rate[i].max(0.0).powi(2)),
         ("time in water", |_, _, time| time),
         ("time since the entry, fading", |_, _, time| (-time / 1.5).exp()),
-        ("pitch", |s, i, _| s.roll_pitch[i][1]),
-        ("roll", |s, i, _| s.roll_pitch[i][0]),
         ("heading (cosine)", |s, i, _| s.yaw[i].cos()),
         ("heading (sine)", |s, i, _| s.yaw[i].sin()),
         ("speed times heading (cosine)", |s, i, _| s.conditions[i].velocity.norm() * s.yaw[i].cos()),

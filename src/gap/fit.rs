@@ -117,8 +117,10 @@ pub(super) fn fit(
     }
     let provisional = (0..set.len())
         .map(|m| {
-            let own = used.iter().zip(&errors).filter(|((member, ..), _)| *member == m);
-            own.map(|(_, e)| e.trials).fold(f64::INFINITY, f64::min) < ONE_CONDITION
+            // by the column that carries most of the load; the others state their own uncertainty
+            let own = used.iter().zip(&errors).zip(beta.iter()).filter(|(((member, ..), _), _)| *member == m);
+            let strongest = own.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+            strongest.is_some_and(|((_, error), _)| error.trials < ONE_CONDITION)
         })
         .collect();
     Some(Fit { values, covariance, intervals, provisional, shape_std })
@@ -215,18 +217,14 @@ fn bootstrap(groups: &[Group], noise: &[f64], config: &Config) -> Vec<DVector<f6
 /// Share of noise in the variance of a column of accelerations.
 fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Series]) -> f64 {
     let candidate = &design.candidates[member.candidate];
-    let axes = match candidate.effect {
-        Effect::AddedMass => coefficient..coefficient + 1,
-        Effect::MassError => 0..3,
-        _ => return 0.0,
-    };
+    if candidate.effect != Effect::AddedMass {
+        return 0.0;
+    }
     let (mut noise, mut power) = (0.0, 0.0);
     for &trial in &design.trials {
         let series = &all[trial];
-        for axis in axes.clone() {
-            noise += series.rate_noise[axis] * series.t.len() as f64;
-            power += series.conditions.iter().map(|c| accelerations(c)[axis].powi(2)).sum::<f64>();
-        }
+        noise += series.rate_noise[coefficient] * series.t.len() as f64;
+        power += series.conditions.iter().map(|c| accelerations(c)[coefficient].powi(2)).sum::<f64>();
     }
     // an axis that does not move has no coefficient worth a correction
     if power > 0.0 { (noise / power).clamp(0.0, 0.3) } else { 0.0 }

@@ -61,20 +61,22 @@ struct Point {
     excess: f64,
 }
 
-type Limits = [[f64; 2]; 9];
+/// Lower and upper limit of each feature.
+pub(super) type Limits = [[f64; 2]; 9];
 
-const OPEN: Limits = [[f64::NEG_INFINITY, f64::INFINITY]; 9];
+pub(super) const OPEN: Limits = [[f64::NEG_INFINITY, f64::INFINITY]; 9];
 
-fn inside(limits: &Limits, features: &[f64; 9]) -> bool {
+pub(super) fn inside(limits: &Limits, features: &[f64; 9]) -> bool {
     limits.iter().zip(features).all(|([low, high], value)| value > low && value <= high)
 }
 
 /// Regions by share, and how many splits were tried. `gap_bins` gives the standardised squared gap of each bin of a trial,
-/// less what noise alone would show.
+/// less what noise alone would show; `known` is a box that a fit has found.
 pub(super) fn locate(
     all: &[Series],
     trials: &[usize],
     excess: impl Fn(usize) -> Vec<f64>,
+    known: Option<Limits>,
     config: &Config,
 ) -> (Vec<Region>, usize) {
     let mut points = Vec::new();
@@ -98,7 +100,8 @@ pub(super) fn locate(
         let within: Vec<&Point> = grow.iter().filter(|p| inside(limits, &p.features)).copied().collect();
         mean(&within) > overall
     };
-    let boxes = merged(leaves.into_iter().filter(|limits| *limits != OPEN && ahead(limits)).collect());
+    let mut boxes = merged(leaves.into_iter().filter(|limits| *limits != OPEN && ahead(limits)).collect());
+    boxes.extend(known);
     let mut random = Random::new(config.seed ^ 0x9e21);
     let mut regions: Vec<Region> =
         boxes.iter().filter_map(|limits| region(limits, &check, trials.len(), &mut random)).collect();
@@ -224,7 +227,7 @@ fn region(limits: &Limits, check: &[&Point], trials: usize, random: &mut Random)
     entered.dedup();
     let conditions = conditions(limits);
     Some(Region {
-        place: conditions.iter().map(text).collect::<Vec<_>>().join(" and "),
+        place: in_words(limits),
         conditions,
         share_of_gap: share,
         share_of_samples: within.len() as f64 / check.len() as f64,
@@ -262,6 +265,11 @@ fn permuted(limits: &Limits, points: &[&Point], observed: f64, random: &mut Rand
             usize::from(here[0] / f64::max(here[1], 1.0) - there[0] / f64::max(there[1], 1.0) >= observed);
     }
     (1 + as_large) as f64 / (1 + DRAWS) as f64
+}
+
+/// Limits in words.
+pub(super) fn in_words(limits: &Limits) -> String {
+    conditions(limits).iter().map(text).collect::<Vec<_>>().join(" and ")
 }
 
 fn conditions(limits: &Limits) -> Vec<Condition> {

@@ -5,7 +5,7 @@
 //!
 //! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
 //! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
-//! hold), `select` (which effects), `shared` (noise of the motion in both), `nonlinear`, `features`, `lasting` and `locate` (where; structure without a name), `verdict`, `fit`,
+//! hold), `select` (which effects), `shared` (noise of the motion in both), `nonlinear`, `features`, `lasting`, `gated` and `locate` (where; structure without a name), `verdict`, `fit`,
 //! `holdout`, `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
 
 mod base_drag;
@@ -18,6 +18,7 @@ mod effects_file;
 mod experiment;
 mod features;
 mod fit;
+mod gated;
 mod holdout;
 mod lasting;
 mod locate;

@@ -11,12 +11,16 @@ use crate::frame::GRAVITY;
 pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
     for candidate in 0..design.candidates.len() {
         if design.candidates[candidate].effect == Effect::Current {
-            iterate(design, all, setting, candidate, &[], 3);
+            iterate(design, all, setting, candidate, &[], 5);
         }
     }
 }
 
 /// Fixed point of a shape that is the effect's own estimate, beside other columns.
+///
+/// Where the load grows with the square of the estimate, `F = k w0 w` says `w = F / (k w0)`, which jumps to and fro about the
+/// root for ever; halfway there is Heron's rule, which closes in on it. The first step is a whole one: from nothing there
+/// is no square.
 fn iterate(
     design: &mut Design,
     all: &[Series],
@@ -25,7 +29,7 @@ fn iterate(
     others: &[usize],
     times: usize,
 ) {
-    for _ in 0..times {
+    for time in 0..times {
         let own = design.candidates[candidate].columns.clone();
         let columns: Vec<usize> =
             own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
@@ -34,7 +38,9 @@ fn iterate(
         let mut shape = design.candidates[candidate].shape;
         for (index, &(column, coefficient)) in own.iter().enumerate() {
             let [low, high] = effect.coefficients()[coefficient].bounds;
-            shape[coefficient] = (beta[index] / design.scale[column]).clamp(low, high);
+            let found = (beta[index] / design.scale[column]).clamp(low, high);
+            let whole = time == 0 && shape[coefficient] == 0.0;
+            shape[coefficient] = if whole { found } else { 0.5 * (shape[coefficient] + found) };
         }
         design.reshape(all, setting, candidate, shape);
     }
@@ -52,8 +58,8 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
                 .collect();
             let candidate = members[index].candidate;
             match design.candidates[candidate].effect {
-                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, candidate, &others, 3),
-                Effect::HullFlooding | Effect::WaterEntrySlamming => {
+                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, candidate, &others, 5),
+                Effect::HullFlooding | Effect::WaterEntrySlamming | Effect::Squat => {
                     search(design, all, setting, &members[index], &others, &[0]);
                 }
                 Effect::WaveMemory => search(design, all, setting, &members[index], &others, &[0, 1]),

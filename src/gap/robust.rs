@@ -68,9 +68,13 @@ pub(super) fn group(
     beta: &[f64],
     residual: &DVector<f64>,
 ) -> Option<Error> {
-    let sum = contribution(design, base, own, beta)?;
-    let weights = &sum / sum.norm_squared().max(f64::MIN_POSITIVE);
-    Some(Noise::of(residual).error(design, &weights, sum.as_slice()))
+    Some(of_column(design, &contribution(design, base, own, beta)?, residual))
+}
+
+/// The error of the coefficient of a single column that is no part of the design.
+pub(super) fn of_column(design: &Design, column: &DVector<f64>, residual: &DVector<f64>) -> Error {
+    let weights = column / column.norm_squared().max(f64::MIN_POSITIVE);
+    Noise::of(residual).error(design, &weights, column.as_slice())
 }
 
 /// What columns add to the rows that a base cannot say.

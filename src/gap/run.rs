@@ -11,6 +11,7 @@ use super::report::Report;
 use super::select::Judge;
 use super::series::{Series, series};
 use super::split::hold_out;
+use super::statistics::median;
 use super::verdict::{Found, floor_loss};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
@@ -18,7 +19,7 @@ use crate::effects::{Block, Body, Effect, Shape};
 use crate::frame::Vec3;
 use crate::trials::Trials;
 
-/// The body that `trials.toml` describes, for another simulator's prediction.
+/// The body that `trials.toml` describes, for another simulator's prediction; its wheels are as large as they roll.
 pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
     let vehicle = &trials.manifest.vehicle;
     let body = trials.manifest.body.ok_or_else(|| GapError::NoBody { vehicle: vehicle.clone() })?;
@@ -29,6 +30,7 @@ pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
         mass: body.mass,
         displaced_volume: body.displaced_volume,
         center_of_mass: body.center_of_mass,
+        wheel_radius: rolling_radius(trials),
     };
     Ok(Body::of_block(vehicle, block))
 }
@@ -82,15 +84,31 @@ pub fn run(
     let gap_structure = general.structure(&design, &setting.components, &design.y);
     let floor_loss = floor_loss(&design, &gap_structure);
     let mut members = {
-        let judge = Judge::new(&design, &setting, config, &floors, floor_loss);
+        let judge = Judge::new(&design, &setting, config, &floors, &general, floor_loss);
         judge.select(&library)
     };
     refine(&mut design, &all, &setting, &members);
     // what stood in for a shape that was not yet right has no place any more
-    let judge = Judge::new(&design, &setting, config, &floors, floor_loss);
+    let judge = Judge::new(&design, &setting, config, &floors, &general, floor_loss);
     members = judge.confirmed(&members);
     let found = Found::of(&judge, &members, &library, &general, &gap_structure, config, &all);
     Ok(compose(trials, &all, &judge, found, held, &library))
+}
+
+/// Radius at which the wheels roll [m]: the median of speed over turning, where wheels turn the way the vehicle goes. Most
+/// driving is rolling; `None` where too little of it was recorded.
+fn rolling_radius(trials: &Trials) -> Option<f64> {
+    const SLOWEST: f64 = 0.3;
+    const LEAST: usize = 50;
+    let mut radii = Vec::new();
+    for trial in &trials.trials {
+        let wheels: Vec<&Vec<f64>> = trial.wheel_speeds.iter().flatten().collect();
+        let turning =
+            |i: usize| wheels.iter().map(|wheel| wheel[i]).sum::<f64>() / f64::max(wheels.len() as f64, 1.0);
+        let rolling = (0..trial.len()).map(|i| (trial.velocity[i].x, turning(i)));
+        radii.extend(rolling.filter(|(v, omega)| v.abs() > SLOWEST && v * omega > 0.0).map(|(v, w)| v / w));
+    }
+    (radii.len() >= LEAST).then(|| median(&mut radii))
 }
 
 /// True where the stamps of all trials are of one clock: they do not overlap.

@@ -12,8 +12,9 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 use super::design::{Design, Fitted};
+use super::features::General;
 use super::noise::Floor;
-use super::robust::{Error, contribution, errors, group, noise_of};
+use super::robust::{Error, contribution, errors, group, noise_of, of_column};
 use super::shared::outlasts_noise;
 use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
@@ -83,6 +84,7 @@ pub(super) struct Judge<'a> {
     pub setting: &'a Setting<'a>,
     pub config: &'a Config,
     pub floors: &'a [Floor; 6],
+    pub general: &'a General,
     /// Loss that nothing explains.
     pub floor_loss: f64,
     passed: RefCell<Verdicts>,
@@ -94,9 +96,10 @@ impl<'a> Judge<'a> {
         setting: &'a Setting<'a>,
         config: &'a Config,
         floors: &'a [Floor; 6],
+        general: &'a General,
         floor_loss: f64,
     ) -> Self {
-        Self { design, setting, config, floors, floor_loss, passed: RefCell::default() }
+        Self { design, setting, config, floors, general, floor_loss, passed: RefCell::default() }
     }
 
     /// Columns of a set.
@@ -241,12 +244,16 @@ impl<'a> Judge<'a> {
         fitted: &Fitted,
     ) -> Option<Refusal> {
         let effect = self.effect(member);
+        // what comes with an effect does not come without it
+        if effect.needs_its_first() && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
+            return Some(Refusal::NotSignificant);
+        }
         // a moving bed changes drag and lift; drag alone is the drag coefficient's
         let held = &self.design.candidates[member.candidate].columns;
         if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
             return Some(Refusal::NotSignificant);
         }
-        if !self.relevant(member, base.len(), fitted) {
+        if !self.relevant(member, base, fitted) {
             return Some(Refusal::Irrelevant);
         }
         if before - fitted.loss < self.least_gain(set, before) {
@@ -256,8 +263,8 @@ impl<'a> Judge<'a> {
     }
 
     /// Size of what a member adds, against the noise of a sample and the model's uncertainty, in any component.
-    fn relevant(&self, member: &Member, first: usize, fitted: &Fitted) -> bool {
-        let design = self.design;
+    fn relevant(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        let (design, first) = (self.design, base.len());
         let mut squares = [0.0; 6];
         let mut count = [0.0; 6];
         for (row, place) in design.rows.rows.iter().enumerate() {
@@ -268,11 +275,33 @@ impl<'a> Judge<'a> {
             squares[place.component] += (value * design.noise.bin[place.component]).powi(2);
             count[place.component] += 1.0;
         }
-        self.setting.components.iter().any(|&c| {
-            let size = (squares[c] / f64::max(count[c], 1.0)).sqrt();
-            let floor = &self.floors[c];
-            size > self.config.relevance * floor.sample && size > floor.model
-        })
+        let size = |c: usize| (squares[c] / f64::max(count[c], 1.0)).sqrt();
+        let components = &self.setting.components;
+        let audible = |&&c: &&usize| size(c) > self.config.relevance * self.floors[c].sample;
+        components.iter().filter(audible).any(|&c| size(c) > self.floors[c].model)
+            || components.iter().any(|c| audible(&c)) && self.is_beyond_model(member, base, fitted)
+    }
+
+    /// True where no error of the model can stand for a member. That error is a function of what the model is told, velocity,
+    /// depth and attitude, the same in every trial: what goes with the same must be larger than it. What is left of a member
+    /// beyond all smooth functions of those is judged by the trials alone, whatever its size.
+    fn is_beyond_model(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        /// Share of the member that must be left, and of its coefficient.
+        const MOST: f64 = 0.5;
+        let design = self.design;
+        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
+        let Some(sum) = contribution(design, base, &own, &fitted.beta.as_slice()[base.len()..]) else {
+            return false;
+        };
+        let left = self.general.untold(&sum, design);
+        if left.norm_squared() < MOST * sum.norm_squared() {
+            return false;
+        }
+        let columns: Vec<usize> = base.iter().chain(&own).copied().collect();
+        let residual = design.residual(&columns, &fitted.beta);
+        let kept = left.dot(&(&residual + &sum)) / left.norm_squared();
+        let error = of_column(design, &left, &residual);
+        kept > MOST && error.probability(kept) <= self.config.significance
     }
 
     fn stable(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
@@ -425,7 +454,12 @@ impl<'a> Judge<'a> {
 
     /// The best form of an effect beside a set, by every gate.
     pub fn weighed(&self, set: &[Member], effect: Effect) -> Option<Judged> {
-        let mut judged = self.judge(set, effect)?;
+        let judged = self.judge(set, effect)?;
+        self.beyond_chance(set, judged)
+    }
+
+    /// The gates that look at a form once it has passed the others: its placebos, and the noise that it shares with the gap.
+    fn beyond_chance(&self, set: &[Member], mut judged: Judged) -> Option<Judged> {
         if judged.refused.is_some() {
             return Some(judged);
         }
@@ -579,15 +613,16 @@ impl<'a> Judge<'a> {
             let without = self.design.solve(&self.columns(&others)).map_or(fitted.loss, |(_, loss)| loss);
             let explained = (without - fitted.loss).max(0.0);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
-                let Some(judged) = self.passes(&others, effect) else { continue };
-                // what needs many more numbers to say the same is no rival
-                if self.numbers(&judged.member) > self.numbers(&out) + 1 {
-                    continue;
-                }
-                let mut rival = others.clone();
-                rival.push(judged.member);
-                let Some((difference, open)) = self.difference(&rival, set, explained) else { continue };
-                if difference <= open {
+                let rivals = self.passing(&others, effect).into_iter().filter_map(|judged| {
+                    if !self.is_rival(&judged.member, &out, &others) {
+                        return None;
+                    }
+                    let mut rival = others.clone();
+                    rival.push(judged.member);
+                    let (difference, open) = self.difference(&rival, set, explained)?;
+                    (difference <= open).then_some((difference, rival))
+                });
+                if let Some((difference, mut rival)) = rivals.min_by(|a, b| a.0.total_cmp(&b.0)) {
                     rival.sort_by_key(|member| self.effect(member));
                     found.push((difference, rival));
                 }
@@ -602,6 +637,47 @@ impl<'a> Judge<'a> {
             rivals.extend(self.both(ours, theirs));
         }
         rivals
+    }
+
+    /// Forms of an effect that pass every gate beside a set: the best one by losses, and that of the fewest columns, since
+    /// what many numbers say of each channel one may say of all.
+    fn passing(&self, set: &[Member], effect: Effect) -> Vec<Judged> {
+        let best = self.passes(set, effect);
+        let base = self.columns(set);
+        let plain = || -> Option<Judged> {
+            let before = self.design.solve(&base)?.1;
+            let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
+            let (candidate, _) = forms.min_by_key(|(index, c)| (c.columns.len(), *index))?;
+            if best.as_ref().is_some_and(|best| best.member.candidate == candidate) {
+                return None;
+            }
+            let judged = self.judge_form(set, &base, before, candidate)?;
+            self.beyond_chance(set, judged).filter(|judged| judged.refused.is_none())
+        };
+        let plain = if effect == Effect::SensorGain { plain() } else { None };
+        best.into_iter().chain(plain).collect()
+    }
+
+    /// True where an effect may stand in another's place: with one number more at most, and none that nobody has ever measured.
+    fn is_rival(&self, member: &Member, out: &Member, others: &[Member]) -> bool {
+        self.numbers(member) <= self.numbers(out) + 1 && self.is_published(member, others)
+    }
+
+    /// True where every coefficient that has a band of published values lies in it, or a quarter beyond.
+    fn is_published(&self, member: &Member, others: &[Member]) -> bool {
+        const BEYOND: f64 = 1.25;
+        let mut columns = self.columns(others);
+        let first = columns.len();
+        columns.extend(member.columns.iter().map(|(column, _)| *column));
+        let Some((beta, _)) = self.design.solve(&columns) else { return false };
+        member.columns.iter().enumerate().all(|(i, &(column, coefficient))| {
+            let value = beta[first + i] / self.design.scale[column];
+            let band = self.effect(member).coefficients()[coefficient].literature;
+            // a band ends where nothing was measured, on either side of 0
+            let reach =
+                |end: f64, outwards: f64| if end * outwards > 0.0 { end * BEYOND } else { end / BEYOND };
+            band.is_none_or(|[low, high]| value >= reach(low, -1.0) && value <= reach(high, 1.0))
+        })
     }
 
     fn effects(&self, set: &[Member]) -> Vec<Effect> {

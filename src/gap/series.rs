@@ -31,6 +31,8 @@ pub(super) struct Series {
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one.
     pub other: Vec<[f64; 6]>,
+    /// Acceleration as the trial has it, before any smoothing [m/s2].
+    pub recorded_acceleration: Vec<Vec3>,
     /// Noise that is left in the acceleration and the angular acceleration: an estimate of the variance of a sample, which
     /// scatters about 0 where there is none.
     pub rate_noise: [f64; 6],
@@ -170,6 +172,7 @@ fn of_trial(
         gap: gap.collect(),
         other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
         wetting_rate,
+        recorded_acceleration: trial.acceleration.clone(),
         rate_noise,
         coherence,
         wheels: (0..count)

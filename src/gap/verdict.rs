@@ -9,7 +9,7 @@ use super::lasting::lasting;
 use super::report::Verdict;
 use super::select::{Judge, Member};
 use super::series::Series;
-use crate::effects::Effect;
+use crate::effects::{Effect, Kind};
 
 /// Deviates that structure without a name needs.
 pub(super) const STRUCTURE: f64 = 5.0;
@@ -20,6 +20,10 @@ const ENERGY: [f64; 2] = [4.5, 0.8];
 /// Deviates in one trial that what lasts needs: one of a hundred trials with noise alone reaches 3.5, and products of
 /// normal numbers have heavier tails than they.
 const LASTS: f64 = 7.0;
+
+/// Least share of the structure that must be explained where a fault of the sensor is named. Laws of the water hold in
+/// outline; a zero, a gain or a turned axis is exact, and where one leaves more it stands in for another thing.
+const EXACT: f64 = 0.8;
 
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
@@ -53,6 +57,8 @@ impl Found {
         let left = general.structure(design, &judge.setting.components, &residual);
         let whole = design.empty_loss() - judge.floor_loss;
         let coverage = if whole > 0.0 { (design.empty_loss() - loss) / whole } else { 1.0 };
+        let faults = members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
+        let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
         let alternatives = judge.alternatives(members, library);
         let mut found =
             Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
@@ -61,7 +67,7 @@ impl Found {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
-        } else if coverage < config.coverage || found.leaves_much(design) {
+        } else if coverage < needed || found.leaves_much(design) {
             Verdict::NoCandidateFits
         } else if found.alternatives.is_empty() {
             Verdict::Named

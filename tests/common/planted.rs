@@ -90,6 +90,40 @@ fn motion(index: usize, samples: usize, random: &mut Random) -> Vec<State> {
         .collect()
 }
 
+/// Straight runs whose speed changes again and again within half a second, at three depths.
+pub fn pushes(count: usize, samples: usize, seed: u64) -> Vec<Vec<State>> {
+    (0..count)
+        .map(|index| {
+            let mut random = Random::new(seed * 1000 + index as u64);
+            let changes: Vec<(f64, f64, f64)> = (0..5)
+                .map(|k| (0.4 + 1.5 * f64::from(k), 0.5 + 0.2 * random.unit(), 0.3 + 1.7 * random.unit()))
+                .collect();
+            let smooth = |u: f64| u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+            let speed = |t: f64| {
+                let step = |(sum, last): (f64, f64), &(at, length, to): &(f64, f64, f64)| {
+                    (sum + (to - last) * smooth(((t - at) / length).clamp(0.0, 1.0)), to)
+                };
+                changes.iter().fold((0.0, 0.0), step).0
+            };
+            let at = |i: usize| {
+                let t = i as f64 / RATE;
+                let rate = (speed(t + 1e-4) - speed(t - 1e-4)) / 2e-4;
+                State {
+                    t,
+                    v: Vec3::new(speed(t), 0.0, 0.0),
+                    w: Vec3::zeros(),
+                    a: Vec3::new(rate, 0.0, 0.0),
+                    al: Vec3::zeros(),
+                    depth: [0.1, 0.2, 0.25][index % 3],
+                    depth_rate: 0.0,
+                    yaw: 0.0,
+                }
+            };
+            (0..samples).map(at).collect()
+        })
+        .collect()
+}
+
 /// Root mean square of each component of planted wrenches.
 pub fn rms(planted: &[Vec<[f64; 6]>]) -> [f64; 6] {
     let count = planted.iter().map(Vec::len).sum::<usize>() as f64;

@@ -1,0 +1,144 @@
+//! An effect that acts in a part of the state space alone: where what the whole space does not fit, a region does.
+//!
+//! The columns of an effect are set to zero outside a region, and the region grows by one limit at a time, that which
+//! explains most, as long as a limit says much. A tree over the size of the gap, as in `locate`, cuts where the gap is
+//! large; an effect that grows with the speed is large where it is fast, and its border lies elsewhere.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::design::Design;
+use super::features::{FEATURES, of_bins};
+use super::locate::{Limits, OPEN, inside};
+use super::select::Judge;
+use super::series::Series;
+use crate::effects::Effect;
+
+/// Features that may limit an effect of the water: depth, Froude number, speed.
+const FEATURES_USED: usize = 3;
+/// Cuts of a feature that are tried.
+const CUTS: usize = 24;
+/// Limits of a region.
+const MOST: usize = 3;
+/// Share of the gap above the floor that a limit must add.
+const WORTH: f64 = 0.03;
+/// Share of the gap above the floor that the effect must explain within its region.
+const EXPLAINED: f64 = 0.6;
+
+/// What a gap is like in a region.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Gated {
+    pub effect: Effect,
+    pub limits: Limits,
+    /// Share of the gap above the floor that it explains there.
+    pub share: f64,
+}
+
+/// The effect and region that explain most of the gap, where one limit or more is worth it.
+pub(super) fn gated(all: &[Series], judge: &Judge, library: &[Effect]) -> Option<Gated> {
+    let design = judge.design;
+    let whole = (design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let features: Vec<Vec<[f64; FEATURES.len()]>> = all.iter().map(of_bins).collect();
+    let places: Vec<[f64; FEATURES.len()]> =
+        design.rows.rows.iter().step_by(design.rows.width).map(|row| features[row.trial][row.bin]).collect();
+    let one = |candidate: &super::design::Candidate| {
+        let columns: Vec<usize> = candidate.columns.iter().map(|(column, _)| *column).collect();
+        let bins = sums(design, &columns);
+        let mut found = (OPEN, gain(bins.iter()));
+        for _ in 0..MOST {
+            let Some(next) = best_limit(&bins, &places, &found.0) else { break };
+            if next.1 < found.1 + WORTH * whole {
+                break;
+            }
+            found = next;
+        }
+        Gated { effect: candidate.effect, limits: found.0, share: found.1 / whole }
+    };
+    // what remembers, or begins in the middle of the trials, has a border of its own
+    let bordered = |effect: Effect| effect.has_memory() || effect == Effect::SensorBiasStep;
+    let candidates = design
+        .candidates
+        .iter()
+        .filter(|candidate| library.contains(&candidate.effect) && !bordered(candidate.effect));
+    let best =
+        candidates.map(one).max_by(|a, b| a.share.total_cmp(&b.share).then(b.effect.cmp(&a.effect)))?;
+    (best.limits != OPEN && best.share > EXPLAINED).then_some(best)
+}
+
+/// Normal equations of one bin.
+#[derive(Clone)]
+struct Sum {
+    xx: DMatrix<f64>,
+    xy: DVector<f64>,
+}
+
+fn sums(design: &Design, columns: &[usize]) -> Vec<Sum> {
+    let width = design.rows.width;
+    let of = |bin: usize| {
+        let rows = bin * width..(bin + 1) * width;
+        let x = DMatrix::from_fn(width, columns.len(), |i, j| design.x[(rows.start + i, columns[j])]);
+        let y = design.y.rows(rows.start, width);
+        Sum { xx: x.tr_mul(&x), xy: x.tr_mul(&y) }
+    };
+    (0..design.y.len() / width).map(of).collect()
+}
+
+fn gain<'a>(bins: impl Iterator<Item = &'a Sum>) -> f64 {
+    total(bins).map_or(0.0, |sum| sum.gain())
+}
+
+fn total<'a>(mut bins: impl Iterator<Item = &'a Sum>) -> Option<Sum> {
+    let mut sum = bins.next()?.clone();
+    bins.for_each(|bin| sum.add(bin));
+    Some(sum)
+}
+
+impl Sum {
+    fn add(&mut self, other: &Self) {
+        self.xx += &other.xx;
+        self.xy += &other.xy;
+    }
+
+    /// What least squares takes off the sum of squares.
+    fn gain(&self) -> f64 {
+        let count = self.xy.len();
+        let ridge = 1e-7 * self.xx.diagonal().max();
+        let matrix =
+            DMatrix::from_fn(count, count, |i, j| self.xx[(i, j)] + if i == j { ridge } else { 0.0 });
+        matrix.cholesky().map_or(0.0, |factor| self.xy.dot(&factor.solve(&self.xy)))
+    }
+}
+
+/// The limit to add to a region with which the effect explains most, and what it explains then.
+fn best_limit(bins: &[Sum], places: &[[f64; FEATURES.len()]], limits: &Limits) -> Option<(Limits, f64)> {
+    let mut best: Option<(Limits, f64)> = None;
+    for feature in 0..FEATURES_USED {
+        let mut order: Vec<usize> = (0..bins.len()).filter(|&bin| inside(limits, &places[bin])).collect();
+        order.sort_by(|&a, &b| places[a][feature].total_cmp(&places[b][feature]));
+        let whole = total(order.iter().map(|&bin| &bins[bin]))?;
+        let mut below: Option<Sum> = None;
+        let step = (order.len() / CUTS).max(1);
+        for (index, &bin) in order.iter().enumerate() {
+            match &mut below {
+                Some(sum) => sum.add(&bins[bin]),
+                None => below = Some(bins[bin].clone()),
+            }
+            let next = order.get(index + 1).map(|&next| places[next][feature]);
+            // a cut lies between two values that differ
+            let Some(next) = next.filter(|next| *next > places[bin][feature]) else { continue };
+            if index % step != 0 && next - places[bin][feature] < 0.01 {
+                continue;
+            }
+            let Some(low) = &below else { continue };
+            let high = Sum { xx: &whole.xx - &low.xx, xy: &whole.xy - &low.xy };
+            let at = 0.5 * (places[bin][feature] + next);
+            for (end, gain) in [(1, low.gain()), (0, high.gain())] {
+                if best.as_ref().is_none_or(|(_, most)| gain > *most) {
+                    let mut tried = *limits;
+                    tried[feature][end] = at;
+                    best = Some((tried, gain));
+                }
+            }
+        }
+    }
+    best
+}
