@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import subprocess
 import time
@@ -17,6 +18,13 @@ from tritonclient.utils import InferenceServerException
 
 ROOT = Path(__file__).resolve().parents[2]
 SURFACES = {"husky": 13, "warthog": 10}
+
+
+def shipped(vehicle: str, key: str) -> str:
+    """What the shipped bundle states of itself."""
+    match = re.search(rf'^{key} = "?(.*?)"?$', (ROOT / "vehicles" / vehicle / "vehicle.toml").read_text(), re.MULTILINE)
+    assert match, f"{vehicle} states no {key}"
+    return match.group(1)
 
 
 def binary() -> Path:
@@ -72,7 +80,7 @@ def test_the_server_and_its_models_are_described(client: triton.InferenceServerC
     assert client.get_server_metadata().name == "wade"
     assert client.is_model_ready("husky") and not client.is_model_ready("tank")
     metadata = client.get_model_metadata("husky", as_json=True)
-    assert metadata["versions"] == ["2"]
+    assert metadata["versions"] == [shipped("husky", "version")]
     inputs = {entry["name"]: entry for entry in metadata["inputs"]}
     assert inputs["velocity_mps"]["shape"] == ["-1", "3"] and inputs["depth_m"]["shape"] == ["-1"]
     assert {entry["datatype"] for entry in metadata["inputs"]} == {"FP32"}
@@ -89,8 +97,8 @@ def test_forces_have_the_bits_of_a_single_query(
     inputs = [tensor("depth_m", depth), tensor("velocity_mps", velocity)]
     result = client.infer(vehicle, inputs, request_id="17")
     answer = result.get_response()
-    assert (answer.id, answer.model_name, answer.model_version) == ("17", vehicle, "2")
-    assert answer.parameters["provenance"].string_param == "analytic"
+    assert (answer.id, answer.model_name, answer.model_version) == ("17", vehicle, shipped(vehicle, "version"))
+    assert answer.parameters["provenance"].string_param == shipped(vehicle, "provenance")
     assert result.as_numpy("surface_force_n").shape == (3, SURFACES[vehicle], 3)
     assert result.as_numpy("in_domain").dtype == np.bool_
     for row in range(3):

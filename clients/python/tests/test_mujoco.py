@@ -166,6 +166,6 @@ def test_it_drives_into_the_water_and_out_again(client: wade.ShmClient) -> None:
     assert track.pitch.max() == pytest.approx(slope, abs=0.01) and track.pitch.min() == pytest.approx(-slope, abs=0.01)
     deepest = track.force[track.depth > bed - 0.01].mean(axis=0)
     assert deepest[0] < -50  # holds it back
-    # water that flows past and under it is faster and pushes less than still water: by a sixth here, by up to half in the CFD
+    # water that flows past pushes less than still water: by a sixth here, by up to half in the CFD
     assert 0.6 < deepest[2] / (DENSITY * GRAVITY * volume_below(Z0 + bed)) < 1.0
     assert not track.force[track.depth <= 0].any()
