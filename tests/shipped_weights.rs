@@ -9,10 +9,9 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{VEHICLES, copy_folder, copy_of_vehicles, model, paper_on, vehicles};
+use common::{VEHICLES, copy_folder, copy_of_vehicles, model, paper_bundle, paper_on, vehicles};
 use serde_json::Value;
 use tempfile::TempDir;
-use wade::bundle;
 use wade::model::kernel::Isa;
 use wade::train::report::sha256_of;
 
@@ -76,11 +75,9 @@ fn on_cases_that_neither_has_seen_the_shipped_weights_are_nearer_than_the_papers
     let data = data(folder.path());
     let papers = copy_of_vehicles();
     for vehicle in VEHICLES {
-        let kept = bundle::kept(&vehicles().join(vehicle)).unwrap();
-        let version = kept.last().unwrap().version.to_string();
         let place = papers.path().join(vehicle);
         std::fs::remove_dir_all(&place).unwrap();
-        copy_folder(&vehicles().join(format!("{vehicle}.versions")).join(version).join(vehicle), &place);
+        copy_folder(&paper_bundle(vehicle), &place);
     }
     let anchored = evaluate(&data, &vehicles(), "anchored");
     let paper = evaluate(&data, papers.path(), "paper");

@@ -11,7 +11,7 @@ use crate::frame::GRAVITY;
 pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
     for candidate in 0..design.candidates.len() {
         if design.candidates[candidate].effect == Effect::Current {
-            iterate(design, all, setting, candidate, &[], 5);
+            iterate(design, all, setting, candidate, &[]);
         }
     }
 }
@@ -21,15 +21,9 @@ pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
 /// Where the load grows with the square of the estimate, `F = k w0 w` says `w = F / (k w0)`, which jumps to and fro about the
 /// root for ever; halfway there is Heron's rule, which closes in on it. The first step is a whole one: from nothing there
 /// is no square.
-fn iterate(
-    design: &mut Design,
-    all: &[Series],
-    setting: &Setting,
-    candidate: usize,
-    others: &[usize],
-    times: usize,
-) {
-    for time in 0..times {
+fn iterate(design: &mut Design, all: &[Series], setting: &Setting, candidate: usize, others: &[usize]) {
+    const TIMES: usize = 5;
+    for time in 0..TIMES {
         let own = design.candidates[candidate].columns.clone();
         let columns: Vec<usize> =
             own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
@@ -58,7 +52,7 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
                 .collect();
             let candidate = members[index].candidate;
             match design.candidates[candidate].effect {
-                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, candidate, &others, 5),
+                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, candidate, &others),
                 Effect::HullFlooding | Effect::WaterEntrySlamming | Effect::Squat => {
                     search(design, all, setting, &members[index], &others, &[0]);
                 }

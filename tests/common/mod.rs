@@ -106,14 +106,17 @@ pub fn model_on(vehicle: &str, isa: Isa) -> Model {
     bundle::load(&vehicles().join(vehicle), isa).expect("the shipped bundles are sound")
 }
 
-/// The paper's network on the same CFD: the shipped version before the one in place.
-pub fn paper_on(vehicle: &str, isa: Isa) -> Model {
-    let place = vehicles().join(vehicle);
-    let kept = bundle::kept(&place).expect("the shipped versions are sound");
+/// Where the paper's network on the same CFD lies: the shipped version before the one in place.
+pub fn paper_bundle(vehicle: &str) -> PathBuf {
+    let kept = bundle::kept(&vehicles().join(vehicle)).expect("the shipped versions are sound");
     let paper = kept.iter().find(|kept| kept.weights.as_ref().is_some_and(|(form, _)| *form == "paper"));
     let version = paper.expect("the paper's weights are shipped").version.to_string();
-    bundle::load(&vehicles().join(format!("{vehicle}.versions")).join(version).join(vehicle), isa)
-        .expect("sound")
+    vehicles().join(format!("{vehicle}.versions")).join(version).join(vehicle)
+}
+
+/// The model of [`paper_bundle`].
+pub fn paper_on(vehicle: &str, isa: Isa) -> Model {
+    bundle::load(&paper_bundle(vehicle), isa).expect("the shipped versions are sound")
 }
 
 /// Copies the shipped bundles to where a test may change them.
