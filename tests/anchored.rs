@@ -224,6 +224,24 @@ fn far_from_what_was_learnt_the_known_physics_is_left_and_marked() {
 }
 
 #[test]
+fn a_network_that_learnt_little_states_how_far_it_is_off() {
+    let lesson = Lesson::new();
+    let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
+    let names: Vec<&String> = models.keys().collect();
+    let (mut stated, mut missed) = (0.0, 0.0);
+    for state in lesson.states(&lesson.split.held_out).iter().filter(|s| s.condition.velocity.norm() > 0.0) {
+        let forces = evaluate(&models[names[state.vehicle]], &state.condition);
+        let size = state.reading.surfaces.iter().map(|surface| surface.unit).sum::<f64>();
+        stated += forces.uncertainty.abs().sum() / size;
+        missed += (forces.wrench.force - state.hydrostatic() - state.dynamic()).abs().sum() / size;
+    }
+    // the mean of |error| is 0.71 to 0.80 of a deviation; the loads are a formula, of which the regressions miss next to
+    // nothing: what is missed here the network has lost
+    let share = missed / stated;
+    assert!((0.25..2.0).contains(&share), "missed {missed}, stated {stated}");
+}
+
+#[test]
 fn at_rest_the_served_wrench_is_that_of_the_hull_by_archimedes() {
     let lesson = Lesson::new();
     let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);

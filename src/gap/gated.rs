@@ -7,9 +7,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::design::Design;
-use super::features::{FEATURES, of_bins};
+use super::features::{Features, of_bins};
+use super::judge::Judge;
 use super::locate::{Limits, OPEN, inside};
-use super::select::Judge;
 use super::series::Series;
 use crate::effects::Effect;
 
@@ -37,8 +37,8 @@ pub(super) struct Gated {
 pub(super) fn gated(all: &[Series], judge: &Judge, library: &[Effect]) -> Option<Gated> {
     let design = judge.design;
     let whole = (design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
-    let features: Vec<Vec<[f64; FEATURES.len()]>> = all.iter().map(of_bins).collect();
-    let places: Vec<[f64; FEATURES.len()]> =
+    let features: Vec<Vec<Features>> = all.iter().map(of_bins).collect();
+    let places: Vec<Features> =
         design.rows.rows.iter().step_by(design.rows.width).map(|row| features[row.trial][row.bin]).collect();
     let one = |candidate: &super::design::Candidate| {
         let columns: Vec<usize> = candidate.columns.iter().map(|(column, _)| *column).collect();
@@ -109,7 +109,7 @@ impl Sum {
 }
 
 /// The limit to add to a region with which the effect explains most, and what it explains then.
-fn best_limit(bins: &[Sum], places: &[[f64; FEATURES.len()]], limits: &Limits) -> Option<(Limits, f64)> {
+fn best_limit(bins: &[Sum], places: &[Features], limits: &Limits) -> Option<(Limits, f64)> {
     let mut best: Option<(Limits, f64)> = None;
     for feature in 0..FEATURES_USED {
         let mut order: Vec<usize> = (0..bins.len()).filter(|&bin| inside(limits, &places[bin])).collect();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::candidates::{Setting, columns};
-use super::features::of_bins;
+use super::features::{FEATURES, Features, of_bins};
 use super::locate::Region;
 use super::noise::Floor;
 use super::series::Series;
@@ -134,7 +134,7 @@ pub(super) fn worse(
     floors: &[Floor; 6],
     regions: &[Region],
 ) -> Vec<Worse> {
-    let mut points: Vec<([f64; 9], f64, f64)> = Vec::new();
+    let mut points: Vec<(Features, f64, f64)> = Vec::new();
     for &trial in held {
         let series = &all[trial];
         let added = explained(named, series, trial, setting);
@@ -159,7 +159,7 @@ pub(super) fn worse(
             .conditions
             .iter()
             .filter_map(|c| {
-                let index = super::features::FEATURES.iter().position(|(name, _)| *name == c.quantity)?;
+                let index = FEATURES.iter().position(|(name, _)| *name == c.quantity)?;
                 Some((index, c.above.unwrap_or(f64::NEG_INFINITY), c.at_most.unwrap_or(f64::INFINITY)))
             })
             .collect();
@@ -175,7 +175,7 @@ pub(super) fn worse(
     }
     let mut worse = Vec::new();
     for (place, limits) in places {
-        let within = |f: &[f64; 9]| limits.iter().all(|&(i, low, high)| f[i] > low && f[i] <= high);
+        let within = |f: &Features| limits.iter().all(|&(i, low, high)| f[i] > low && f[i] <= high);
         let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
         for (features, b, a) in &points {
             if within(features) {

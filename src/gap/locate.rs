@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use super::Config;
-use super::features::{FEATURES, of_bins};
+use super::features::{FEATURES, Features, of_bins};
 use super::series::Series;
 use crate::random::Random;
 
@@ -56,21 +56,21 @@ pub struct Condition {
 /// A bin as the tree sees it.
 struct Point {
     trial: usize,
-    features: [f64; 9],
+    features: Features,
     /// Squared standardised gap above the floor.
     excess: f64,
 }
 
 /// Lower and upper limit of each feature.
-pub(super) type Limits = [[f64; 2]; 9];
+pub(super) type Limits = [[f64; 2]; FEATURES.len()];
 
-pub(super) const OPEN: Limits = [[f64::NEG_INFINITY, f64::INFINITY]; 9];
+pub(super) const OPEN: Limits = [[f64::NEG_INFINITY, f64::INFINITY]; FEATURES.len()];
 
-pub(super) fn inside(limits: &Limits, features: &[f64; 9]) -> bool {
+pub(super) fn inside(limits: &Limits, features: &Features) -> bool {
     limits.iter().zip(features).all(|([low, high], value)| value > low && value <= high)
 }
 
-/// Regions by share, and how many splits were tried. `gap_bins` gives the standardised squared gap of each bin of a trial,
+/// Regions by share, and how many splits were tried. `excess` gives the standardised squared gap of each bin of a trial,
 /// less what noise alone would show; `known` is a box that a fit has found.
 pub(super) fn locate(
     all: &[Series],

@@ -5,8 +5,9 @@
 //!
 //! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
 //! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
-//! hold), `select` (which effects), `shared` (noise of the motion in both), `nonlinear`, `features`, `lasting`, `gated` and `locate` (where; structure without a name), `verdict`, `fit`,
-//! `holdout`, `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
+//! hold), `judge` (the gates), `select` and `rivals` (which effects), `shared` (noise of the motion in both), `nonlinear`,
+//! `general` and `lasting` (structure without a name), `features`, `gated` and `locate` (where), `verdict`, `fit`, `holdout`,
+//! `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
 
 mod base_drag;
 mod candidates;
@@ -19,7 +20,9 @@ mod experiment;
 mod features;
 mod fit;
 mod gated;
+mod general;
 mod holdout;
+mod judge;
 mod lasting;
 mod locate;
 mod measurement;
@@ -28,6 +31,7 @@ mod nonlinear;
 mod page;
 mod rates;
 mod report;
+mod rivals;
 mod robust;
 mod run;
 mod select;
@@ -42,11 +46,11 @@ pub use detect::{Detectable, Excitation, GapSize};
 pub use effects_file::{NotApplicable, effects_file};
 pub use fit::Parameter;
 pub use holdout::{Closure, Worse};
+pub use judge::Refusal;
 pub use locate::{Condition as RegionCondition, Region};
 pub use noise::{Floor, FloorSource};
 pub use report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 pub use run::{body_of, run};
-pub use select::Refusal;
 
 use crate::effects::{Effect, Shape};
 use crate::wrench::Wrench;

@@ -2,7 +2,7 @@
 
 use super::candidates::Setting;
 use super::design::Design;
-use super::select::Member;
+use super::judge::Member;
 use super::series::Series;
 use crate::effects::{Effect, Shape};
 use crate::frame::GRAVITY;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
+use super::judge::Refusal;
 use super::noise::FloorSource;
 use super::report::{NamedEffect, Report, Trace, Verdict};
-use super::select::Refusal;
 use crate::effects::Kind;
 use crate::page::plot::{BLUE, GRAY, RED, Series, traces};
 use crate::page::{PlotError, document, escape, table};

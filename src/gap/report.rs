@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::detect::{Excitation, GapSize};
 use super::fit::Parameter;
 use super::holdout::{Closure, Worse};
+use super::judge::Refusal;
 use super::locate::Region;
 use super::noise::Floor;
-use super::select::Refusal;
 use crate::effects::{Effect, Kind, Shape};
 
 /// The answer in a word.

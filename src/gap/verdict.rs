@@ -4,10 +4,11 @@ use nalgebra::DVector;
 
 use super::Config;
 use super::design::Design;
-use super::features::{General, Structure, energy};
+use super::features::energy;
+use super::general::{General, Structure};
+use super::judge::{Judge, Member};
 use super::lasting::lasting;
 use super::report::Verdict;
-use super::select::{Judge, Member};
 use super::series::Series;
 use crate::effects::{Effect, Kind};
 

@@ -14,48 +14,65 @@ const NEIGHBORS: usize = 8;
 /// How far states go beyond either case, in units of their distance.
 const BEYOND: f64 = 0.3;
 
-/// The training states and `count` states for each between it and a neighbor, all with the loads that the teacher gives.
-pub fn taught(
-    training: &[Known],
-    vehicles: &[Prepared],
-    teacher: &Teacher,
-    (unit, count): (&[f64; COORDINATES], usize),
-    random: &mut Random,
-) -> Vec<Known> {
-    let mut taught = Vec::with_capacity(training.len() * (count + 1));
-    for state in training {
-        let prepared = &vehicles[state.vehicle];
-        let learn = |condition: Condition| {
-            let mut reading = Reading::default();
-            prepared.anchor.read(&prepared.vehicle, &condition, &mut reading);
-            let loads = teacher.loads(state.vehicle, (&condition, &reading), prepared)?;
-            Some(Known { condition, reading, loads, ..state.clone() })
-        };
-        let Some(itself) = learn(state.condition) else {
-            taught.push(state.clone());
-            continue;
-        };
-        taught.push(itself);
-        let near = neighbors(state, training, unit);
-        for _ in 0..count {
-            let Some(other) = near.get((random.unit() * near.len() as f64) as usize) else { break };
-            let share = (1.0 + 2.0 * BEYOND) * random.unit() - BEYOND;
-            taught.extend(learn(between(&state.condition, &other.condition, share)));
-        }
-    }
-    taught
+/// What states between the training cases are made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Between<'a> {
+    /// The cases.
+    pub training: &'a [Known],
+    /// Their vehicles.
+    pub vehicles: &'a [Prepared],
+    /// What says the loads.
+    pub teacher: &'a Teacher,
+    /// Unit of each coordinate.
+    pub unit: &'a [f64; COORDINATES],
 }
 
-fn neighbors<'a>(state: &Known, all: &'a [Known], unit: &[f64; COORDINATES]) -> Vec<&'a Known> {
-    let distance = |other: &Known| -> f64 {
-        let (a, b) = (&state.reading.coordinates, &other.reading.coordinates);
-        (0..COORDINATES).map(|i| ((a[i] - b[i]) / unit[i]).powi(2)).sum()
-    };
-    let others = all.iter().filter(|other| other.vehicle == state.vehicle);
-    let mut others: Vec<(f64, &Known)> = others.map(|other| (distance(other), other)).collect();
-    others.retain(|(distance, _)| *distance > 0.0);
-    others.sort_by(|a, b| a.0.total_cmp(&b.0));
-    others.into_iter().take(NEIGHBORS).map(|(_, other)| other).collect()
+impl<'a> Between<'a> {
+    /// The training states and `count` states for each between it and a neighbor, all with the loads that the teacher gives.
+    pub fn taught(&self, count: usize, random: &mut Random) -> Vec<Known> {
+        let mut taught = Vec::with_capacity(self.training.len() * (count + 1));
+        for state in self.training {
+            let Some(itself) = self.learn(state, state.condition) else {
+                taught.push(state.clone());
+                continue;
+            };
+            taught.push(itself);
+            let near = self.neighbors(state);
+            taught.extend((0..count).filter_map(|_| self.drawn(state, &near, random)));
+        }
+        taught
+    }
+
+    /// For each training state one more between it and a neighbor; none of a vehicle that the teacher does not know.
+    pub fn fresh(&self, random: &mut Random) -> Vec<Option<Known>> {
+        self.training.iter().map(|state| self.drawn(state, &self.neighbors(state), random)).collect()
+    }
+
+    fn drawn(&self, state: &Known, near: &[&Known], random: &mut Random) -> Option<Known> {
+        let other = near.get((random.unit() * near.len() as f64) as usize)?;
+        let share = (1.0 + 2.0 * BEYOND) * random.unit() - BEYOND;
+        self.learn(state, between(&state.condition, &other.condition, share))
+    }
+
+    fn learn(&self, state: &Known, condition: Condition) -> Option<Known> {
+        let prepared = &self.vehicles[state.vehicle];
+        let mut reading = Reading::default();
+        prepared.anchor.read(&prepared.vehicle, &condition, &mut reading);
+        let loads = self.teacher.loads(state.vehicle, (&condition, &reading), prepared)?;
+        Some(Known { condition, reading, loads, ..state.clone() })
+    }
+
+    fn neighbors(&self, state: &Known) -> Vec<&'a Known> {
+        let distance = |other: &Known| -> f64 {
+            let (a, b) = (&state.reading.coordinates, &other.reading.coordinates);
+            (0..COORDINATES).map(|i| ((a[i] - b[i]) / self.unit[i]).powi(2)).sum()
+        };
+        let others = self.training.iter().filter(|other| other.vehicle == state.vehicle);
+        let mut others: Vec<(f64, &Known)> = others.map(|other| (distance(other), other)).collect();
+        others.retain(|(distance, _)| *distance > 0.0);
+        others.sort_by(|a, b| a.0.total_cmp(&b.0));
+        others.into_iter().take(NEIGHBORS).map(|(_, other)| other).collect()
+    }
 }
 
 /// A state on the line through two, `share` of the way from the first; seen from the side to which each moves.

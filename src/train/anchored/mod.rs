@@ -28,6 +28,7 @@ use crate::frame::Vec3;
 use crate::model::network::WIDTH;
 use crate::model::{Anchored, Form, SPREAD, Weights};
 use crate::random::Random;
+use between::Between;
 use known::{Known, Prepared};
 use spread::{Missed, Spread};
 use teacher::Teacher;
@@ -58,15 +59,20 @@ pub fn train(
     let (mut form, unit) = form(&training);
     let teacher = Teacher::new(&training, &vehicles, unit)?;
     let mut random = Random::new(config.seed);
-    let taught =
-        between::taught(&training, &vehicles, &teacher, (&unit, config.anchored.between), &mut random);
+    let between = Between { training: &training, vehicles: &vehicles, teacher: &teacher, unit: &unit };
+    let taught = between.taught(config.anchored.between, &mut random);
     let task = task(&taught, &held_out, &vehicles, &form, config)?;
     let begun = Instant::now();
     let (fit, epochs) = run(&task, config, checkpoint, progress)?;
     let epoch_s = (epochs > 0).then(|| begun.elapsed().as_secs_f64() / f64::from(epochs));
     let (mut layers, kept_epoch) = fit.kept();
     let history = fit.state.history;
-    let errors = teacher.errors(training.len());
+    let mut errors = teacher.errors(training.len());
+    // states that the network has not seen tell what it loses of what it was taught
+    for (error, state) in errors.iter_mut().zip(between.fresh(&mut random)) {
+        let lost = |s: &Known| predict(&layers, s, &vehicles[s.vehicle], &form) - s.dynamic();
+        *error += state.as_ref().map_or_else(Vec3::zeros, lost);
+    }
     let spread = Spread::fit(&missed(&layers, &training, &vehicles, &form, &errors));
     form.spread = spread.factors.map(|k| k as f32);
     layers.set_output(SPREAD, &spread.weights, spread.bias);

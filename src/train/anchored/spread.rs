@@ -1,7 +1,8 @@
 //! How far the answer may be off, learnt from what each case would be missed by, were it not known.
 //!
-//! The regressions that teach the network state that error for every training case. The network learns its size: it states for each surface a measure `m_s >= 0`, and the
-//! standard deviation of a component c of the net force is `k_c sum_s unit_s m_s`. Only the row of the last layer that
+//! The regressions that teach the network state that error for every training case; what the network loses of them in a state
+//! that it was not taught, between the case and a neighbor, adds to it. The network learns the size of the sum: it states for
+//! each surface a measure `m_s >= 0`, and the standard deviation of a component c of the net force is `k_c sum_s unit_s m_s`. Only the row of the last layer that
 //! answers `m_s` and the `k_c` are fitted, so the forces stay as they were. The loss is the negative log-likelihood of a
 //! Laplace distribution, `ln d + sqrt(2) |error| / d` with the deviation d: errors of CFD have long tails.
 

@@ -1,0 +1,480 @@
+//! Whether an effect holds beside a set of others.
+//!
+//! Physics, sensors and drive compete in one regression, scored by the loss of blocks left out (Burman, Chow, Nolan,
+//! Biometrika 1994) and Schwarz's price of a number (Annals of Statistics 1978). Each effect of a set must pass every gate given the others:
+//! significant by cluster-robust errors, inside its physical bounds, of one sign in every fold, better in most folds and in
+//! most of the blocks that excite it, a stated share of the remaining gap above the floor, larger than its phase-shifted
+//! placebos, and large enough to matter beside the noise of a sample and the model's own uncertainty.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+
+use super::design::{Design, Fitted};
+use super::general::General;
+use super::noise::Floor;
+use super::robust::{Error, contribution, errors, group, of_column};
+use super::shared::outlasts_noise;
+use super::statistics::deviate_of;
+use super::{Config, candidates::Setting};
+use crate::effects::Effect;
+use crate::random::Random;
+
+/// Least deviate of a column that stays in a group.
+const COLUMN_DEVIATE: f64 = 2.5;
+/// Squared sine of the angle to the others of a set below which a column says the same as they.
+const NOVEL: f64 = 0.03;
+/// Share of the folds in which an effect must help and keep its sign.
+const MOST_FOLDS: f64 = 0.75;
+/// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
+/// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
+const MOST_SCATTER: f64 = 0.75;
+/// A shifted column that still points the same way is no placebo.
+const SAME_DIRECTION: f64 = 0.9;
+
+/// An effect of a set: its candidate, and the columns that are in use with their coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Member {
+    pub candidate: usize,
+    pub columns: Vec<(usize, usize)>,
+}
+
+/// How an effect does beside a set.
+#[derive(Debug, Clone)]
+pub(super) struct Judged {
+    pub member: Member,
+    pub effect: Effect,
+    /// Cross-validated loss of the set with it.
+    pub cv_loss: f64,
+    /// In-sample gain of the loss.
+    pub gain: f64,
+    /// Why it is not named; `None` where every gate is passed.
+    pub refused: Option<Refusal>,
+}
+
+/// A gate that was not passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refusal {
+    /// As likely chance.
+    NotSignificant,
+    /// Coefficients beyond what is physically possible.
+    OutOfBounds,
+    /// Too small beside the noise or the model's uncertainty.
+    Irrelevant,
+    /// Explains too little of the remaining gap.
+    SmallShare,
+    /// Does not help in most folds, or changes sign between them.
+    Unstable,
+    /// Placebos do as well.
+    Placebo,
+    /// The others of the set say the same.
+    NotNew,
+    /// Agrees with the gap from sample to sample alone, as the noise of the recorded motion does.
+    SharedNoise,
+}
+
+/// What the gates said of an effect beside a set of columns.
+type Verdicts = BTreeMap<(Vec<usize>, Effect), Option<Judged>>;
+
+/// The regression with what the gates need.
+pub(super) struct Judge<'a> {
+    pub design: &'a Design,
+    pub setting: &'a Setting<'a>,
+    pub config: &'a Config,
+    pub floors: &'a [Floor; 6],
+    pub general: &'a General,
+    /// Loss that nothing explains.
+    pub floor_loss: f64,
+    passed: RefCell<Verdicts>,
+}
+
+impl<'a> Judge<'a> {
+    pub fn new(
+        design: &'a Design,
+        setting: &'a Setting<'a>,
+        config: &'a Config,
+        floors: &'a [Floor; 6],
+        general: &'a General,
+        floor_loss: f64,
+    ) -> Self {
+        Self { design, setting, config, floors, general, floor_loss, passed: RefCell::default() }
+    }
+
+    /// Columns of a set.
+    pub fn columns(&self, set: &[Member]) -> Vec<usize> {
+        set.iter().flat_map(|member| member.columns.iter().map(|(column, _)| *column)).collect()
+    }
+
+    pub fn effect(&self, member: &Member) -> Effect {
+        self.design.candidates[member.candidate].effect
+    }
+
+    /// The best form of an effect beside a set, by every gate but the placebos.
+    pub fn judge(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let ranked = self.ranked(set, effect)?;
+        let before = self.design.solve(&self.columns(set))?.1;
+        let &(least, candidate) = ranked.first()?;
+        let Some(refused) = self.hopeless(set, before, least) else {
+            return self.judge_ranked(set, &ranked);
+        };
+        let member = self.whole(candidate);
+        let (gain, refused) = (before - least, Some(refused));
+        Some(Judged { member, effect, cv_loss: f64::INFINITY, gain, refused })
+    }
+
+    /// Loss and candidate of each form of an effect beside a set, the least first.
+    pub fn ranked(&self, set: &[Member], effect: Effect) -> Option<Vec<(f64, usize)>> {
+        let base = self.columns(set);
+        let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
+        let mut ranked: Vec<(f64, usize)> = forms
+            .filter_map(|(index, candidate)| {
+                let mut columns = base.clone();
+                columns.extend(candidate.columns.iter().map(|(column, _)| *column));
+                Some((self.design.solve(&columns)?.1, index))
+            })
+            .collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        (!ranked.is_empty()).then_some(ranked)
+    }
+
+    /// A candidate with all of its columns.
+    pub fn whole(&self, candidate: usize) -> Member {
+        Member { candidate, columns: self.design.candidates[candidate].columns.clone() }
+    }
+
+    /// The first of the best two forms that passes, or else the best one.
+    pub fn judge_ranked(&self, set: &[Member], ranked: &[(f64, usize)]) -> Option<Judged> {
+        let base = self.columns(set);
+        let before = self.design.solve(&base)?.1;
+        let mut first = None;
+        for &(_, candidate) in ranked.iter().take(2) {
+            let judged = self.judge_form(set, &base, before, candidate)?;
+            if judged.refused.is_none() {
+                return Some(judged);
+            }
+            first.get_or_insert(judged);
+        }
+        first
+    }
+
+    /// A gate that no choice among an effect's columns can pass, from the gain of all of them: most of the library is not
+    /// there, and the errors of a fit take most of the time.
+    fn hopeless(&self, set: &[Member], before: f64, after: f64) -> Option<Refusal> {
+        // a third of the variance that rows of their own residual would give
+        const CERTAIN: f64 = 3.0;
+        let gain = before - after;
+        if gain < self.least_gain(set, before) {
+            return Some(Refusal::SmallShare);
+        }
+        let variance = after / self.design.y.len().max(1) as f64;
+        let deviate = deviate_of(self.config.significance);
+        (CERTAIN * gain < deviate * deviate * variance).then_some(Refusal::NotSignificant)
+    }
+
+    /// What an effect beside a set must gain.
+    fn least_gain(&self, set: &[Member], before: f64) -> f64 {
+        let remaining = (before - self.floor_loss).max(0.0);
+        let whole = (self.design.empty_loss() - self.floor_loss).max(0.0);
+        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * whole };
+        f64::max(self.config.share_of_remaining * remaining, of_whole)
+    }
+
+    pub fn judge_form(&self, set: &[Member], base: &[usize], before: f64, candidate: usize) -> Option<Judged> {
+        let effect = self.design.candidates[candidate].effect;
+        let mut own = self.design.candidates[candidate].columns.clone();
+        // two that say the same cancel each other at any size, and so explain what neither does
+        own.retain(|(column, _)| self.design.novelty(*column, base) > NOVEL);
+        if own.is_empty() {
+            let member = self.whole(candidate);
+            return Some(Judged {
+                member,
+                effect,
+                cv_loss: before,
+                gain: 0.0,
+                refused: Some(Refusal::NotNew),
+            });
+        }
+        let mut refused = None;
+        let fitted = loop {
+            let columns: Vec<usize> = base.iter().copied().chain(own.iter().map(|(c, _)| *c)).collect();
+            let (beta, _) = self.design.solve(&columns)?;
+            let residual = self.design.residual(&columns, &beta);
+            let errors = errors(self.design, &columns, &residual)?;
+            let at = base.len();
+            let outside = |i: usize| self.out_of_bounds(effect, own[i], beta[at + i], &errors[at + i]);
+            let deviate = |i: usize| errors[at + i].deviate(beta[at + i]);
+            let weakest = (0..own.len()).min_by(|&a, &b| deviate(a).total_cmp(&deviate(b)));
+            let bad = (0..own.len()).find(|&i| outside(i)).filter(|_| own.len() > 1);
+            let drop = bad.or(weakest.filter(|&i| own.len() > 1 && deviate(i) < COLUMN_DEVIATE));
+            if let Some(drop) = drop {
+                own.remove(drop);
+                continue;
+            }
+            if outside(0) && own.len() == 1 {
+                refused = Some(Refusal::OutOfBounds);
+            }
+            let mine: Vec<usize> = own.iter().map(|(column, _)| *column).collect();
+            let together = group(self.design, base, &mine, &beta.as_slice()[at..], &residual)?;
+            if together.probability(1.0) > self.config.significance {
+                refused = refused.or(Some(Refusal::NotSignificant));
+            }
+            break self.design.fit(&columns)?;
+        };
+        let gain = before - fitted.loss;
+        let member = Member { candidate, columns: own };
+        refused = refused.or_else(|| self.gates(set, &member, base, before, &fitted));
+        Some(Judged { member, effect, cv_loss: fitted.cv_loss, gain, refused })
+    }
+
+    fn out_of_bounds(&self, effect: Effect, column: (usize, usize), beta: f64, error: &Error) -> bool {
+        let [low, high] = effect.coefficients()[column.1].bounds;
+        let scale = self.design.scale[column.0];
+        let (value, slack) = (beta / scale, 2.0 * error.std / scale);
+        value < low - slack || value > high + slack
+    }
+
+    fn gates(
+        &self,
+        set: &[Member],
+        member: &Member,
+        base: &[usize],
+        before: f64,
+        fitted: &Fitted,
+    ) -> Option<Refusal> {
+        let effect = self.effect(member);
+        // what comes with an effect does not come without it
+        if effect.needs_its_first() && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
+            return Some(Refusal::NotSignificant);
+        }
+        // a moving bed changes drag and lift; drag alone is the drag coefficient's
+        let held = &self.design.candidates[member.candidate].columns;
+        if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
+            return Some(Refusal::NotSignificant);
+        }
+        if !self.relevant(member, base, fitted) {
+            return Some(Refusal::Irrelevant);
+        }
+        if before - fitted.loss < self.least_gain(set, before) {
+            return Some(Refusal::SmallShare);
+        }
+        (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
+    }
+
+    /// Size of what a member adds, against the noise of a sample and the model's uncertainty, in any component.
+    fn relevant(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        let (design, first) = (self.design, base.len());
+        let mut squares = [0.0; 6];
+        let mut count = [0.0; 6];
+        for (row, place) in design.rows.rows.iter().enumerate() {
+            let of = |(i, (column, _)): (usize, &(usize, usize))| {
+                fitted.beta[first + i] * design.x[(row, *column)]
+            };
+            let value: f64 = member.columns.iter().enumerate().map(of).sum();
+            squares[place.component] += (value * design.noise.bin[place.component]).powi(2);
+            count[place.component] += 1.0;
+        }
+        let size = |c: usize| (squares[c] / f64::max(count[c], 1.0)).sqrt();
+        let components = &self.setting.components;
+        let audible = |&&c: &&usize| size(c) > self.config.relevance * self.floors[c].sample;
+        components.iter().filter(audible).any(|&c| size(c) > self.floors[c].model)
+            || components.iter().any(|c| audible(&c)) && self.is_beyond_model(member, base, fitted)
+    }
+
+    /// True where no error of the model can stand for a member. That error is a function of what the model is told, velocity,
+    /// depth and attitude, the same in every trial: what goes with the same must be larger than it. What is left of a member
+    /// beyond all smooth functions of those is judged by the trials alone, whatever its size.
+    fn is_beyond_model(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        /// Share of the member that must be left, and of its coefficient.
+        const MOST: f64 = 0.5;
+        let design = self.design;
+        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
+        let Some(sum) = contribution(design, base, &own, &fitted.beta.as_slice()[base.len()..]) else {
+            return false;
+        };
+        let left = self.general.untold(&sum, design);
+        if left.norm_squared() < MOST * sum.norm_squared() {
+            return false;
+        }
+        let columns: Vec<usize> = base.iter().chain(&own).copied().collect();
+        let residual = design.residual(&columns, &fitted.beta);
+        let kept = left.dot(&(&residual + &sum)) / left.norm_squared();
+        let error = of_column(design, &left, &residual);
+        kept > MOST && error.probability(kept) <= self.config.significance
+    }
+
+    fn stable(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
+        let Some(without) = self.design.fit(base) else { return false };
+        let pairs = without.fold_losses.iter().zip(&fitted.fold_losses);
+        let helped = pairs.filter(|(without, with)| with < without).count() as f64;
+        let folds = fitted.fold_losses.len() as f64;
+        // the strongest column carries the sign
+        let strongest = (0..member.columns.len())
+            .max_by(|&a, &b| fitted.beta[base.len() + a].abs().total_cmp(&fitted.beta[base.len() + b].abs()));
+        let Some(strongest) = strongest else { return false };
+        let columns: Vec<usize> =
+            base.iter().copied().chain(member.columns.iter().map(|(c, _)| *c)).collect();
+        let scatter = scatter(self.design, &columns, &fitted.beta, base.len() + strongest);
+        if scatter > MOST_SCATTER * fitted.beta[base.len() + strongest].abs() {
+            return false;
+        }
+        let sign = fitted.beta[base.len() + strongest].signum();
+        let kept = fitted.fold_betas.iter().all(|beta| beta[base.len() + strongest].signum() == sign);
+        helped >= MOST_FOLDS * folds && kept && self.helps_most_blocks(member, base, fitted, &without)
+    }
+
+    /// Among the blocks that together hold nine tenths of the member's own energy, most must be better.
+    fn helps_most_blocks(&self, member: &Member, base: &[usize], with: &Fitted, without: &Fitted) -> bool {
+        let design = self.design;
+        let blocks = design.rows.blocks;
+        let (mut energy, mut change) = (vec![0.0; blocks], vec![0.0; blocks]);
+        for (row, place) in design.rows.rows.iter().enumerate() {
+            let fold = design.block_fold[place.block];
+            let sum = |beta: &DVector<f64>| {
+                base.iter().enumerate().map(|(i, &c)| beta[i] * design.x[(row, c)]).sum::<f64>()
+            };
+            let own: f64 = member
+                .columns
+                .iter()
+                .enumerate()
+                .map(|(i, (c, _))| with.fold_betas[fold][base.len() + i] * design.x[(row, *c)])
+                .sum();
+            let (a, b) = (sum(&without.fold_betas[fold]), sum(&with.fold_betas[fold]) + own);
+            energy[place.block] += own * own;
+            change[place.block] += (design.y[row] - b).powi(2) - (design.y[row] - a).powi(2);
+        }
+        let mut order: Vec<usize> = (0..blocks).collect();
+        order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]).then(a.cmp(&b)));
+        let whole: f64 = energy.iter().sum();
+        let (mut held, mut better, mut looked) = (0.0, 0, 0);
+        for block in order {
+            if held > 0.9 * whole {
+                break;
+            }
+            held += energy[block];
+            looked += 1;
+            better += usize::from(change[block] < 0.0);
+        }
+        2 * better > looked
+    }
+
+    /// Gain of a member, and that of the best of copies of itself that are shifted in time around each trial, which have its
+    /// spectrum but not its phase (surrogate data; Theiler and others, Physica D 1992).
+    pub fn placebo_gains(&self, set: &[Member], member: &Member) -> Option<(f64, f64)> {
+        let design = self.design;
+        let others: Vec<Member> = set.iter().filter(|other| *other != member).cloned().collect();
+        let base = self.columns(&others);
+        let (beta, before) = design.solve(&base)?;
+        let residual = design.residual(&base, &beta);
+        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
+        let all: Vec<usize> = base.iter().chain(&own).copied().collect();
+        let real = before - design.solve(&all)?.1;
+        let mut random = Random::new(self.config.seed ^ 0x9e37);
+        let mut strongest: f64 = 0.0;
+        for _ in 0..self.config.placebos {
+            let order = self.shifted(&mut random);
+            let columns: Vec<DVector<f64>> = own
+                .iter()
+                .map(|&c| DVector::from_iterator(order.len(), order.iter().map(|&r| design.x[(r, c)])))
+                .collect();
+            let alike = columns.iter().zip(&own).any(|(shifted, &c)| {
+                let original = design.x.column(c);
+                shifted.dot(&original) / (shifted.norm() * original.norm()).max(1e-12) > SAME_DIRECTION
+            });
+            if !alike {
+                strongest = strongest.max(design.gain(&columns, &base, &residual));
+            }
+        }
+        Some((real, strongest))
+    }
+
+    /// For every row the row of the same component whose time is shifted within its trial.
+    fn shifted(&self, random: &mut Random) -> Vec<usize> {
+        let rows = &self.design.rows;
+        let mut order = Vec::with_capacity(rows.rows.len());
+        for trial in &rows.of_trial {
+            let bins = trial.len() / rows.width;
+            let shift = ((0.25 + 0.5 * random.unit()) * bins as f64) as usize;
+            for bin in 0..bins {
+                let from = trial.start + (bin + shift) % bins * rows.width;
+                order.extend(from..from + rows.width);
+            }
+        }
+        order
+    }
+
+    pub fn taken(&self, set: &[Member], effect: Effect) -> bool {
+        set.iter().any(|member| self.effect(member) == effect)
+    }
+
+    /// An effect beside a set where it passes every gate; the search asks again and again.
+    pub fn passes(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let key = (self.columns(set), effect);
+        if let Some(known) = self.passed.borrow().get(&key) {
+            return known.clone();
+        }
+        let found = self.passes_anew(set, effect);
+        self.passed.borrow_mut().insert(key, found.clone());
+        found
+    }
+
+    fn passes_anew(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        self.weighed(set, effect).filter(|judged| judged.refused.is_none())
+    }
+
+    /// The best form of an effect beside a set, by every gate.
+    pub fn weighed(&self, set: &[Member], effect: Effect) -> Option<Judged> {
+        let judged = self.judge(set, effect)?;
+        self.beyond_chance(set, judged)
+    }
+
+    /// The gates that look at a form once it has passed the others: its placebos, and the noise that it shares with the gap.
+    pub fn beyond_chance(&self, set: &[Member], mut judged: Judged) -> Option<Judged> {
+        if judged.refused.is_some() {
+            return Some(judged);
+        }
+        let mut whole = set.to_vec();
+        whole.push(judged.member.clone());
+        let (real, placebo) = self.placebo_gains(&whole, &judged.member)?;
+        if real <= 1.05 * placebo {
+            judged.refused = Some(Refusal::Placebo);
+        } else if !self.outlasts_noise(set, &judged.member)? {
+            judged.refused = Some(Refusal::SharedNoise);
+        }
+        Some(judged)
+    }
+
+    fn outlasts_noise(&self, set: &[Member], member: &Member) -> Option<bool> {
+        let (design, base) = (self.design, self.columns(set));
+        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
+        let all: Vec<usize> = base.iter().chain(&own).copied().collect();
+        let (beta, _) = design.solve(&all)?;
+        let sum = contribution(design, &base, &own, &beta.as_slice()[base.len()..])?;
+        let (beta, _) = design.solve(&base)?;
+        Some(outlasts_noise(design, &sum, &design.residual(&base, &beta)))
+    }
+}
+
+/// Standard deviation of a coefficient between trials beyond what noise explains, by moments (DerSimonian and Laird,
+/// Controlled Clinical Trials 1986); 0 where its excess is as likely chance.
+fn scatter(design: &Design, columns: &[usize], beta: &DVector<f64>, index: usize) -> f64 {
+    let residual = design.residual(columns, beta);
+    let x = design.x.column(columns[index]);
+    let noise = residual.norm_squared() / residual.len().max(1) as f64;
+    let trials: Vec<(f64, f64)> = design
+        .rows
+        .of_trial
+        .iter()
+        .map(|rows| rows.clone().fold((0.0, 0.0), |(xx, xr), r| (xx + x[r] * x[r], xr + x[r] * residual[r])))
+        .filter(|(xx, _)| *xx > 0.0)
+        .collect();
+    let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), (xx, _)| (s + xx, q + xx * xx));
+    let freedom = trials.len().max(2) as f64 - 1.0;
+    let excess =
+        trials.iter().map(|(xx, xr)| xr * xr / xx).sum::<f64>() / noise.max(f64::MIN_POSITIVE) - freedom;
+    if excess < 5.0 * (2.0 * freedom).sqrt() {
+        return 0.0;
+    }
+    (excess * noise / (sum - squares / sum).max(f64::MIN_POSITIVE)).sqrt()
+}

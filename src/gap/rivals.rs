@@ -1,0 +1,155 @@
+//! What could stand in the place of an effect that was named: sets that explain as much with other names.
+
+use nalgebra::DVector;
+
+use super::judge::{Judge, Judged, Member, Refusal};
+use super::robust::noise_of;
+use crate::effects::Effect;
+
+impl Judge<'_> {
+    /// Sets in which one effect is exchanged that explain as much within two standard errors, with no more numbers.
+    pub fn alternatives(&self, set: &[Member], library: &[Effect]) -> Vec<Vec<Member>> {
+        let columns = self.columns(set);
+        let Some(fitted) = self.design.fit(&columns) else { return Vec::new() };
+        let mut found = Vec::new();
+        for index in 0..set.len() {
+            let mut others = set.to_vec();
+            let out = others.remove(index);
+            let without = self.design.solve(&self.columns(&others)).map_or(fitted.loss, |(_, loss)| loss);
+            let explained = (without - fitted.loss).max(0.0);
+            for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
+                let rivals = self.passing(&others, effect).into_iter().filter_map(|judged| {
+                    if !self.is_rival(&judged.member, &out, &others) {
+                        return None;
+                    }
+                    let mut rival = others.clone();
+                    rival.push(judged.member);
+                    let (difference, open) = self.difference(&rival, set, explained)?;
+                    (difference <= open).then_some((difference, rival))
+                });
+                if let Some((difference, mut rival)) = rivals.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                    rival.sort_by_key(|member| self.effect(member));
+                    found.push((difference, rival));
+                }
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut rivals: Vec<Vec<Member>> = found.into_iter().map(|(_, rival)| rival).collect();
+        // where one could stand for the other, both may be there
+        if let (&[ours], Some(&[theirs])) =
+            (&self.effects(set)[..], rivals.first().map(|r| self.effects(r)).as_deref())
+        {
+            rivals.extend(self.both(ours, theirs));
+        }
+        rivals
+    }
+
+    /// Forms of an effect that pass every gate beside a set: the best one by losses, and that of the fewest columns, since
+    /// what many numbers say of each channel one may say of all.
+    fn passing(&self, set: &[Member], effect: Effect) -> Vec<Judged> {
+        let best = self.passes(set, effect);
+        let base = self.columns(set);
+        let plain = || -> Option<Judged> {
+            let before = self.design.solve(&base)?.1;
+            let forms = self.design.candidates.iter().enumerate().filter(|(_, c)| c.effect == effect);
+            let (candidate, _) = forms.min_by_key(|(index, c)| (c.columns.len(), *index))?;
+            if best.as_ref().is_some_and(|best| best.member.candidate == candidate) {
+                return None;
+            }
+            let judged = self.judge_form(set, &base, before, candidate)?;
+            self.beyond_chance(set, judged).filter(|judged| judged.refused.is_none())
+        };
+        let plain = if effect == Effect::SensorGain { plain() } else { None };
+        best.into_iter().chain(plain).collect()
+    }
+
+    /// True where an effect may stand in another's place: with one number more at most, and none that nobody has ever measured.
+    fn is_rival(&self, member: &Member, out: &Member, others: &[Member]) -> bool {
+        self.numbers(member) <= self.numbers(out) + 1 && self.is_published(member, others)
+    }
+
+    /// True where every coefficient that has a band of published values lies in it, or a quarter beyond.
+    fn is_published(&self, member: &Member, others: &[Member]) -> bool {
+        const BEYOND: f64 = 1.25;
+        let mut columns = self.columns(others);
+        let first = columns.len();
+        columns.extend(member.columns.iter().map(|(column, _)| *column));
+        let Some((beta, _)) = self.design.solve(&columns) else { return false };
+        member.columns.iter().enumerate().all(|(i, &(column, coefficient))| {
+            let value = beta[first + i] / self.design.scale[column];
+            let band = self.effect(member).coefficients()[coefficient].literature;
+            // a band ends where nothing was measured, on either side of 0
+            let reach =
+                |end: f64, outwards: f64| if end * outwards > 0.0 { end * BEYOND } else { end / BEYOND };
+            band.is_none_or(|[low, high]| value >= reach(low, -1.0) && value <= reach(high, 1.0))
+        })
+    }
+
+    /// Two rivals together, where each is significant beside the other.
+    fn both(&self, ours: Effect, theirs: Effect) -> Option<Vec<Member>> {
+        let significant = |set: &[Member], effect: Effect| {
+            let judged = self.judge_ranked(set, &self.ranked(set, effect)?)?;
+            matches!(judged.refused, None | Some(Refusal::SmallShare)).then_some(judged.member)
+        };
+        let a = self.judge(&[], ours)?.member;
+        let b = significant(&[a], theirs)?;
+        let a = significant(std::slice::from_ref(&b), ours)?;
+        let mut both = vec![a, b];
+        both.sort_by_key(|member| self.effect(member));
+        Some(both)
+    }
+
+    /// Numbers that a member was fitted with, nonlinear ones included.
+    fn numbers(&self, member: &Member) -> usize {
+        let shape = match self.effect(member) {
+            // when, and whether in a trial or between trials
+            Effect::SensorBiasStep => 2,
+            // time constant, frequency, and what it remembers
+            Effect::WaveMemory => 3,
+            effect => effect.shape_names().len(),
+        };
+        member.columns.len() + shape
+    }
+
+    /// Cross-validated loss of one set over another, and how much of it two standard errors and the formulas' own
+    /// uncertainty leave open, for a member that explains `explained`.
+    ///
+    /// The scatter from trial to trial, and a hundredth for the formula. Where few trials tell the two apart that scatter
+    /// says nothing: there the noise alone counts, through what the two predict differently, and a twentieth.
+    fn difference(&self, rival: &[Member], set: &[Member], explained: f64) -> Option<(f64, f64)> {
+        const ENOUGH: f64 = 8.0;
+        let (a, b) = (self.predictions(rival)?, self.predictions(set)?);
+        let design = self.design;
+        let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
+        let mut trials = vec![0.0; design.trials.len()];
+        for (row, part) in design.rows.rows.iter().enumerate() {
+            trials[place(part.trial)] += (design.y[row] - a[row]).powi(2) - (design.y[row] - b[row]).powi(2);
+        }
+        let count = trials.len() as f64;
+        let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), d| (s + d.abs(), q + d * d));
+        let total: f64 = trials.iter().sum();
+        if sum * sum >= ENOUGH * squares {
+            let variance = trials.iter().map(|d| (d - total / count).powi(2)).sum::<f64>() / (count - 1.0);
+            return Some((total, (2.0 * (variance * count).sqrt()).max(0.01 * explained)));
+        }
+        // the loss of the rival has the noise twice as often as the predictions differ
+        let noise = 2.0 * noise_of(design, &(&design.y - &b), &(&a - &b)).sqrt();
+        Some((total, (2.0 * noise).max(0.05 * explained)))
+    }
+
+    /// What a set predicts of each row by the fit without the row's fold.
+    fn predictions(&self, set: &[Member]) -> Option<DVector<f64>> {
+        let columns = self.columns(set);
+        let fitted = self.design.fit(&columns)?;
+        let design = self.design;
+        let of = |row: usize| {
+            let beta = &fitted.fold_betas[design.block_fold[design.rows.rows[row].block]];
+            columns.iter().enumerate().map(|(i, &c)| beta[i] * design.x[(row, c)]).sum()
+        };
+        Some(DVector::from_fn(design.y.len(), |row, _| of(row)))
+    }
+
+    fn effects(&self, set: &[Member]) -> Vec<Effect> {
+        set.iter().map(|member| self.effect(member)).collect()
+    }
+}
