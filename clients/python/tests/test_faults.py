@@ -196,6 +196,16 @@ def offer(service: str, query: Any) -> Any:
     return node, factory, factory.server_builder().create()
 
 
+def tell(namespace: str, version: str, vehicles: str) -> Any:
+    """What a server of another version would tell of itself."""
+    node = iox.NodeBuilder.new().create(iox.ServiceType.Ipc)
+    told = iox.AttributeSpecifier.new()
+    for key, value in ((shm_layout.SERVED_LAYOUT, version), (shm_layout.SERVED_VEHICLES, vehicles)):
+        told = told.define(iox.AttributeKey.new(key), iox.AttributeValue.new(value))
+    builder = node.service_builder(iox.ServiceName.new(shm_layout.served_name(namespace))).event()
+    return node, builder.create_with_attributes(told)
+
+
 class LongerQuery(ctypes.Structure):
     _fields_ = [("words", ctypes.c_uint64 * 14)]
 
@@ -206,7 +216,7 @@ class LongerQuery(ctypes.Structure):
 
 def test_another_layout_version_is_told(mortal_server: Server) -> None:
     with wade.ShmClient(mortal_server.namespace) as client:
-        server = offer(f"{mortal_server.namespace}/v0/evaluate/husky", shm_layout.Query)
+        server = tell(mortal_server.namespace, "v0", "husky")
         for call in (lambda: client.evaluate("husky", STATE), lambda: client.vehicles()):
             with pytest.raises(wade.LayoutMismatch) as caught:
                 call()
