@@ -16,7 +16,6 @@ use tempfile::TempDir;
 use wade::client::{ClientError, ShmClient};
 use wade::service::shm::Wait;
 use wade::service::shm_layout::{Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, Status};
-use wade::service::wire::State;
 
 #[test]
 fn a_living_client_finds_a_killed_and_restarted_server_again() {

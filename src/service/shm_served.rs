@@ -56,7 +56,7 @@ pub(crate) fn served<S: Service>(names: &Names) -> Option<Served> {
     nodes.iter().find(|node| matches!(node, NodeState::Alive(_)))?;
     let values = |key: &str| {
         let attributes = details.static_details.attributes().iter();
-        let of_key = attributes.filter(|attribute| attribute.key().to_string() == key);
+        let of_key = attributes.filter(|attribute| attribute.key() == key);
         of_key.map(|attribute| attribute.value().to_string()).collect::<Vec<_>>()
     };
     let vehicles = values(SERVED_VEHICLES).join(" ");
