@@ -7,8 +7,10 @@ mod common;
 
 use std::hint::black_box;
 use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use common::{Row, Subject, Table};
@@ -45,7 +47,7 @@ impl Served {
         };
         config.grpc.listen = "127.0.0.1:0".into();
         config.grpc.unix_socket = folder.path().join("wade.sock");
-        config.http.listen = String::new();
+        config.http.listen = "127.0.0.1:0".into();
         config.shm.wait = wait;
         config.shm.namespace = format!("bench-{}-{wait:?}", std::process::id());
         Self { running: server::start(&config).expect("the server starts"), config, _folder: folder }
@@ -95,6 +97,33 @@ fn echo() -> impl FnMut() {
     }
 }
 
+/// Queries a second of a page whose user drags a slider: one a frame.
+const FRAMES_PER_SECOND: u32 = 60;
+
+/// Works while a page asks over HTTP, each query on a connection of its own, which costs the server more than a browser does.
+fn beside_a_page(address: SocketAddr, work: impl FnOnce()) {
+    let body = r#"{"vehicle": "husky", "state": {"depth_m": 0.35}}"#;
+    let request = format!(
+        "POST /v1/query HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{body}",
+        body.len()
+    );
+    let closed = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !closed.load(Ordering::Relaxed) {
+                let mut stream = TcpStream::connect(address).expect("connected");
+                stream.write_all(request.as_bytes()).expect("sent");
+                let mut answer = String::new();
+                stream.read_to_string(&mut answer).expect("answered");
+                assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+                std::thread::sleep(Duration::from_secs(1) / FRAMES_PER_SECOND);
+            }
+        });
+        work();
+        closed.store(true, Ordering::Relaxed);
+    });
+}
+
 fn evaluate(mut client: Client) -> Box<dyn FnMut()> {
     let state = state();
     Box::new(move || {
@@ -105,7 +134,7 @@ fn evaluate(mut client: Client) -> Box<dyn FnMut()> {
 fn measure(table: &mut Table, placement: &str, server_core: usize, client_core: usize) {
     cores::pin_to(&[server_core]).expect("a core");
     let blocking = Served::start(Wait::Block);
-    let raw = echo();
+    let (raw, raw_beside) = (echo(), echo());
     cores::pin_to(&[client_core]).expect("a core");
     let row = |name: &str| Row::new(format!("{name}, {placement}"), 0);
     let mut subjects: Vec<Subject> = vec![
@@ -118,6 +147,14 @@ fn measure(table: &mut Table, placement: &str, server_core: usize, client_core: 
         (row("shared memory, blocking"), evaluate(blocking.shm(Wait::Block))),
     ];
     common::measure(&mut subjects);
+    table.add(subjects);
+    let mut subjects: Vec<Subject> = vec![
+        (row("control: Unix-socket echo, beside a page"), Box::new(raw_beside)),
+        (row("gRPC stream, TCP, beside a page"), evaluate(blocking.grpc(Method::Stream, false))),
+        (row("shared memory, blocking, beside a page"), evaluate(blocking.shm(Wait::Block))),
+    ];
+    let http = blocking.running.http_address().expect("HTTP is on");
+    beside_a_page(http, || common::measure(&mut subjects));
     table.add(subjects);
     drop(blocking);
     if server_core != client_core {

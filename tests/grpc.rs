@@ -12,6 +12,7 @@ use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 use tonic_types::StatusExt;
+use wade::client::{GrpcClient, Method};
 use wade::service::proto;
 use wade::service::proto::hydrodynamics_client::HydrodynamicsClient;
 
@@ -89,6 +90,20 @@ fn bad_requests_name_their_field_and_the_next_is_served() {
         assert_eq!(status.get_details_resource_info().expect("named").resource_name, "nautilus");
         client.evaluate(request("husky", 0.1)).await.expect("the next request is served");
     });
+}
+
+#[test]
+fn a_client_that_finds_nobody_says_each_reason_once_with_the_way_out() {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let socket = folder.path().join("wade.sock");
+    let url = format!("unix:{}", socket.display());
+    let of_client = GrpcClient::unix(socket, "husky", Method::Unary, PATIENCE).map(|_| ());
+    let of_reload = wade::client::reload(&url, "husky", PATIENCE).map(|_| ());
+    for error in [of_client.expect_err("nobody"), of_reload.expect_err("nobody")] {
+        let text = error.to_string();
+        assert_eq!(text.matches("No such file").count(), 1, "{text}");
+        assert!(text.contains(&url) && text.contains("is wade serve running"), "{text}");
+    }
 }
 
 #[test]

@@ -2,67 +2,20 @@
 
 mod common;
 
-use std::os::unix::process::ExitStatusExt;
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+#[path = "common/process.rs"]
+mod process;
+
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::{PATIENCE, Served, namespace, vehicles};
 use iceoryx2::node::NodeBuilder;
 use iceoryx2::prelude::ipc;
+use process::{Process, state, until_answered};
 use tempfile::TempDir;
 use wade::client::{ClientError, ShmClient};
 use wade::service::shm::Wait;
 use wade::service::shm_layout::{Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, Status};
-use wade::service::wire::State;
-
-fn state() -> State {
-    State { depth: 0.15, velocity: [0.5, 0.0, 0.0], ..State::default() }
-}
-
-/// A server in a process of its own, which a test can kill.
-struct Process(Child);
-
-impl Process {
-    fn start(folder: &Path, namespace: &str, wait: &str) -> Self {
-        let file = folder.join("wade.toml");
-        let settings = format!(
-            "vehicles = \"{}\"\n[grpc]\nlisten = \"\"\nunix_socket = \"\"\n[http]\nlisten = \"\"\n\
-             [shm]\nnamespace = \"{namespace}\"\nwait = \"{wait}\"\n[log]\nfilter = \"error\"\n",
-            vehicles().display()
-        );
-        std::fs::write(&file, settings).expect("written");
-        let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
-        command.arg("serve").arg("--config").arg(file).stdin(Stdio::null());
-        Self(command.spawn().expect("the server starts"))
-    }
-
-    /// Ends it as nothing can prepare for.
-    fn kill(mut self) {
-        self.0.kill().expect("killed");
-        let status = self.0.wait().expect("reaped");
-        assert_eq!(status.signal(), Some(9));
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Asks until somebody answers.
-fn until_answered(client: &mut ShmClient) -> Answer {
-    let start = Instant::now();
-    loop {
-        match client.evaluate(&state()) {
-            Ok(answer) => return answer,
-            Err(error) => assert!(start.elapsed() < PATIENCE, "never answered: {error}"),
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
 
 #[test]
 fn a_living_client_finds_a_killed_and_restarted_server_again() {

@@ -7,7 +7,7 @@ use tokio::runtime::Runtime;
 use tonic::transport::Endpoint;
 
 use super::grpc_link::GrpcLink;
-use super::{ClientError, EffectReply, Reply, SurfaceReply, chain};
+use super::{ClientError, EffectReply, Reply, SurfaceReply, nobody_at};
 use crate::domain::{Domain, Outside, Quantity, Range};
 use crate::effects::{BoxQuantity, Effect, LeftOut, OutsideBox};
 use crate::service::proto;
@@ -91,16 +91,17 @@ impl GrpcClient {
 
 /// Asks the server at a URL, `http://HOST:PORT` or `unix:PATH`, to read a vehicle's bundle again.
 pub fn reload(url: &str, vehicle: &str, timeout: Duration) -> Result<Vec<proto::Reloaded>, ClientError> {
-    let no_server = |reason: String| ClientError::NoServer { at: url.to_owned(), reason };
-    let failed = |error: &dyn std::error::Error| no_server(chain(error));
     let runtime = runtime(url)?;
-    let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| failed(&error))?;
+    let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| nobody_at(url, &error))?;
     runtime.block_on(async {
         let endpoint = endpoint.connect_timeout(timeout).timeout(timeout);
-        let mut client = AdminClient::new(endpoint.connect().await.map_err(|error| failed(&error))?);
+        let mut client = AdminClient::new(endpoint.connect().await.map_err(|error| nobody_at(url, &error))?);
         let request = proto::ReloadRequest { vehicle: vehicle.to_owned() };
-        let response =
-            client.reload(request).await.map_err(|status| no_server(status.message().to_owned()))?;
+        let no_answer = |status: tonic::Status| {
+            let reason = status.message().to_owned();
+            ClientError::NoServer { at: url.to_owned(), reason }
+        };
+        let response = client.reload(request).await.map_err(no_answer)?;
         Ok(response.into_inner().vehicles)
     })
 }
@@ -108,7 +109,7 @@ pub fn reload(url: &str, vehicle: &str, timeout: Duration) -> Result<Vec<proto::
 /// A runtime on which the calling thread does everything itself.
 fn runtime(url: &str) -> Result<Runtime, ClientError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    runtime.map_err(|error| ClientError::NoServer { at: url.to_owned(), reason: chain(&error) })
+    runtime.map_err(|error| ClientError::NoServer { at: url.to_owned(), reason: error.to_string() })
 }
 
 pub(super) fn message(state: &State) -> proto::State {

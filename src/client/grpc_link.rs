@@ -8,7 +8,7 @@ use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::grpc::{batch_message, message, shared};
-use super::{ClientError, chain};
+use super::{ClientError, nobody_at};
 use crate::service::proto;
 use crate::service::proto::hydrodynamics_client::HydrodynamicsClient;
 use crate::service::wire::State;
@@ -32,13 +32,9 @@ struct Open {
 impl GrpcLink {
     /// Connects to `http://HOST:PORT` or `unix:PATH`. The timeout is for this and for every call.
     pub async fn connect(url: &str, vehicle: &str, timeout: Duration) -> Result<Self, ClientError> {
-        let no_server = |error: &dyn std::error::Error| ClientError::NoServer {
-            at: url.to_owned(),
-            reason: chain(error),
-        };
-        let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|e| no_server(&e))?;
+        let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|e| nobody_at(url, &e))?;
         let endpoint = endpoint.connect_timeout(timeout).tcp_nodelay(true);
-        let channel = endpoint.connect().await.map_err(|e| no_server(&e))?;
+        let channel = endpoint.connect().await.map_err(|e| nobody_at(url, &e))?;
         let client = HydrodynamicsClient::new(channel).max_decoding_message_size(64 << 20);
         Ok(Self { client, url: url.to_owned(), vehicle: vehicle.to_owned(), timeout, stream: None })
     }

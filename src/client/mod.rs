@@ -79,10 +79,16 @@ pub enum ClientError {
     },
 }
 
-/// An error with what caused it.
-fn chain(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
+/// Nobody answers at a URL, for what an error and its causes say: each reason once, since some repeat their source.
+fn nobody_at(url: &str, error: &dyn std::error::Error) -> ClientError {
+    let mut reasons: Vec<String> = Vec::new();
+    for cause in std::iter::successors(Some(error), |error| error.source()).map(ToString::to_string) {
+        if !reasons.iter().any(|reason| reason.contains(&cause)) {
+            reasons.push(cause);
+        }
+    }
+    let way_out = "is wade serve running, and is this its grpc.listen or grpc.unix_socket?";
+    ClientError::NoServer { at: url.to_owned(), reason: format!("{}; {way_out}", reasons.join(": ")) }
 }
 
 /// The load on one surface as it travels.

@@ -12,7 +12,7 @@ use iceoryx2::port::client::{Client, RequestSendError};
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::port_name::PortName;
-use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ZeroCopySend, ipc_threadsafe};
+use iceoryx2::prelude::{MessagingPattern, PortFactory as _, ZeroCopySend, ipc_threadsafe};
 use iceoryx2::service::Service as _;
 use tonic::Code;
 
@@ -21,6 +21,7 @@ use crate::service::shm::{self, OpenError, ShmError, Wait};
 use crate::service::shm_layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, VERSION, wake_name,
 };
+use crate::service::shm_served::{self, Served};
 
 /// A link may be opened by one thread and used by another.
 type Ipc = ipc_threadsafe::Service;
@@ -69,7 +70,11 @@ impl ShmLink {
     pub fn open(names: &Names, vehicle: &str, wait: Wait) -> Result<Self, ClientError> {
         let at = || names.evaluate(vehicle);
         let failed = |error: ShmError| ClientError::NoServer { at: at(), reason: error.to_string() };
-        let node = shm::node::<Ipc>().map_err(failed)?;
+        // a client that waits for a server looks every now and then: what it does for that is to read a file
+        if is_absent(&at()) {
+            return Err(why_not(names, vehicle));
+        }
+        let node = shm::node::<Ipc>(&config()).map_err(failed)?;
         let not_open = |error: OpenError| match error {
             OpenError::Absent => why_not(names, vehicle),
             OpenError::OtherTypes => {
@@ -206,32 +211,38 @@ where
     if pending.number_of_server_connections() == 0 { Err(Lost::Server) } else { Ok(Asked(pending)) }
 }
 
-/// The reason why there is no server for a vehicle: what else is served in this namespace tells.
+/// The reason why there is no server for a vehicle: what the one of this namespace tells of itself.
 fn why_not(names: &Names, vehicle: &str) -> ClientError {
-    let (mut served, mut versions) = (Vec::new(), Vec::new());
-    let listed = Ipc::list(Config::global_config(), |service| {
-        match names.version_and_vehicle(service.static_details.name().as_str()) {
-            Some((VERSION, other)) if other != vehicle => served.push(other.to_owned()),
-            Some((version, _)) if version != VERSION => versions.push(version.to_owned()),
-            _ => {}
+    match shm_served::served::<Ipc>(names) {
+        Some(Served { layout, .. }) if layout != VERSION => {
+            ClientError::Layout { expected: VERSION.into(), found: layout }
         }
-        CallbackProgression::Continue
-    });
-    if let Err(error) = listed {
-        tracing::debug!(?error, "listing what is served");
+        Some(Served { vehicles, .. }) if vehicles.iter().all(|served| served != vehicle) => {
+            ClientError::UnknownVehicle { vehicle: vehicle.to_owned(), served: vehicles }
+        }
+        _ => {
+            let reason =
+                "no server has opened this service; is wade serve running with shm.enabled and this vehicle?";
+            ClientError::NoServer { at: names.evaluate(vehicle), reason: reason.into() }
+        }
     }
-    served.sort_unstable();
-    if !served.is_empty() {
-        return ClientError::UnknownVehicle { vehicle: vehicle.to_owned(), served };
-    }
-    versions.sort_unstable();
-    versions.dedup();
-    if !versions.is_empty() {
-        return ClientError::Layout { expected: VERSION.into(), found: versions.join(", ") };
-    }
-    let reason =
-        "no server has opened this service; is wade serve running with shm.enabled and this vehicle?".into();
-    ClientError::NoServer { at: names.evaluate(vehicle), reason }
+}
+
+/// True where nobody has created a service, as far as one look at its file tells.
+fn is_absent(service: &str) -> bool {
+    let name = service.try_into();
+    name.is_ok_and(|name| {
+        matches!(Ipc::details(&name, Config::global_config(), MessagingPattern::RequestResponse), Ok(None))
+    })
+}
+
+/// The settings of a client's node: what others left that were killed is the servers' to clear away, and that of those in a
+/// service is cleared when it is opened. All of the machine may be minutes of work.
+fn config() -> Config {
+    let mut config = Config::global_config().clone();
+    config.global.node.cleanup_dead_nodes_on_creation = false;
+    config.global.node.cleanup_dead_nodes_on_destruction = false;
+    config
 }
 
 /// A listener under a name that no other client has.

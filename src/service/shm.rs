@@ -23,7 +23,7 @@ use super::shm_layout::{
     Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
 };
 use super::wire::{InvalidState, Refusal, State};
-use super::{Evaluator, nanoseconds_since};
+use super::{Evaluator, nanoseconds_since, shm_served};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
 use crate::served::ServedVehicle;
@@ -94,9 +94,9 @@ impl ShmError {
 }
 
 /// A node that leaves the signals to their owner.
-pub(crate) fn node<S: Service>() -> Result<Node<S>, ShmError> {
-    let node = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<S>();
-    node.map_err(|error| {
+pub(crate) fn node<S: Service>(config: &iceoryx2::config::Config) -> Result<Node<S>, ShmError> {
+    let builder = NodeBuilder::new().config(config).signal_handling_mode(SignalHandlingMode::Disabled);
+    builder.create::<S>().map_err(|error| {
         let hint = "; its files lie in /tmp/iceoryx2 and /dev/shm and serve the one user who owns them";
         ShmError::new("a node")(&format!("{error}{hint}"))
     })
@@ -209,7 +209,16 @@ pub struct ShmServer {
     node: Node<ipc::Service>,
     doors: Vec<Door>,
     wake: Listener<ipc::Service>,
+    told: Told,
     desk: Desk,
+}
+
+/// What clients are told of this server.
+#[derive(Default)]
+struct Told {
+    vehicles: Vec<String>,
+    /// None where it could not be told.
+    _service: Option<event::PortFactory<ipc::Service>>,
 }
 
 /// What it takes to answer.
@@ -228,7 +237,8 @@ struct Desk {
 impl ShmServer {
     /// Opens the services of every vehicle that is served.
     pub fn new(config: Config, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Result<Self, ShmError> {
-        let node = node()?;
+        // clears away what servers left that were killed
+        let node = node(iceoryx2::config::Config::global_config())?;
         let names = Names::new(&config.namespace);
         let wake = events(&node, &names.wake())?.listener_builder().create();
         let done = events(&node, &names.done())?.notifier_builder().create();
@@ -242,10 +252,11 @@ impl ShmServer {
             sleepers: HashMap::new(),
         };
         let wake = wake.map_err(|error| ShmError::new("the listener")(&error))?;
-        let mut server = Self { config, names, node, doors: Vec::new(), wake, desk };
+        let mut server = Self { config, names, node, doors: Vec::new(), wake, told: Told::default(), desk };
         for vehicle in server.without_door() {
             server.open_door(vehicle)?;
         }
+        server.tell();
         Ok(server)
     }
 
@@ -292,6 +303,7 @@ impl ShmServer {
             if look && Instant::now() >= next_housekeeping {
                 next_housekeeping = Instant::now() + HOUSEKEEPING;
                 self.open_new_doors();
+                self.tell();
             }
         }
         let end = Instant::now() + HOUSEKEEPING;
@@ -305,6 +317,21 @@ impl ShmServer {
                 tracing::error!(%error, "a new vehicle is not served over shared memory");
             }
         }
+    }
+
+    /// Tells clients which vehicles there are, where that has changed.
+    fn tell(&mut self) {
+        let vehicles = self.desk.engine.vehicles();
+        if vehicles.keys().eq(&self.told.vehicles) {
+            return;
+        }
+        let vehicles: Vec<String> = vehicles.keys().cloned().collect();
+        // the name is free when the service before is closed
+        self.told = Told::default();
+        let service = shm_served::tell(&self.node, &self.names, &vehicles).inspect_err(|error| {
+            tracing::warn!(%error, "clients are not told which vehicles there are; is another server in this namespace?");
+        });
+        self.told = Told { vehicles, _service: service.ok() };
     }
 
     fn wait(&mut self, round: u32) {

@@ -6,6 +6,7 @@
 //! | `<namespace>/v3/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
 //! | `<namespace>/v3/wake` | event | a client wakes the server | |
 //! | `<namespace>/v3/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
+//! | `<namespace>/served` | event | nobody connects: its attributes tell [`SERVED_LAYOUT`] and [`SERVED_VEHICLES`], in every version | |
 //!
 //! The namespace is `wade` unless the server's configuration says otherwise.
 //!
@@ -30,6 +31,11 @@ pub const PROVENANCE_LEN: usize = 32;
 /// Version of the layout, as the names of the services have it.
 pub const VERSION: &str = "v3";
 
+/// Attribute of [`Names::served`]: the version of the layout.
+pub const SERVED_LAYOUT: &str = "layout";
+/// Attribute of [`Names::served`], as often as it takes: names of vehicles that are served, with a space between them.
+pub const SERVED_VEHICLES: &str = "vehicles";
+
 /// Names of the services of one server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Names {
@@ -52,10 +58,9 @@ impl Names {
         format!("{}/{VERSION}/evaluate_batch/{vehicle}", self.namespace)
     }
 
-    /// The version of the layout and the vehicle of a service for single queries in this namespace.
-    pub fn version_and_vehicle<'n>(&self, service: &'n str) -> Option<(&'n str, &'n str)> {
-        let (version, rest) = service.strip_prefix(&self.namespace)?.strip_prefix('/')?.split_once('/')?;
-        Some((version, rest.strip_prefix("evaluate/")?))
+    /// Service whose attributes tell which layout and vehicles are served, whatever the version of the layout.
+    pub fn served(&self) -> String {
+        format!("{}/served", self.namespace)
     }
 
     /// Event service on which clients wake the server.

@@ -1,5 +1,6 @@
 //! A client over any transport.
 
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use wade::service::shm::Wait;
@@ -9,7 +10,8 @@ use crate::abi::{WADE_MAX_BATCH, WADE_NEVER, WadeBatch, WadeForces, WadeState, W
 use crate::connection::Connection;
 use crate::convert::checked;
 use crate::grpc::Grpc;
-use crate::last::{Last, nanoseconds_since};
+use crate::known::Known;
+use crate::last::nanoseconds_since;
 use crate::shm::Shm;
 
 /// Longest budget that the clock is asked for.
@@ -18,9 +20,10 @@ const DAY: Duration = Duration::from_secs(86_400);
 /// A client of one vehicle of one server. Any number of threads may call it; their calls are answered one at a time.
 pub struct WadeClient {
     transport: Transport,
+    known: Arc<Known>,
     max_batch: usize,
     /// When the last batch was asked that was answered.
-    batch_asked: std::sync::Mutex<Option<Instant>>,
+    batch_asked: Mutex<Option<Instant>>,
 }
 
 enum Transport {
@@ -59,26 +62,22 @@ impl WadeClient {
             return None;
         }
         let max_batch = max_batch as usize;
+        let known = Arc::new(Known::new());
+        let of_transport = Arc::clone(&known);
         let transport = match address {
-            Address::Shm(namespace) => Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch).ok()?),
-            Address::Grpc(url) => Transport::Grpc(Grpc::open(url.clone(), vehicle, max_batch).ok()?),
+            Address::Shm(namespace) => {
+                Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch, of_transport).ok()?)
+            }
+            Address::Grpc(url) => {
+                Transport::Grpc(Grpc::open(url.clone(), vehicle, max_batch, of_transport).ok()?)
+            }
         };
-        Some(Self { transport, max_batch, batch_asked: std::sync::Mutex::default() })
+        Some(Self { transport, known, max_batch, batch_asked: Mutex::default() })
     }
 
     /// Whether it is connected.
     pub fn connection(&self) -> &Connection {
-        match &self.transport {
-            Transport::Shm(client) => client.connection(),
-            Transport::Grpc(client) => client.connection(),
-        }
-    }
-
-    fn last(&self) -> &Last {
-        match &self.transport {
-            Transport::Shm(client) => client.last(),
-            Transport::Grpc(client) => client.last(),
-        }
+        &self.known.connection
     }
 
     /// The forces in a state, or the last ones.
@@ -88,7 +87,7 @@ impl WadeClient {
         let valid = match checked(state) {
             Ok(valid) => valid,
             Err(invalid) => {
-                self.last().get(forces);
+                self.known.last.get(forces);
                 forces.blame(invalid);
                 return WadeStatus::InvalidState;
             }

@@ -10,9 +10,9 @@ use wade::service::wire::State;
 
 use crate::abi::{WADE_SESSION_BEGINS, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};
-use crate::connection::{Connection, RETRY, status_of};
+use crate::connection::{RETRY, status_of};
 use crate::event::Event;
-use crate::last::Last;
+use crate::known::Known;
 use crate::skipped::Skipped;
 
 /// A question that is open for longer than this has no server any more; also how long connecting may take.
@@ -27,8 +27,7 @@ pub struct Grpc {
 struct Shared {
     url: String,
     vehicle: String,
-    connection: Connection,
-    last: Last,
+    known: Arc<Known>,
     turn: Mutex<Turn>,
     /// The question for the worker, of which `asked` tells it.
     question: Mutex<Option<Question>>,
@@ -79,13 +78,12 @@ struct Batch {
 
 impl Grpc {
     /// Starts to connect to `http://HOST:PORT` or `unix:PATH`.
-    pub fn open(url: String, vehicle: &str, max_batch: usize) -> std::io::Result<Self> {
+    pub fn open(url: String, vehicle: &str, max_batch: usize, known: Arc<Known>) -> std::io::Result<Self> {
         let batch = Batch { states: Vec::with_capacity(max_batch), forces: Vec::with_capacity(max_batch) };
         let shared = Arc::new(Shared {
             url,
             vehicle: vehicle.to_owned(),
-            connection: Connection::new(),
-            last: Last::new(),
+            known,
             turn: Mutex::default(),
             question: Mutex::default(),
             asked: Arc::new(Event::new()?),
@@ -102,20 +100,10 @@ impl Grpc {
                 Ok(Err(error)) => error.to_string(),
                 Err(_) => "the thread that has the connection broke down".into(),
             };
-            worked.connection.tell(WadeStatus::Internal, reason);
+            worked.known.connection.tell(WadeStatus::Internal, reason);
         };
         let worker = thread::Builder::new().name("wade-grpc".into()).spawn(work)?;
         Ok(Self { shared, worker })
-    }
-
-    /// Whether it is connected.
-    pub fn connection(&self) -> &Connection {
-        &self.shared.connection
-    }
-
-    /// The last answer.
-    pub fn last(&self) -> &Last {
-        &self.shared.last
     }
 
     /// Asks for the forces in a state until the deadline, and copies the last answer: where it says `Ok`, that to this state.
@@ -134,7 +122,7 @@ impl Grpc {
             Some(turn) => shared.evaluate(turn, state, session, start, deadline),
         };
         // while it is still this thread's turn, so that no other's answer comes between
-        shared.last.get(forces);
+        shared.known.last.get(forces);
         drop(turn);
         status
     }
@@ -149,7 +137,7 @@ impl Grpc {
     ) -> WadeStatus {
         let shared = &*self.shared;
         let Some(mut turn) = lock_until(&shared.turn, deadline) else { return WadeStatus::Timeout };
-        let status = shared.connection.status();
+        let status = shared.known.connection.status();
         if status != WadeStatus::Ok {
             return status;
         }
@@ -172,7 +160,7 @@ impl Grpc {
 
     /// Ends the client's thread.
     pub fn close(self) {
-        self.shared.connection.stop();
+        self.shared.known.connection.stop();
         self.shared.asked.set();
         // a panic of it has been told to the connection
         let _ = self.worker.join();
@@ -188,7 +176,7 @@ impl Shared {
         start: Instant,
         deadline: Instant,
     ) -> WadeStatus {
-        let status = self.connection.status();
+        let status = self.known.connection.status();
         if status != WadeStatus::Ok {
             // what was remembered is lost with the connection
             turn.skipped = Skipped::default();
@@ -247,14 +235,14 @@ impl Shared {
     /// Connects, answers until the server is lost, and connects again.
     async fn work(&self) -> std::io::Result<()> {
         let asked = self.asked.register()?;
-        while !self.connection.is_stopped() {
+        while !self.known.connection.is_stopped() {
             match self.connect().await {
                 Ok(link) => {
-                    self.connection.opened();
+                    self.known.connection.opened();
                     self.serve(link, &asked).await?;
                 }
                 Err(error) => {
-                    self.connection.failed(&error);
+                    self.known.connection.failed(&error);
                     tokio::time::sleep(RETRY).await;
                 }
             }
@@ -278,7 +266,7 @@ impl Shared {
                 let mut ready = asked.readable().await?;
                 self.asked.clear();
                 ready.clear_ready();
-                if self.connection.is_stopped() {
+                if self.known.connection.is_stopped() {
                     return Ok(());
                 }
                 continue;
@@ -287,7 +275,7 @@ impl Shared {
                 What::Batch => self.answer_batch(&mut link).await,
                 What::State { state, session: of } => {
                     let forces = answer(&mut link, &state, of, &mut session).await;
-                    forces.map(|forces| self.last.put(forces, question.at))
+                    forces.map(|forces| self.known.last.put(forces, question.at))
                 }
             };
             let status = answer.as_ref().map_or_else(status_of, |()| WadeStatus::Ok);
@@ -297,7 +285,7 @@ impl Shared {
             });
             // told before the caller goes on
             if let Some(error) = &lost {
-                self.connection.failed(error);
+                self.known.connection.failed(error);
             }
             *lock(&self.done) = Done { number: question.number, status };
             self.answered.set();

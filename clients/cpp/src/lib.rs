@@ -13,6 +13,7 @@ mod convert;
 mod event;
 mod exports;
 mod grpc;
+mod known;
 mod last;
 mod pool;
 mod shm;

@@ -12,9 +12,9 @@ use wade::service::wire::State;
 
 use crate::abi::{WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};
-use crate::connection::{Connection, RETRY};
+use crate::connection::RETRY;
 use crate::convert::answered;
-use crate::last::Last;
+use crate::known::Known;
 use crate::skipped::Skipped;
 
 /// A question that is open for longer than this has no server any more. iceoryx2 says nothing of one that was killed.
@@ -30,8 +30,7 @@ struct Shared {
     names: Names,
     vehicle: String,
     wait: Wait,
-    connection: Connection,
-    last: Last,
+    known: Arc<Known>,
     turn: Mutex<Turn>,
 }
 
@@ -55,7 +54,13 @@ struct Open {
 
 impl Shm {
     /// Starts to look for the server of a namespace.
-    pub fn open(namespace: &str, vehicle: &str, wait: Wait, max_batch: usize) -> std::io::Result<Self> {
+    pub fn open(
+        namespace: &str,
+        vehicle: &str,
+        wait: Wait,
+        max_batch: usize,
+        known: Arc<Known>,
+    ) -> std::io::Result<Self> {
         let turn = Turn {
             link: None,
             open: None,
@@ -68,23 +73,12 @@ impl Shm {
             names: Names::new(namespace),
             vehicle: vehicle.to_owned(),
             wait,
-            connection: Connection::new(),
-            last: Last::new(),
+            known,
             turn: Mutex::new(turn),
         });
         let kept = Arc::clone(&shared);
         let keeper = thread::Builder::new().name("wade-shm".into()).spawn(move || kept.keep_watched())?;
         Ok(Self { shared, keeper })
-    }
-
-    /// Whether it is connected.
-    pub fn connection(&self) -> &Connection {
-        &self.shared.connection
-    }
-
-    /// The last answer.
-    pub fn last(&self) -> &Last {
-        &self.shared.last
     }
 
     /// Asks for the forces in a state until the deadline, and copies the last answer: where it says `Ok`, that to this state.
@@ -98,14 +92,14 @@ impl Shm {
     ) -> WadeStatus {
         let turn = lock_until(&self.shared.turn, deadline);
         let Some(mut turn) = turn else {
-            self.shared.last.get(forces);
+            self.shared.known.last.get(forces);
             return WadeStatus::Timeout;
         };
         let query = Query { session, ..Query::from(state) };
         let status = turn.evaluate(&self.shared, query, start, deadline);
         self.wake_keeper(&turn);
         // while it is still this thread's turn, so that no other's answer comes between
-        self.shared.last.get(forces);
+        self.shared.known.last.get(forces);
         status
     }
 
@@ -136,7 +130,7 @@ impl Shm {
 
     /// Ends the client's thread.
     pub fn close(self) {
-        self.shared.connection.stop();
+        self.shared.known.connection.stop();
         self.keeper.thread().unpark();
         // a panic of it has been told to the connection
         let _ = self.keeper.join();
@@ -151,7 +145,7 @@ impl Turn {
             match link.answer(&open.asked, deadline, answered) {
                 Ok(Some(answer)) => {
                     if let Ok(forces) = answer {
-                        shared.last.put(forces, open.at);
+                        shared.known.last.put(forces, open.at);
                     }
                     self.open = None;
                 }
@@ -164,7 +158,7 @@ impl Turn {
         self.skipped.asked();
         match link.answer(&asked, deadline, answered) {
             Ok(Some(Ok(forces))) => {
-                shared.last.put(forces, start);
+                shared.known.last.put(forces, start);
                 WadeStatus::Ok
             }
             Ok(Some(Err(refused))) => refused,
@@ -205,7 +199,7 @@ impl Turn {
     }
 
     fn give_up(&mut self, shared: &Shared, status: WadeStatus) -> WadeStatus {
-        shared.connection.lost();
+        shared.known.connection.lost();
         // what was remembered is lost with the link
         (self.skipped, self.batch_asked) = (Skipped::default(), None);
         self.given_up = self.link.take().map(|link| (link, self.open.take()));
@@ -232,7 +226,7 @@ fn take(answer: &BatchAnswer, count: usize, batch: &mut Vec<WadeForces>) -> Wade
 impl Shared {
     /// Why there is no link.
     fn why_not(&self) -> WadeStatus {
-        match self.connection.status() {
+        match self.known.connection.status() {
             WadeStatus::Ok => WadeStatus::NoServer,
             status => status,
         }
@@ -241,14 +235,15 @@ impl Shared {
     fn keep_watched(&self) {
         let kept = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.keep()));
         if kept.is_err() {
-            self.connection
+            self.known
+                .connection
                 .tell(WadeStatus::Internal, "the thread that keeps the connection broke down".into());
         }
     }
 
     /// Opens a link where there is none, and closes what was given up.
     fn keep(&self) {
-        while !self.connection.is_stopped() {
+        while !self.known.connection.is_stopped() {
             let mut turn = lock(&self.turn);
             let (given_up, linked) = (turn.given_up.take(), turn.link.is_some());
             drop(turn);
@@ -263,10 +258,10 @@ impl Shared {
                 Ok(link) => {
                     let mut turn = lock(&self.turn);
                     turn.link = Some(link);
-                    self.connection.opened();
+                    self.known.connection.opened();
                 }
                 Err(error) => {
-                    self.connection.failed(&error);
+                    self.known.connection.failed(&error);
                     thread::park_timeout(RETRY);
                 }
             }

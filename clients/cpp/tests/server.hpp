@@ -75,7 +75,7 @@ class Server {
   // Returns when it answers for a vehicle of the folder.
   void start(const std::filesystem::path &vehicles, const char *vehicle) {
     kill();
-    const std::string binary = environment("WADE_BIN"), config = (folder_ / "wade.toml").string();
+    const std::string config = (folder_ / "wade.toml").string(), binary = binary_.string();
     const std::string log = (folder_ / "log").string(), from = vehicles.string();
     process_ = fork();
     CHECK(process_ >= 0);
@@ -119,6 +119,9 @@ class Server {
   // Lets it go on.
   void thaw() { ::kill(process_, SIGCONT); }
 
+  // Starts this binary from now on.
+  void serve_with(const std::filesystem::path &binary) { binary_ = binary; }
+
   const std::filesystem::path &folder() const { return folder_; }
   const std::string &tcp() const { return tcp_; }
   std::string shm() const { return "shm:" + namespace_; }
@@ -127,7 +130,7 @@ class Server {
   std::vector<std::string> addresses() const { return {shm(), tcp_, "unix:" + unix_}; }
 
  private:
-  std::filesystem::path folder_;
+  std::filesystem::path folder_, binary_ = environment("WADE_BIN");
   std::string tcp_, unix_, namespace_;
   pid_t process_ = 0;
 };

@@ -196,6 +196,16 @@ def offer(service: str, query: Any) -> Any:
     return node, factory, factory.server_builder().create()
 
 
+def tell(namespace: str, version: str, vehicles: str) -> Any:
+    """What a server of another version would tell of itself."""
+    node = iox.NodeBuilder.new().create(iox.ServiceType.Ipc)
+    told = iox.AttributeSpecifier.new()
+    for key, value in ((shm_layout.SERVED_LAYOUT, version), (shm_layout.SERVED_VEHICLES, vehicles)):
+        told = told.define(iox.AttributeKey.new(key), iox.AttributeValue.new(value))
+    builder = node.service_builder(iox.ServiceName.new(shm_layout.served_name(namespace))).event()
+    return node, builder.create_with_attributes(told)
+
+
 class LongerQuery(ctypes.Structure):
     _fields_ = [("words", ctypes.c_uint64 * 14)]
 
@@ -206,7 +216,7 @@ class LongerQuery(ctypes.Structure):
 
 def test_another_layout_version_is_told(mortal_server: Server) -> None:
     with wade.ShmClient(mortal_server.namespace) as client:
-        server = offer(f"{mortal_server.namespace}/v0/evaluate/husky", shm_layout.Query)
+        server = tell(mortal_server.namespace, "v0", "husky")
         for call in (lambda: client.evaluate("husky", STATE), lambda: client.vehicles()):
             with pytest.raises(wade.LayoutMismatch) as caught:
                 call()
@@ -254,11 +264,11 @@ def test_a_batch_never_mixes_two_bundles(kind: str, mortal_server: Server, loop:
     states = wade.State(depth_m=np.full(1024, 0.15), velocity_mps=(0.5, 0.2, 0))
     done = threading.Event()
 
-    def exchange() -> None:
+    def exchange(pause_s: float) -> None:
         with grpc.insecure_channel(mortal_server.address) as channel:
             admin, next_link = admin_pb2_grpc.AdminStub(channel), vehicles.parent / "next"
             for target in itertools.cycle((higher, lower)):
-                if done.wait(0.05):
+                if done.wait(pause_s):
                     return
                 next_link.symlink_to(target)
                 next_link.replace(vehicles / "husky")
@@ -266,7 +276,10 @@ def test_a_batch_never_mixes_two_bundles(kind: str, mortal_server: Server, loop:
 
     seen: dict[int, tuple[float, ...]] = {}
     with connect(kind, mortal_server, loop, timeout_s=20.0) as client, ThreadPoolExecutor(1) as pool:
-        exchanging = pool.submit(exchange)
+        # a batch that takes longer than the pause between two exchanges is begun again for ever
+        start = time.monotonic()
+        client.evaluate_batch("husky", states)
+        exchanging = pool.submit(exchange, 4 * (time.monotonic() - start))
         try:
             # until both were seen, and a while longer
             for _ in itertools.takewhile(lambda turn: len(seen) < 2 or turn < 20, itertools.count()):

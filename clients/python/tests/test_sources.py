@@ -131,6 +131,7 @@ def test_the_names_are_the_servers() -> None:
     ours = (
         shm_layout.evaluate_name("", "{vehicle}"),
         shm_layout.evaluate_batch_name("", "{vehicle}"),
+        shm_layout.served_name(""),
         shm_layout.wake_name(""),
         shm_layout.done_name(""),
     )

@@ -20,7 +20,7 @@ from . import shm_layout as layout
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
 from .forces import Array, Effect, Forces, named_effect
-from .shm_link import Link, Lost, memory
+from .shm_link import Link, Lost, memory, vehicles
 from .state import GroundContact, State
 
 _T = TypeVar("_T")
@@ -107,11 +107,7 @@ class ShmClient:
     def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
         """Names of the vehicles that are served. This asks the system, not the server, and does not wait."""
         self._end(timeout_s)
-        link = Link(self.namespace, blocks=False)
-        served = link.served()
-        if not served:
-            raise link.why_not("any vehicle")
-        return served
+        return vehicles(self.namespace)
 
     def close(self) -> None:
         """Gives up the ports. A call after it opens new ones."""

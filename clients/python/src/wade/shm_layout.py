@@ -17,6 +17,10 @@ MAX_SURFACES = 64
 #: Most effects that a vehicle can have.
 PHYSICS = 14
 
+#: Attributes of the service of `served_name`: the version of the layout, and lists of the vehicles that are served.
+SERVED_LAYOUT = "layout"
+SERVED_VEHICLES = "vehicles"
+
 #: Flag of a query: no water pressure under the contact patches.
 DRY_CONTACT = 1
 #: Flag of a query: the caller integrates added mass.
@@ -170,6 +174,11 @@ def evaluate_name(namespace: str, vehicle: str) -> str:
 def evaluate_batch_name(namespace: str, vehicle: str) -> str:
     """Name of a vehicle's service for batches."""
     return f"{namespace}/{VERSION}/evaluate_batch/{vehicle}"
+
+
+def served_name(namespace: str) -> str:
+    """Name of the service whose attributes tell what is served, whatever the version of the layout."""
+    return f"{namespace}/served"
 
 
 def wake_name(namespace: str) -> str:

@@ -36,6 +36,41 @@ class Lost(Exception):
     """No server is connected to the port any more."""
 
 
+def vehicles(namespace: str) -> list[str]:
+    """Names of the vehicles that the server of a namespace tells of. Reads one file and asks nobody.
+
+    Raises `ServerUnavailable` where no server lives, `LayoutMismatch` where it is of another layout.
+    """
+    name, pattern = iox.ServiceName.new(layout.served_name(namespace)), iox.MessagingPattern.Event
+    try:
+        details = iox.Service.details(name, iox.config.global_config(), pattern, iox.ServiceType.Ipc)
+    except iox.ServiceDetailsError as failure:
+        raise ServerUnavailable(_at(namespace), str(failure)) from None
+    if details is None or not any(isinstance(node, iox.NodeState.Alive) for node in details.nodes()):
+        raise ServerUnavailable(
+            _at(namespace), "no server; is wade serve running with shared memory and this namespace?"
+        )
+
+    def told(key: str) -> str:
+        return " ".join(value.to_string() for value in details.attributes().key_values(iox.AttributeKey.new(key)))
+
+    if told(layout.SERVED_LAYOUT) != layout.VERSION:
+        raise LayoutMismatch(layout.VERSION, told(layout.SERVED_LAYOUT))
+    return told(layout.SERVED_VEHICLES).split()
+
+
+def _at(namespace: str) -> str:
+    return f"shared memory, namespace {namespace!r}"
+
+
+def _config() -> Any:
+    """The settings of a client's node: what others left that were killed is for servers to clear away."""
+    config = iox.config.global_config()
+    config.global_cfg.node.cleanup_dead_nodes_on_creation = False
+    config.global_cfg.node.cleanup_dead_nodes_on_destruction = False
+    return config
+
+
 class Link:
     """What a client holds open in one namespace. Raises the errors of the package, and `Lost`."""
 
@@ -48,7 +83,7 @@ class Link:
         self._ports: dict[tuple[str, bool], Any] = {}
         try:
             # the signals belong to the program
-            builder = iox.NodeBuilder.new().signal_handling_mode(iox.SignalHandlingMode.Disabled)
+            builder = iox.NodeBuilder.new().config(_config()).signal_handling_mode(iox.SignalHandlingMode.Disabled)
             self._node = builder.create(iox.ServiceType.Ipc)
         except _FAILURES as failure:
             raise ServerUnavailable(
@@ -77,30 +112,18 @@ class Link:
         except _FAILURES as failure:
             raise ServerUnavailable(self._at(), str(failure)) from None
 
-    def served(self) -> list[str]:
-        """Names of the vehicles that a server serves here."""
-        prefix = layout.evaluate_name(self._namespace, "")
-        names = [name.removeprefix(prefix) for name in self._services() if name.startswith(prefix)]
-        return sorted(name for name in names if self._has_server(name))
-
     def why_not(self, vehicle: str) -> Exception:
         """The reason why there is no server for a vehicle."""
-        served = self.served()
-        if served and vehicle not in served:
+        try:
+            served = vehicles(self._namespace)
+        except (LayoutMismatch, ServerUnavailable) as failure:
+            return failure
+        if vehicle not in served:
             return UnknownVehicle(vehicle, f"vehicle {vehicle!r} is not served; there are: {', '.join(served)}")
-        parts = (name.split("/") for name in self._services())
-        versions = {p[1] for p in parts if p[0] == self._namespace and p[2:3] == ["evaluate"]} - {layout.VERSION}
-        if versions and not served:
-            return LayoutMismatch(layout.VERSION, ", ".join(sorted(versions)))
-        return ServerUnavailable(
-            self._at(), f"no server has opened {vehicle}; is wade serve running with shared memory and this namespace?"
-        )
+        return ServerUnavailable(self._at(), f"the server has not opened {vehicle}")
 
     def _at(self) -> str:
-        return f"shared memory, namespace {self._namespace!r}"
-
-    def _services(self) -> list[str]:
-        return [s.name().to_string() for s in iox.Service.list(iox.config.global_config(), iox.ServiceType.Ipc)]
+        return _at(self._namespace)
 
     def _exchange_service(self, vehicle: str, batch: bool) -> Any:
         types = (layout.BatchQuery, layout.BatchAnswer) if batch else (layout.Query, layout.Answer)
@@ -116,12 +139,6 @@ class Link:
             if str(failure) == "IncompatibleRequestOrResponseType":
                 raise LayoutMismatch(layout.VERSION, f"{name} with other types") from None
             raise
-
-    def _has_server(self, vehicle: str) -> bool:
-        try:
-            return bool(self._exchange_service(vehicle, False).dynamic_config.number_of_servers)
-        except (LayoutMismatch, *_FAILURES):
-            return False
 
     def _open(self, vehicle: str, batch: bool) -> Any:
         service = self._exchange_service(vehicle, batch)

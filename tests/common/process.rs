@@ -1,0 +1,60 @@
+//! A server of shared memory alone in a process of its own, which a test can kill.
+
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use wade::client::ShmClient;
+use wade::service::shm_layout::Answer;
+use wade::service::wire::State;
+
+use crate::common::{PATIENCE, vehicles};
+
+pub struct Process(Child);
+
+impl Process {
+    pub fn start(folder: &Path, namespace: &str, wait: &str) -> Self {
+        let file = folder.join("wade.toml");
+        let settings = format!(
+            "vehicles = \"{}\"\n[grpc]\nlisten = \"\"\nunix_socket = \"\"\n[http]\nlisten = \"\"\n\
+             [shm]\nnamespace = \"{namespace}\"\nwait = \"{wait}\"\n[log]\nfilter = \"error\"\n",
+            vehicles().display()
+        );
+        std::fs::write(&file, settings).expect("written");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+        command.arg("serve").arg("--config").arg(file).stdin(Stdio::null());
+        Self(command.spawn().expect("the server starts"))
+    }
+
+    /// Ends it as nothing can prepare for.
+    pub fn kill(mut self) {
+        self.0.kill().expect("killed");
+        let status = self.0.wait().expect("reaped");
+        assert_eq!(status.signal(), Some(9));
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A state that is answered.
+pub fn state() -> State {
+    State { depth: 0.15, velocity: [0.5, 0.0, 0.0], ..State::default() }
+}
+
+/// Asks until somebody answers.
+pub fn until_answered(client: &mut ShmClient) -> Answer {
+    let start = Instant::now();
+    loop {
+        match client.evaluate(&state()) {
+            Ok(answer) => return answer,
+            Err(error) => assert!(start.elapsed() < PATIENCE, "never answered: {error}"),
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}

@@ -1,0 +1,121 @@
+//! Promise: a client that gets no answer over shared memory says why, by asking for the one server it wants: what others left
+//! behind that were killed is neither gone through nor cleared away. That is a server's work when it starts.
+
+mod common;
+
+#[path = "common/process.rs"]
+mod process;
+
+use common::PATIENCE;
+use iceoryx2::config::Config;
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::prelude::{AttributeSpecifier, MessagingPattern, Service as _, ipc};
+use process::{Process, state, until_answered};
+use tempfile::TempDir;
+use wade::client::{ClientError, ShmClient};
+use wade::service::shm::Wait;
+use wade::service::shm_layout::{Names, SERVED_LAYOUT, SERVED_VEHICLES};
+
+/// From here on this process and its children have an iceoryx2 of their own, in which nobody else cleans up.
+struct OwnIceoryx {
+    folder: TempDir,
+    prefix: String,
+}
+
+impl OwnIceoryx {
+    fn new() -> Self {
+        let (folder, prefix) =
+            (TempDir::new().expect("a folder"), format!("remains_{}_", std::process::id()));
+        let root = folder.path().join("root/");
+        let settings = format!("[global]\nroot-path = \"{}\"\nprefix = \"{prefix}\"\n", root.display());
+        std::fs::create_dir(folder.path().join("config")).expect("a folder");
+        std::fs::write(folder.path().join("config/iceoryx2.toml"), settings).expect("written");
+        std::env::set_current_dir(folder.path()).expect("there");
+        assert_eq!(Config::global_config().global.prefix.to_string(), prefix);
+        Self { folder, prefix }
+    }
+
+    fn start(&self, namespace: &str) -> Process {
+        let settings = self.folder.path().join(namespace);
+        std::fs::create_dir(&settings).expect("a folder");
+        Process::start(&settings, namespace, "block")
+    }
+}
+
+impl Drop for OwnIceoryx {
+    fn drop(&mut self) {
+        for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&self.prefix) {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+fn client(vehicle: &str, namespace: &str) -> ShmClient {
+    ShmClient::new(vehicle, Wait::Block, PATIENCE).in_namespace(namespace)
+}
+
+fn error(vehicle: &str, namespace: &str) -> ClientError {
+    client(vehicle, namespace).evaluate(&state()).expect_err("nobody answers")
+}
+
+fn is_there(namespace: &str) -> bool {
+    let service = Names::new(namespace).evaluate("husky");
+    let name = service.as_str().try_into().expect("a name");
+    ipc::Service::does_exist(&name, Config::global_config(), MessagingPattern::RequestResponse).expect("told")
+}
+
+/// A node that leaves the remains alone.
+fn node() -> Node<ipc::Service> {
+    let mut config = Config::global_config().clone();
+    config.global.node.cleanup_dead_nodes_on_creation = false;
+    config.global.node.cleanup_dead_nodes_on_destruction = false;
+    NodeBuilder::new().config(&config).create().expect("a node")
+}
+
+#[test]
+fn the_reason_is_right_among_the_remains_of_other_servers() {
+    let own = OwnIceoryx::new();
+    // names that begin as ours does, and the other way round
+    let others = ["ford", "ford-2", "for", "bed"];
+    let servers = others.map(|namespace| own.start(namespace));
+    for namespace in others {
+        until_answered(&mut client("husky", namespace));
+    }
+    for server in servers {
+        server.kill();
+    }
+
+    let error_without_server = error("husky", "ford-1");
+    assert!(matches!(error_without_server, ClientError::NoServer { .. }), "{error_without_server:?}");
+    assert!(error_without_server.to_string().contains("is wade serve running"), "{error_without_server}");
+    assert_eq!(others.map(is_there), [true; 4], "what others left is theirs");
+
+    // a server of another layout
+    let node = node();
+    let attributes = AttributeSpecifier::new()
+        .define(&SERVED_LAYOUT.try_into().expect("a key"), &"v9".try_into().expect("a value"))
+        .and_then(|told| {
+            told.define(&SERVED_VEHICLES.try_into().expect("a key"), &"husky".try_into().expect("a value"))
+        })
+        .expect("two attributes");
+    let name = Names::new("ford-1").served().as_str().try_into().expect("a name");
+    let foreign = node.service_builder(&name).event().create_with_attributes(&attributes).expect("created");
+    let found = error("husky", "ford-1");
+    assert!(matches!(&found, ClientError::Layout { found, .. } if found == "v9"), "{found:?}");
+    drop((foreign, node));
+
+    // one that was killed, asked for by name, is nobody, and is cleared away by whoever opens it
+    let found = error("husky", "bed");
+    assert!(matches!(found, ClientError::NoServer { .. }), "{found:?}");
+    assert_eq!(others.map(is_there), [true, true, true, false]);
+
+    // a server that serves others, which clears away the rest
+    let _server = own.start("ford-1");
+    until_answered(&mut client("husky", "ford-1"));
+    let found = error("nautilus", "ford-1");
+    let ClientError::UnknownVehicle { served, .. } = &found else { panic!("{found:?}") };
+    assert_eq!(served, &["husky", "warthog"]);
+    assert_eq!(others.map(is_there), [false; 4]);
+}
