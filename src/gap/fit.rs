@@ -2,8 +2,9 @@
 //!
 //! Least squares on the rows of the design, corrected for noise in the accelerations: a column with a share `s` of noise in
 //! its variance pulls its coefficient down by `1 - s` (Fuller, Measurement Error Models, section 1.2), so that share is
-//! taken off the normal matrix. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, and what
-//! the formula itself leaves open.
+//! taken off the normal matrix. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, its ends
+//! moved out for the few that there are (the expanded percentile of Hesterberg, The American Statistician 2015), and what the
+//! formula itself leaves open.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -15,7 +16,7 @@ use super::judge::Member;
 use super::rates::accelerations;
 use super::robust::errors;
 use super::series::Series;
-use super::statistics::quantile;
+use super::statistics::{quantile, student_from_normal};
 use crate::effects::{Effect, Kind, Shape};
 use crate::random::Random;
 
@@ -107,7 +108,13 @@ pub(super) fn fit(
     let interval = |i: usize| {
         let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale[i]).collect();
         let drawn = [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)];
-        drawn.map(|end| values[i] + (end - values[i]).signum() * (end - values[i]).hypot(Z90 * formula(i)))
+        // draws scatter by n - 1 of n of the variance, and as a normal variable, not as Student's
+        let freedom = errors[i].freedom.max(1.0);
+        let expansion = student_from_normal(Z90, freedom) / Z90 * ((freedom + 1.0) / freedom).sqrt();
+        drawn.map(|end| {
+            let reach = (end - values[i]) * expansion;
+            values[i] + reach.signum() * reach.hypot(Z90 * formula(i))
+        })
     };
     let intervals = (0..count).map(interval).collect();
     let mut shape_std = vec![[0.0; 3]; set.len()];

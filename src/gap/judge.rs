@@ -181,7 +181,13 @@ impl<'a> Judge<'a> {
         f64::max(self.config.share_of_remaining * remaining, of_whole)
     }
 
-    pub fn judge_form(&self, set: &[Member], base: &[usize], before: f64, candidate: usize) -> Option<Judged> {
+    pub fn judge_form(
+        &self,
+        set: &[Member],
+        base: &[usize],
+        before: f64,
+        candidate: usize,
+    ) -> Option<Judged> {
         let effect = self.design.candidates[candidate].effect;
         let mut own = self.design.candidates[candidate].columns.clone();
         // two that say the same cancel each other at any size, and so explain what neither does

@@ -59,6 +59,13 @@ pub(super) fn normal_from_student(t: f64, freedom: f64) -> f64 {
     (8.0 * n + 1.0) / (8.0 * n + 3.0) * root
 }
 
+/// Student's `t` with `freedom` degrees that is as rare as a normal deviate: the inverse of [`normal_from_student`].
+pub(super) fn student_from_normal(z: f64, freedom: f64) -> f64 {
+    let n = freedom.max(1.0);
+    let root = z * (8.0 * n + 3.0) / (8.0 * n + 1.0);
+    (n * (root * root / n).exp_m1()).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -71,6 +78,10 @@ mod tests {
         // Student's two-sided 1 % point for 10 degrees is 3.169, for 50 degrees 2.678
         for (t, freedom) in [(3.169, 10.0), (2.678, 50.0)] {
             assert!((normal_tails(normal_from_student(t, freedom)) / 0.01 - 1.0).abs() < 0.05);
+        }
+        // and the two-sided 10 % points for 5, 10 and 50 degrees
+        for (t, freedom) in [(2.015, 5.0), (1.812, 10.0), (1.676, 50.0)] {
+            assert!((student_from_normal(1.645, freedom) / t - 1.0).abs() < 0.01, "{freedom}");
         }
     }
 
