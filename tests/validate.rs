@@ -518,12 +518,11 @@ fn bad_input_names_the_file_and_writes_nothing() {
     assert!(message.contains("--vehicle husky"), "{message}");
 
     let out = root.join("none");
-    for (arguments, expected) in [
-        (vec!["--trials", "nowhere"], "nowhere"),
-        (vec!["--generated", "1", "--vehicles", "nowhere"], "warthog"),
-        (vec!["--generated", "1", "--config", "nowhere.toml"], "nowhere.toml"),
+    for (output, expected) in [
+        (validate(&["--trials", "nowhere"], &out), "nowhere"),
+        (validate(&["--generated", "1", "--vehicles", "nowhere"], &out), "warthog"),
+        (validate_by(Path::new("nowhere.toml"), &["--generated", "1"], &out), "nowhere.toml"),
     ] {
-        let output = validate(&arguments, &out);
         assert_eq!(output.status.code(), Some(1));
         assert!(stderr(&output).contains(expected), "{}", stderr(&output));
         assert!(!out.exists());
