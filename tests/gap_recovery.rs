@@ -6,11 +6,12 @@
 #[path = "common/planted.rs"]
 mod planted;
 
-use planted::{Noise, State, motions, planted as plant, pushes, rms, trials};
+use planted::{Noise, State, gaussian, motions, planted as plant, pushes, rms, trials};
 use wade::condition::Condition;
 use wade::effects::Effect;
 use wade::frame::Vec3;
 use wade::gap::{self, Config, GapError, Predicted, Report, Verdict};
+use wade::random::Random;
 use wade::trials::{Method, Trials};
 use wade::wrench::Wrench;
 
@@ -194,7 +195,11 @@ fn within_the_model_s_error(name: &str, bias: f64) -> (Report, f64) {
             unit.iter().zip(drag).map(sum).collect()
         })
         .collect();
-    let mut trials = trials(&motions, &added, &Noise::white(NOISE), 25);
+    (run_with_doubts(trials(&motions, &added, &Noise::white(NOISE), 25)), factor)
+}
+
+/// The workflow with a model that states six noises of itself.
+fn run_with_doubts(mut trials: Trials) -> Report {
     trials.trials.iter_mut().for_each(|trial| trial.simulated = Default::default());
     let body = gap::body_of(&trials).expect("a body");
     let mut model = |condition: &Condition| {
@@ -202,7 +207,7 @@ fn within_the_model_s_error(name: &str, bias: f64) -> (Report, f64) {
         let wrench = Wrench { force: Vec3::new(fx, fy, fz), moment: Vec3::new(mx, my, mz) };
         Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise) }
     };
-    (gap::run(&trials, &body, &mut model, &Config::default()).expect("runs"), factor)
+    gap::run(&trials, &body, &mut model, &Config::default()).expect("runs")
 }
 
 #[test]
@@ -216,6 +221,32 @@ fn what_the_model_is_not_told_is_named_however_wrong_the_model_says_it_is_and_wh
     // a drag of that size is what the model said of itself
     let (report, _) = within_the_model_s_error("drag_coefficient_error", 0.0);
     assert!(report.effects.is_empty(), "{} {:?}", report.summary, names(&report));
+}
+
+#[test]
+fn an_error_that_the_model_states_of_itself_and_that_differs_from_trial_to_trial_hides_no_added_mass() {
+    let motions = motions(TRIALS, SAMPLES, 26);
+    let unit: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| plant("added_mass", motion)).collect();
+    let factor = 2.0 * NOISE[0] / rms(&unit)[0];
+    let mut random = Random::new(26);
+    let added: Vec<Vec<[f64; 6]>> = motions
+        .iter()
+        .zip(&unit)
+        .map(|(motion, unit)| {
+            let error: [[f64; 2]; 6] =
+                std::array::from_fn(|c| [4.0, 4.0].map(|size| size * NOISE[c] * gaussian(&mut random)));
+            let squares = |s: &State| s.v.norm_squared();
+            let mean = motion.iter().map(squares).sum::<f64>() / motion.len() as f64;
+            let of = |(s, u): (&State, &[f64; 6])| {
+                std::array::from_fn(|c| factor * u[c] + error[c][0] + error[c][1] * squares(s) / mean)
+            };
+            motion.iter().zip(unit).map(of).collect()
+        })
+        .collect();
+    let report = run_with_doubts(trials(&motions, &added, &Noise::white(NOISE), 26));
+    assert_eq!(names(&report), ["added_mass"], "{} {:?}", report.summary, report.rejected);
+    let found = report.effects[0].parameters["surge"].value;
+    assert!((found / factor - 1.0).abs() < 0.2, "{found}, planted {factor}");
 }
 
 #[test]

@@ -35,6 +35,9 @@ pub enum Set {
     Unsteady,
     /// Cases that others know the answer of: at rest, head-on at the paper's depths, three meshes.
     Check,
+    /// Straight ahead over the depths and speeds of the table: how a vehicle is driven most, and an edge of the
+    /// hypercube that holds next to no case.
+    Ahead,
 }
 
 impl fmt::Display for Set {
@@ -45,6 +48,7 @@ impl fmt::Display for Set {
             Self::Driving => "driving",
             Self::Unsteady => "unsteady",
             Self::Check => "check",
+            Self::Ahead => "ahead",
         })
     }
 }
@@ -306,6 +310,7 @@ impl Plan {
             Set::Driving => self.twins(count)?,
             Set::Unsteady => self.surges(),
             Set::Check => self.checks(),
+            Set::Ahead => self.ahead(),
         };
         let known: BTreeSet<String> = self.cases.iter().map(|c| c.id.clone()).collect();
         self.cases.extend(fresh.into_iter().filter(|case| !known.contains(&case.id)));
@@ -388,14 +393,9 @@ impl Plan {
 
     /// At rest at three depths; head-on at two speeds for each; one of them on three meshes.
     fn checks(&self) -> Vec<Case> {
-        let Table { speed_mps, depth_m, .. } = self.campaign.table;
-        let inch = 0.0254;
-        // the depths of the paper's trials with the Warthog, and the same shares of the table for other vehicles
-        let depths = [4.0, 8.0, 10.0].map(|inches: f64| {
-            let share = (inches * inch - 0.10) / 0.30;
-            depth_m.min + share * (depth_m.max - depth_m.min)
-        });
-        let speeds = [0.0, 0.25 * speed_mps.max, 0.5 * speed_mps.max];
+        let speed = self.campaign.table.speed_mps.max;
+        let depths = self.trial_depths();
+        let speeds = [0.0, 0.25 * speed, 0.5 * speed];
         let states = depths.iter().flat_map(|&depth| speeds.map(|speed| (speed, depth, 1.0)));
         let meshes = [0.72, 0.5].map(|scale| (speeds[2], depths[1], scale));
         let mut all: Vec<(f64, f64, f64)> = states.chain(meshes).collect();
@@ -414,6 +414,29 @@ impl Plan {
                 ..Case::steady(&self.campaign.vehicle, Set::Check, i, speed, depth)
             })
             .collect()
+    }
+
+    /// Straight ahead at quarters of the highest speed: what the checks leave out at their depths, and all of it at
+    /// three depths between and above them.
+    fn ahead(&self) -> Vec<Case> {
+        let Table { speed_mps, depth_m, .. } = self.campaign.table;
+        let depth = |share: f64| depth_m.min + share * (depth_m.max - depth_m.min);
+        let between = [1.0 / 6.0, 0.75, 1.0].map(|share| (depth(share), [0.25, 0.5, 0.75, 1.0].as_slice()));
+        let checked = self.trial_depths().map(|depth| (depth, [0.75, 1.0].as_slice()));
+        checked
+            .into_iter()
+            .chain(between)
+            .flat_map(|(depth, shares)| shares.iter().map(move |share| (depth, share * speed_mps.max)))
+            .enumerate()
+            .map(|(i, (depth, speed))| Case::steady(&self.campaign.vehicle, Set::Ahead, i, speed, depth))
+            .collect()
+    }
+
+    /// The depths of the paper's trials with the Warthog, and the same shares of the table for other vehicles.
+    fn trial_depths(&self) -> [f64; 3] {
+        let Range { min, max } = self.campaign.table.depth_m;
+        let inch = 0.0254;
+        [4.0, 8.0, 10.0].map(|inches: f64| min + (inches * inch - 0.10) / 0.30 * (max - min))
     }
 }
 
@@ -567,10 +590,23 @@ mod tests {
     }
 
     #[test]
+    fn straight_ahead_no_state_is_computed_twice() {
+        let mut plan = plan();
+        plan.extend(Set::Check, 0, 1, 0.378).unwrap();
+        plan.extend(Set::Ahead, 0, 1, 0.378).unwrap();
+        let moving = |case: &&Case| case.speed_mps > 0.0 && case.cell_scale == 1.0;
+        let states: Vec<[f64; 6]> = plan.cases.iter().filter(moving).map(coordinates).collect();
+        assert_eq!(states.len(), 6 * 4, "six depths, four speeds");
+        for (i, state) in states.iter().enumerate() {
+            assert!(!states[..i].contains(state), "{state:?}");
+        }
+    }
+
+    #[test]
     fn a_folder_reads_back_as_written_and_a_bad_row_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let mut plan = plan();
-        for set in [Set::Paper, Set::Wide, Set::Unsteady, Set::Check] {
+        for set in [Set::Paper, Set::Wide, Set::Unsteady, Set::Check, Set::Ahead] {
             plan.extend(set, 5, 1, 0.378).unwrap();
         }
         plan.write(folder.path()).unwrap();

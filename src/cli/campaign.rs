@@ -72,6 +72,7 @@ enum SetName {
     Driving,
     Unsteady,
     Check,
+    Ahead,
 }
 
 impl From<SetName> for Set {
@@ -82,6 +83,7 @@ impl From<SetName> for Set {
             SetName::Driving => Self::Driving,
             SetName::Unsteady => Self::Unsteady,
             SetName::Check => Self::Check,
+            SetName::Ahead => Self::Ahead,
         }
     }
 }
@@ -97,7 +99,7 @@ struct PlanCommand {
     #[command(flatten)]
     vehicles: Vehicles,
     /// What to add: `paper` and `wide` are Latin hypercubes, `driving` the straightest paper cases with a moving bed,
-    /// `unsteady` and `check` fixed lists
+    /// `unsteady`, `check` and `ahead` fixed lists
     #[arg(long, value_enum)]
     set: SetName,
     /// Cases to add

@@ -334,7 +334,7 @@ fn traces(
     for (trial, series) in all.iter().enumerate() {
         let size = |&c: &usize| {
             let squares = series.gap.iter().map(|gap| gap[c].powi(2)).sum::<f64>();
-            ((squares / series.gap.len() as f64).sqrt() / floors[c].total().max(1e-12), trial, c)
+            ((squares / series.gap.len() as f64).sqrt() / floors[c].with_model().max(1e-12), trial, c)
         };
         worst.extend(setting.components.iter().map(size).max_by(|a, b| a.0.total_cmp(&b.0)));
     }

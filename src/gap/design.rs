@@ -1,12 +1,13 @@
 //! The regression: rows are the compared components of every bin, columns the coefficients of the candidates.
 //!
-//! Rows are standardised by the noise of their component. The zero of a trial may differ from run to run: each trial's mean
-//! is taken off in the share that this scatter has in it (the transform of the random-effects model; Baltagi, Econometric
-//! Analysis of Panel Data, section 2.3), so that the rows are about independent.
+//! Rows are standardised by the noise of their component. The zero of a trial may differ from run to run, and where a model
+//! states how far it may be off, a trial may have a load of that size that stays, and one that goes with the square of the
+//! speed. Each trial's part along these is taken off in the share that such scatter has in it (the transform of the
+//! random-effects model; Baltagi, Econometric Analysis of Panel Data, section 2.3), so that the rows are about independent.
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 
 use super::Config;
 use super::candidates::{Column, Setting, columns};
@@ -30,6 +31,8 @@ pub(super) struct RowNoise {
     pub bin: [f64; 6],
     /// Standard deviation of the zero from trial to trial.
     pub offset: [f64; 6],
+    /// Standard deviation that the model states of itself, by trial and component; 0 where it states none.
+    pub model: Vec<[f64; 6]>,
     /// Half width of the smoothing over bins; 0 for none.
     pub smoothing: usize,
 }
@@ -110,6 +113,7 @@ pub(super) fn to_rows(
     for &trial in trials {
         let series = &all[trial];
         let column = of(trial);
+        let pace = noise.model[trial].iter().any(|std| *std > 0.0).then(|| pace(series, noise.smoothing));
         let by_component: Vec<Vec<f64>> = components
             .iter()
             .map(|&component| {
@@ -117,11 +121,14 @@ pub(super) fn to_rows(
                 for run in &series.runs {
                     smooth(&mut values[run.clone()], noise.smoothing);
                 }
-                let count = values.len() as f64;
-                let mean = values.iter().sum::<f64>() / count;
-                let (bin, offset) = (noise.bin[component], noise.offset[component]);
-                let share = 1.0 - (bin * bin / (bin * bin + count * offset * offset)).sqrt();
-                values.iter_mut().for_each(|value| *value = (*value - share * mean) / bin);
+                let bin = noise.bin[component];
+                let model = noise.model[trial][component] / bin;
+                let zero = (noise.offset[component] / bin).hypot(model);
+                values.iter_mut().for_each(|value| *value /= bin);
+                match &pace {
+                    Some(pace) => whiten(&mut values, pace, [zero, model]),
+                    None => center(&mut values, zero),
+                }
                 values
             })
             .collect();
@@ -130,6 +137,38 @@ pub(super) fn to_rows(
         }
     }
     out
+}
+
+/// Takes off the mean in the share that a zero of this deviation has in it, beside noise of 1 a value.
+fn center(values: &mut [f64], zero: f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let share = 1.0 - (1.0 + count * zero * zero).sqrt().recip();
+    values.iter_mut().for_each(|value| *value -= share * mean);
+}
+
+/// The same for a constant and a multiple of `pace`, of independent deviations: `(I + U U^T)^(-1/2)` of the values, `U` the
+/// two with their deviations.
+fn whiten(values: &mut [f64], pace: &[f64], [zero, paced]: [f64; 2]) {
+    let along = |value: f64| Vector2::new(zero, paced * value);
+    let gram = pace.iter().map(|&p| along(p) * along(p).transpose()).sum::<Matrix2<f64>>();
+    let projected = values.iter().zip(pace).map(|(value, &p)| along(p) * *value).sum::<Vector2<f64>>();
+    let SymmetricEigen { eigenvectors, eigenvalues } = gram.symmetric_eigen();
+    // (1 - 1 / sqrt(1 + l)) / l, which is 1/2 where l vanishes
+    let share = eigenvalues.map(|l| 1.0 / ((1.0 + l.max(0.0)).sqrt() * (1.0 + (1.0 + l.max(0.0)).sqrt())));
+    let off = eigenvectors * share.component_mul(&(eigenvectors.transpose() * projected));
+    values.iter_mut().zip(pace).for_each(|(value, &p)| *value -= along(p).dot(&off));
+}
+
+/// The square of the speed through the water of each bin, of mean square 1.
+fn pace(series: &Series, smoothing: usize) -> Vec<f64> {
+    let mut pace = series.binned(|i| series.conditions[i].velocity.norm_squared());
+    for run in &series.runs {
+        smooth(&mut pace[run.clone()], smoothing);
+    }
+    let size = (pace.iter().map(|p| p * p).sum::<f64>() / pace.len().max(1) as f64).sqrt();
+    pace.iter_mut().for_each(|p| *p /= size.max(f64::MIN_POSITIVE));
+    pace
 }
 
 /// `[1 2 1] / 4`, `times` times; the ends stay.
@@ -464,4 +503,33 @@ fn fold_loss(fold: &Fold, columns: &[usize], beta: &DVector<f64>) -> f64 {
         }
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn whitens_by_the_inverse_root_of_the_covariance_and_alone_the_zero_is_the_mean() {
+        let pace: Vec<f64> = (0..12).map(|i| 0.3 + 0.1 * f64::from(i)).collect();
+        let values: Vec<f64> = (0..12).map(|i| f64::from(i * i % 7) - 2.0).collect();
+        let (zero, paced) = (1.7, 0.6);
+        let covariance = DMatrix::from_fn(12, 12, |i, j| {
+            zero * zero + paced * paced * pace[i] * pace[j] + f64::from(u8::from(i == j))
+        });
+        let eigen = covariance.symmetric_eigen();
+        let root = &eigen.eigenvectors
+            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| l.sqrt().recip()))
+            * eigen.eigenvectors.transpose();
+        let expected = root * DVector::from_vec(values.clone());
+        let mut found = values.clone();
+        whiten(&mut found, &pace, [zero, paced]);
+        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected}");
+        let (mut centered, mut found) = (values.clone(), values);
+        center(&mut centered, zero);
+        whiten(&mut found, &pace, [zero, 0.0]);
+        assert!(found.iter().zip(&centered).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
 }

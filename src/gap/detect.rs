@@ -61,7 +61,7 @@ pub(super) fn sizes(
             })
             .collect();
         let interval = [quantile(&mut draws.clone(), 0.05), quantile(&mut draws, 0.95)];
-        let noise_floor = floors[component].total().hypot(floors[component].model);
+        let noise_floor = floors[component].with_model();
         let size =
             GapSize { rms: rms(&squares), interval, noise_floor, above_floor: interval[0] > noise_floor };
         (WRENCH[component], size)

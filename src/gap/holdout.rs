@@ -17,7 +17,7 @@ use crate::trials::WRENCH;
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
-/// Root mean squares of one component [N or N m]; of `all` in noise floors.
+/// Root mean squares of one component [N or N m]; of `all` in noise floors, each with what the model states of itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Closure {
     /// Without the named effects.
@@ -66,7 +66,7 @@ struct Sums {
     count: f64,
 }
 
-/// The closure of each component and of all together in noise floors.
+/// The closure of each component, and of all together, each in its noise and what the model states of itself.
 pub(super) fn closures(
     named: &[Named],
     all: &[Series],
@@ -97,7 +97,7 @@ pub(super) fn closures(
         })
         .collect();
     let closure = |components: &[usize], floor: f64, unit: bool| {
-        let weight = |c: usize| if unit { 1.0 } else { floors[c].total().max(1e-12).powi(-2) };
+        let weight = |c: usize| if unit { 1.0 } else { floors[c].with_model().max(1e-12).powi(-2) };
         let sizes = |sums: &[Sums]| {
             let count = sums.iter().map(|s| s.count).sum::<f64>() * components.len() as f64;
             let rms = |of: &dyn Fn(&Sums, usize) -> f64| {
@@ -118,7 +118,10 @@ pub(super) fn closures(
     };
     let mut closures: BTreeMap<&'static str, Closure> =
         setting.components.iter().map(|&c| (WRENCH[c], closure(&[c], floors[c].total(), true))).collect();
-    closures.insert("all", closure(&setting.components, 1.0, false));
+    let noise = |c: usize| (floors[c].total() / floors[c].with_model().max(1e-12)).powi(2);
+    let squares = setting.components.iter().map(|&c| noise(c)).sum::<f64>();
+    let floor = (squares / setting.components.len().max(1) as f64).sqrt();
+    closures.insert("all", closure(&setting.components, floor, false));
     closures
 }
 
@@ -143,7 +146,7 @@ pub(super) fn worse(
                 setting
                     .components
                     .iter()
-                    .map(|&c| (value(i, c) / floors[c].total().max(1e-12)).powi(2))
+                    .map(|&c| (value(i, c) / floors[c].with_model().max(1e-12)).powi(2))
                     .sum::<f64>()
                     / setting.components.len() as f64
             };

@@ -40,6 +40,11 @@ impl Floor {
     pub fn total(&self) -> f64 {
         self.sample.hypot(self.offset)
     }
+
+    /// The same with what the model states of itself: what weighs one component against another [N or N m].
+    pub fn with_model(&self) -> f64 {
+        self.total().hypot(self.model)
+    }
 }
 
 /// The floor of each compared component from the trials `naming`; the others are 0. Repeats may be of any trials: what
@@ -50,6 +55,7 @@ pub(super) fn floors(
     manifest: &Manifest,
     components: &[usize],
 ) -> [Floor; 6] {
+    let model = model_error(&naming.iter().map(|&trial| &all[trial]).collect::<Vec<_>>());
     std::array::from_fn(|component| {
         let name = WRENCH[component];
         let stated = manifest.sensor_noise.get(name).copied();
@@ -65,11 +71,17 @@ pub(super) fn floors(
         if let Some(stated) = stated.filter(|&stated| stated > floor.sample) {
             floor = Floor { sample: stated, source: FloorSource::Stated, ..floor };
         }
-        let squares =
-            naming.iter().flat_map(|&trial| all[trial].uncertainty.iter().map(|u| u[component].powi(2)));
-        let count = naming.iter().map(|&trial| all[trial].t.len()).sum::<usize>().max(1);
-        floor.model = (squares.sum::<f64>() / count as f64).sqrt();
+        floor.model = model[component];
         floor
+    })
+}
+
+/// Root mean square of what the model states of itself over all samples of some trials [N or N m].
+fn model_error(trials: &[&Series]) -> [f64; 6] {
+    let count = trials.iter().map(|series| series.t.len()).sum::<usize>().max(1) as f64;
+    std::array::from_fn(|c| {
+        let squares = trials.iter().flat_map(|series| series.uncertainty.iter().map(|u| u[c].powi(2)));
+        (squares.sum::<f64>() / count).sqrt()
     })
 }
 
@@ -135,7 +147,8 @@ pub(super) fn row_noise(
     floors: &[Floor; 6],
     smoothing: usize,
 ) -> RowNoise {
-    let mut noise = RowNoise { bin: [1.0; 6], offset: [0.0; 6], smoothing };
+    let model = all.iter().map(|series| model_error(std::slice::from_ref(&series))).collect();
+    let mut noise = RowNoise { bin: [1.0; 6], offset: [0.0; 6], model, smoothing };
     for &component in components {
         let mut variances = Vec::new();
         for &trial in trials {
@@ -150,7 +163,10 @@ pub(super) fn row_noise(
         let bin = median(&mut variances).sqrt().max(white);
         // a component without any noise at all weighs as if its gap were noise of a thousandth
         let size = rms(all, trials, component);
-        noise.bin[component] = bin.max(1e-3 * size).max(1e-12);
+        let bin = bin.max(1e-3 * size).max(1e-12);
+        // what the model does not know of itself goes with the state, and stays; a component of which it knows little
+        // says little beside the others
+        noise.bin[component] = bin.hypot(floors[component].model);
         noise.offset[component] = floors[component].offset;
     }
     noise
