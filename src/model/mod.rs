@@ -171,8 +171,8 @@ impl Model {
             learnt += (known.force(&faded(output, 1.0)) - known.drag).abs();
             spread += known.unit * Anchored::softplus(output[SPREAD]);
         }
-        // what was learnt and is not trusted may be missing
-        forces.uncertainty = Vec3::from(form.spread.map(f64::from)) * spread + learnt * (1.0 - trust);
+        let stated = Vec3::from(form.spread.map(f64::from)) * spread;
+        forces.uncertainty = stated + learnt * Anchored::doubt(distance);
     }
 
     /// Fills in where the water reaches and lists the wet surfaces with their features.

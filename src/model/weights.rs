@@ -86,6 +86,13 @@ impl Anchored {
         x * x * (3.0 - 2.0 * x)
     }
 
+    /// How much of the learnt part may be wrong because the state is a stranger: none as near to a case as is usual, all of it
+    /// where nothing of it counts any more.
+    pub fn doubt(distance: f64) -> f64 {
+        let share = (distance - 1.0) / (FADES[1] - 1.0);
+        share.clamp(0.0, 1.0).max(1.0 - Self::trust(distance))
+    }
+
     /// The measure that the network states of a surface's uncertainty, 0 or more: `ln(1 + e^x)`.
     pub fn softplus(output: f32) -> f64 {
         let x = f64::from(output);
@@ -110,5 +117,18 @@ impl Weights {
             Form::Paper(paper) => Some(paper.ground_contact),
             Form::Anchored(_) => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Anchored;
+
+    #[test]
+    fn doubt_grows_from_what_is_usual_to_where_nothing_counts_any_more() {
+        let at: Vec<f64> = (0..=50).map(|i| Anchored::doubt(0.1 * f64::from(i))).collect();
+        assert!(at[..=10].iter().all(|doubt| *doubt == 0.0) && at[40..].iter().all(|doubt| *doubt == 1.0));
+        assert!(at.is_sorted() && at[15] > 0.1, "{at:?}");
+        assert!(at.iter().enumerate().all(|(i, d)| *d >= 1.0 - Anchored::trust(0.1 * i as f64)));
     }
 }

@@ -38,20 +38,21 @@ impl<'a> Between<'a> {
             };
             taught.push(itself);
             let near = self.neighbors(state);
-            taught.extend((0..count).filter_map(|_| self.drawn(state, &near, random)));
+            let drawn = (0..count).filter_map(|_| self.learn(state, drawn(state.condition, &near, random)?));
+            taught.extend(drawn);
         }
         taught
     }
 
-    /// For each training state one more between it and a neighbor; none of a vehicle that the teacher does not know.
+    /// For each training state one more among it and two neighbors; none of a vehicle that the teacher does not know. On a
+    /// line through two cases, where the network was taught, it is nearer to the teacher than it is elsewhere.
     pub fn fresh(&self, random: &mut Random) -> Vec<Option<Known>> {
-        self.training.iter().map(|state| self.drawn(state, &self.neighbors(state), random)).collect()
-    }
-
-    fn drawn(&self, state: &Known, near: &[&Known], random: &mut Random) -> Option<Known> {
-        let other = near.get((random.unit() * near.len() as f64) as usize)?;
-        let share = (1.0 + 2.0 * BEYOND) * random.unit() - BEYOND;
-        self.learn(state, between(&state.condition, &other.condition, share))
+        let mut of = |state: &Known| {
+            let near = self.neighbors(state);
+            let on_a_line = drawn(state.condition, &near, random)?;
+            self.learn(state, drawn(on_a_line, &near, random)?)
+        };
+        self.training.iter().map(&mut of).collect()
     }
 
     fn learn(&self, state: &Known, condition: Condition) -> Option<Known> {
@@ -73,6 +74,13 @@ impl<'a> Between<'a> {
         others.sort_by(|a, b| a.0.total_cmp(&b.0));
         others.into_iter().take(NEIGHBORS).map(|(_, other)| other).collect()
     }
+}
+
+/// A state on the line through one and any of its neighbors.
+fn drawn(from: Condition, near: &[&Known], random: &mut Random) -> Option<Condition> {
+    let other = near.get((random.unit() * near.len() as f64) as usize)?;
+    let share = (1.0 + 2.0 * BEYOND) * random.unit() - BEYOND;
+    Some(between(&from, &other.condition, share))
 }
 
 /// A state on the line through two, `share` of the way from the first; seen from the side to which each moves.

@@ -1,10 +1,11 @@
 //! How far the answer may be off, learnt from what each case would be missed by, were it not known.
 //!
 //! The regressions that teach the network state that error for every training case; what the network loses of them in a state
-//! that it was not taught, between the case and a neighbor, adds to it. The network learns the size of the sum: it states for
-//! each surface a measure `m_s >= 0`, and the standard deviation of a component c of the net force is `k_c sum_s unit_s m_s`. Only the row of the last layer that
-//! answers `m_s` and the `k_c` are fitted, so the forces stay as they were. The loss is the negative log-likelihood of a
-//! Laplace distribution, `ln d + sqrt(2) |error| / d` with the deviation d: errors of CFD have long tails.
+//! that it was not taught, among the case and two neighbors, adds to it. The network learns the size of the sum: it states
+//! for each surface a measure `m_s >= 0`, and the standard deviation of a component c of the net force is
+//! `k_c sum_s unit_s m_s`. Only the row of the last layer that answers `m_s` and the `k_c` are fitted, so the forces stay as
+//! they were. The loss is the negative log-likelihood of a Laplace distribution, `ln d + sqrt(2) |error| / d` with the
+//! deviation d: errors of CFD have long tails. The `k_c` are those that hold in cases left out of the fit.
 
 use crate::model::Anchored;
 use crate::model::network::OUTPUTS;
@@ -14,6 +15,8 @@ const STEPS: usize = 600;
 const RATE: f64 = 0.02;
 /// Pull of the weights towards zero, where every surface counts by its dynamic load alone.
 const DECAY: f64 = 1e-2;
+/// Groups of states, each left out of a fit in turn.
+const FOLDS: usize = 5;
 /// Error over dynamic load that counts as none: no model of a turbulent flow is better.
 const LEAST: f64 = 0.01;
 
@@ -52,15 +55,38 @@ impl Spread {
     pub fn fit(states: &[Missed]) -> Self {
         let moving = |state: &&Missed| state.surfaces.iter().any(|(_, unit)| *unit > 0.0);
         let states: Vec<&Missed> = states.iter().filter(moving).collect();
+        let mut spread = Self::to(&states);
+        if states.len() < 2 * FOLDS {
+            return spread;
+        }
+        // a row of as many weights fits the states that it was shown better than others
+        let mut sums = [0.0; OUTPUTS];
+        for fold in 0..FOLDS {
+            let in_fold = |(index, _): &(usize, &&Missed)| index % FOLDS == fold;
+            let (own, others): (Vec<_>, Vec<_>) = states.iter().enumerate().partition(in_fold);
+            let part = Self::to(&others.into_iter().map(|(_, state)| *state).collect::<Vec<_>>());
+            for (_, state) in own {
+                let measure = part.measure(state);
+                (0..OUTPUTS).for_each(|c| sums[c] += state.error[c].abs() / (part.factors[c] * measure));
+            }
+        }
+        for (factor, sum) in spread.factors.iter_mut().zip(sums) {
+            *factor *= f64::max(1.0, std::f64::consts::SQRT_2 * sum / states.len() as f64);
+        }
+        spread
+    }
+
+    /// The row and the factors that suit some states best.
+    fn to(states: &[&Missed]) -> Self {
         let width = states.first().and_then(|state| state.surfaces.first()).map_or(0, |(h, _)| h.len());
         let mut spread = Self { weights: vec![0.0; width], bias: 0.0, factors: [1.0; OUTPUTS] };
         if states.is_empty() {
             return spread;
         }
-        spread.calibrate(&states);
+        spread.calibrate(states);
         let mut moments = vec![[0.0_f64; 2]; width + 1];
         for step in 1..=STEPS {
-            let gradient = spread.gradient(&states);
+            let gradient = spread.gradient(states);
             let unbias = [0.9_f64, 0.999].map(|beta| 1.0 - beta.powi(step as i32));
             for (index, (slope, [mean, square])) in gradient.into_iter().zip(&mut moments).enumerate() {
                 *mean += 0.1 * (slope - *mean);
@@ -71,7 +97,7 @@ impl Spread {
                     None => spread.bias -= change,
                 }
             }
-            spread.calibrate(&states);
+            spread.calibrate(states);
         }
         spread
     }
