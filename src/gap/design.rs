@@ -291,6 +291,28 @@ impl Design {
         found
     }
 
+    /// A value a sample as rows that were not smoothed.
+    pub fn unsmoothed(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        of: &dyn Fn(usize) -> Column,
+    ) -> DVector<f64> {
+        let noise = RowNoise { smoothing: 0, ..self.noise.clone() };
+        DVector::from_vec(to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of))
+    }
+
+    /// A column that was not smoothed, in the units of the one that was.
+    pub fn unsmoothed_column(&self, all: &[Series], setting: &Setting, wanted: usize) -> DVector<f64> {
+        let holds = |candidate: &&Candidate| candidate.columns.iter().any(|(column, _)| *column == wanted);
+        let Some(Candidate { effect, shape, columns: own }) = self.candidates.iter().find(holds) else {
+            return DVector::zeros(self.y.len());
+        };
+        let coefficient = own.iter().find(|(column, _)| *column == wanted).map_or(0, |(_, c)| *c);
+        let of = |trial: usize| columns(*effect, shape, &all[trial], trial, setting)[coefficient].clone();
+        self.unsmoothed(all, setting, &of) / self.scale[wanted]
+    }
+
     /// Gives a candidate another shape.
     pub fn reshape(&mut self, all: &[Series], setting: &Setting, candidate: usize, shape: Shape) {
         let effect = self.candidates[candidate].effect;

@@ -14,8 +14,9 @@ use nalgebra::DVector;
 use super::design::{Design, Fitted};
 use super::general::General;
 use super::noise::Floor;
-use super::robust::{Error, contribution, errors, group, of_column};
-use super::shared::outlasts_noise;
+use super::robust::{Error, contribution, errors, group, of_column, shadow};
+use super::series::Series;
+use super::shared::{exceeds_noise, outlasts_noise};
 use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
 use crate::effects::Effect;
@@ -81,6 +82,7 @@ type Verdicts = BTreeMap<(Vec<usize>, Effect), Option<Judged>>;
 /// The regression with what the gates need.
 pub(super) struct Judge<'a> {
     pub design: &'a Design,
+    pub all: &'a [Series],
     pub setting: &'a Setting<'a>,
     pub config: &'a Config,
     pub floors: &'a [Floor; 6],
@@ -93,13 +95,14 @@ pub(super) struct Judge<'a> {
 impl<'a> Judge<'a> {
     pub fn new(
         design: &'a Design,
+        all: &'a [Series],
         setting: &'a Setting<'a>,
         config: &'a Config,
         floors: &'a [Floor; 6],
         general: &'a General,
         floor_loss: f64,
     ) -> Self {
-        Self { design, setting, config, floors, general, floor_loss, passed: RefCell::default() }
+        Self { design, all, setting, config, floors, general, floor_loss, passed: RefCell::default() }
     }
 
     /// Columns of a set.
@@ -456,10 +459,42 @@ impl<'a> Judge<'a> {
         let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
         let all: Vec<usize> = base.iter().chain(&own).copied().collect();
         let (beta, _) = design.solve(&all)?;
-        let sum = contribution(design, &base, &own, &beta.as_slice()[base.len()..])?;
-        let (beta, _) = design.solve(&base)?;
-        Some(outlasts_noise(design, &sum, &design.residual(&base, &beta)))
+        let mine = &beta.as_slice()[base.len()..];
+        let sum = contribution(design, &base, &own, mine)?;
+        let (of_base, _) = design.solve(&base)?;
+        if outlasts_noise(design, &sum, &design.residual(&base, &of_base)) {
+            return Some(true);
+        }
+        if !lives_on_a_rate(self.effect(member)) {
+            return Some(false);
+        }
+        let on_base = shadow(design, &base, &own, mine)?;
+        let (trials, setting) = (self.all, self.setting);
+        let mut residual = design.unsmoothed(trials, setting, &|trial| trials[trial].gap.clone());
+        let mut sum = DVector::zeros(residual.len());
+        // an inferred wrench holds the noise of the accelerations itself
+        let source = match setting.inferred {
+            true => residual.clone(),
+            false => design.unsmoothed(trials, setting, &|trial| trials[trial].predicted.clone()),
+        };
+        for (index, &column) in all.iter().enumerate() {
+            let column = design.unsmoothed_column(trials, setting, column);
+            match index.checked_sub(base.len()) {
+                Some(own) => sum.axpy(mine[own], &column, 1.0),
+                None => {
+                    sum.axpy(-on_base[index], &column, 1.0);
+                    residual.axpy(-of_base[index], &column, 1.0);
+                }
+            }
+        }
+        Some(exceeds_noise(design, &sum, &residual, &source))
     }
+}
+
+/// True for an effect that comes and goes with a rate, as fast as the noise of a motion does.
+fn lives_on_a_rate(effect: Effect) -> bool {
+    use Effect::{AddedMass, MassError, SensorDelay, WaterEntrySlamming, WaveMemory};
+    matches!(effect, AddedMass | MassError | SensorDelay | WaterEntrySlamming | WaveMemory)
 }
 
 /// Standard deviation of a coefficient between trials beyond what noise explains, by moments (DerSimonian and Laird,

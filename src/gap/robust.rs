@@ -84,14 +84,26 @@ pub(super) fn contribution(
     own: &[usize],
     beta: &[f64],
 ) -> Option<DVector<f64>> {
+    let mut sum = total(design, own, beta);
+    let weights = shadow(design, base, own, beta)?;
+    base.iter().zip(&weights).for_each(|(&c, &weight)| sum.axpy(-weight, &design.x.column(c), 1.0));
+    Some(sum)
+}
+
+/// The coefficients of a base that say of a sum of columns what they can.
+pub(super) fn shadow(design: &Design, base: &[usize], own: &[usize], beta: &[f64]) -> Option<Vec<f64>> {
+    if base.is_empty() {
+        return Some(Vec::new());
+    }
+    let sum = total(design, own, beta);
+    let cross = DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&sum)));
+    Some((design.inverse(base)? * cross).as_slice().to_vec())
+}
+
+fn total(design: &Design, own: &[usize], beta: &[f64]) -> DVector<f64> {
     let mut sum = DVector::zeros(design.y.len());
     own.iter().zip(beta).for_each(|(&column, &beta)| sum.axpy(beta, &design.x.column(column), 1.0));
-    if !base.is_empty() {
-        let cross = DVector::from_iterator(base.len(), base.iter().map(|&c| design.x.column(c).dot(&sum)));
-        let weights = design.inverse(base)? * cross;
-        base.iter().enumerate().for_each(|(i, &c)| sum.axpy(-weights[i], &design.x.column(c), 1.0));
-    }
-    Some(sum)
+    sum
 }
 
 /// Variance of a weighted sum of rows under the autocovariance of a residual.

@@ -84,12 +84,12 @@ pub fn run(
     let gap_structure = general.structure(&design, &setting.components, &design.y);
     let floor_loss = floor_loss(&design, &gap_structure);
     let mut members = {
-        let judge = Judge::new(&design, &setting, config, &floors, &general, floor_loss);
+        let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
         judge.select(&library)
     };
     refine(&mut design, &all, &setting, &members);
     // what stood in for a shape that was not yet right has no place any more
-    let judge = Judge::new(&design, &setting, config, &floors, &general, floor_loss);
+    let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
     members = judge.confirmed(&members);
     let found = Found::of(&judge, &members, &library, &general, &gap_structure, config, &all);
     Ok(compose(trials, &all, &judge, found, held, &library))

@@ -3,11 +3,12 @@
 //! A prediction is made for the motion that was recorded, so the recording's noise stands in the gap, and in every column
 //! that is made of the same motion. The two then agree sample by sample though nothing is missing (errors in variables;
 //! Fuller, Measurement Error Models, section 1.1). What an effect explains hangs together in time for longer than such
-//! noise: the product of the two is judged by what is left of it beyond the noise's reach.
+//! noise, or is more than the product of the two noises can be (Cauchy and Schwarz).
 
 use nalgebra::DVector;
 
 use super::design::Design;
+use super::statistics::white_variance;
 
 /// Share of the product of a column and the gap that must hang together.
 const LASTS: f64 = 0.5;
@@ -25,6 +26,29 @@ pub(super) fn outlasts_noise(design: &Design, sum: &DVector<f64>, residual: &DVe
 /// autocovariance.
 fn reach(smoothing: usize) -> usize {
     1 + (1.5 * (smoothing as f64).sqrt()).ceil() as usize
+}
+
+/// True where a sum of columns and a residual have more in common than its noise and that of `source` can have, through
+/// which the motion's noise comes into the gap; rows that were not smoothed.
+pub(super) fn exceeds_noise(
+    design: &Design,
+    sum: &DVector<f64>,
+    residual: &DVector<f64>,
+    source: &DVector<f64>,
+) -> bool {
+    let bound = |component: usize| {
+        let energy = |rows: &DVector<f64>| -> f64 {
+            let trials = design.rows.of_trial.iter();
+            let values = |trial: &std::ops::Range<usize>| -> Vec<f64> {
+                let own = trial.clone().skip(component).step_by(design.rows.width);
+                own.map(|row| rows[row]).collect()
+            };
+            trials.map(values).map(|values| white_variance(&values) * values.len() as f64).sum()
+        };
+        (energy(sum) * energy(source)).sqrt()
+    };
+    let most: f64 = (0..design.rows.width).map(bound).sum();
+    (1.0 - LASTS) * common(design, sum, residual, 0) > most
 }
 
 /// Sum of the products of two rows of a component that are so many bins apart, either way.
