@@ -250,6 +250,21 @@ fn an_error_that_the_model_states_of_itself_and_that_differs_from_trial_to_trial
 }
 
 #[test]
+fn a_computed_wrench_has_no_fault_of_a_sensor_and_what_lies_above_the_model_s_error_is_not_called_nothing() {
+    let motions = motions(TRIALS, SAMPLES, 27);
+    let mut random = Random::new(27);
+    let mut off = || 30.0 * NOISE[0] * gaussian(&mut random);
+    let added: Vec<Vec<[f64; 6]>> =
+        motions.iter().map(|motion| vec![[off(), 0.0, 0.0, 0.0, 0.0, 0.0]; motion.len()]).collect();
+    let mut trials = trials(&motions, &added, &Noise::white(NOISE), 27);
+    trials.manifest.measured.method = Some(Method::Cfd);
+    let report = run_with_doubts(trials);
+    assert_eq!(report.verdict, Verdict::NoCandidateFits, "{}", report.summary);
+    let bias = report.not_testable.iter().find(|effect| effect.name == "sensor_bias").expect("said");
+    assert!(bias.why.contains("computed"), "{}", bias.why);
+}
+
+#[test]
 fn faults_of_sensors_are_named_as_such_and_never_applied() {
     for (name, parameter, value) in [
         ("sensor_bias", "fz", 1.0),

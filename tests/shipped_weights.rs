@@ -30,7 +30,7 @@ fn data(folder: &Path) -> PathBuf {
     let out = folder.join("cfd.parquet");
     let [husky, warthog] = VEHICLES.map(|vehicle| campaigns().join(vehicle).join("sections.parquet"));
     let [husky, warthog, to] = [&husky, &warthog, &out].map(|path| path.to_str().unwrap());
-    wade(&["dataset", "merge", husky, warthog, "--set", "paper,check", "--out", to]);
+    wade(&["dataset", "merge", husky, warthog, "--set", "paper,check,ahead", "--out", to]);
     out
 }
 

@@ -25,6 +25,8 @@ pub(super) struct Setting<'a> {
     pub components: Vec<usize>,
     /// The wrench comes from inertia, drive and weight.
     pub inferred: bool,
+    /// The wrench was computed by a resolved flow.
+    pub computed: bool,
     /// True where each stamp of the folder is of one clock.
     pub one_clock: bool,
     pub first_stamp: f64,
@@ -42,6 +44,9 @@ pub(super) fn unavailable(
 ) -> Option<String> {
     let has_wheels = || all.iter().any(|s| s.wheels.iter().any(|w| w.iter().any(Option::is_some)));
     match effect {
+        _ if effect.kind() == effects::Kind::Sensor && setting.computed => {
+            Some("the wrench was computed: no sensor can have a fault".into())
+        }
         Effect::ChannelBlockage if setting.channel_width.is_none() => {
             Some("trials.toml states no channel_width".into())
         }
@@ -56,6 +61,11 @@ pub(super) fn unavailable(
         }
         _ => None,
     }
+}
+
+/// True where the wrench of the trials was computed by a resolved flow.
+pub(super) fn is_computed(manifest: &Manifest) -> bool {
+    manifest.measured.method == Some(Method::Cfd)
 }
 
 /// True where the wrench of the trials rests on inertia and drive.

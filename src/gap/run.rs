@@ -1,7 +1,7 @@
 //! The workflow from trials to report.
 
 use super::base_drag::base_drag;
-use super::candidates::{Setting, is_inferred, shapes, unavailable};
+use super::candidates::{Setting, is_computed, is_inferred, shapes, unavailable};
 use super::compose::compose;
 use super::design::Design;
 use super::general::General;
@@ -57,6 +57,7 @@ pub fn run(
         mass: trials.manifest.mass.unwrap_or(body.mass),
         components,
         inferred: is_inferred(&trials.manifest),
+        computed: is_computed(&trials.manifest),
         one_clock: one_clock(&all),
         first_stamp: all.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min),
     };

@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::Config;
 use super::design::Design;
+use super::detect::sizes;
 use super::features::energy;
 use super::general::{General, Structure};
 use super::judge::{Judge, Member};
@@ -101,7 +102,11 @@ impl Found {
         let (deviate, _, energy) = energy(all, design, &design.y);
         let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
         let kept = lasting(design, &design.y);
-        structure.deviate > STRUCTURE && size > least
+        // a load that was computed has no noise that hangs together and could pass for a gap
+        let setting = judge.setting;
+        let above = || sizes(all, judge.floors, &setting.components, config).values().any(|s| s.above_floor);
+        setting.computed && above()
+            || structure.deviate > STRUCTURE && size > least
             || deviate > bar && energy > 2.0 * least.max(0.5)
             || kept.deviate > LASTS && kept.size > least
     }
