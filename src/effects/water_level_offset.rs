@@ -7,17 +7,19 @@ use super::input::{Input, Part};
 use crate::frame::GRAVITY;
 use crate::wrench::Wrench;
 
-/// Depth below which a drag over the depth says nothing [m].
-const SHALLOWEST: f64 = 0.01;
-
 pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let (state, immersion) = (input.condition, input.immersion);
     let stiffness = state.density * GRAVITY * immersion.waterplane_area * state.up.z;
     emit(0, Part::Hull, input.at(state.up.into_inner() * stiffness, &immersion.waterplane_center));
-    // a hull that is wholly under does not meet more of the flow
-    if immersion.waterplane_area > 0.0 && immersion.depth > SHALLOWEST {
-        let (force, up) = (input.predicted.force, state.up.into_inner());
-        let drag = force - up * force.dot(&up);
-        emit(0, Part::Hull, input.at(drag / immersion.depth, &immersion.center_of_buoyancy));
+    let velocity = state.velocity;
+    for (index, panel) in input.body.panels.iter().enumerate() {
+        let part = &immersion.panels[index];
+        let wet = part.fraction;
+        // a panel that is wet in part grows with the level
+        if wet > 0.0 && wet < 1.0 && immersion.depth > 1e-3 {
+            let area = panel.windward(&velocity).component_mul(&input.base_drag) * (wet / immersion.depth);
+            let force = area.component_mul(&velocity) * (-input.half_density() * velocity.norm());
+            emit(0, Part::Panel(index), input.at(force, &part.point));
+        }
     }
 }
