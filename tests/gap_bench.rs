@@ -191,6 +191,18 @@ fn the_workflow_keeps_silent_on_noise_and_names_what_is_hidden() {
     assert!(value("held-out closure, median, 3 x").unwrap() > 0.9);
 }
 
+#[test]
+fn a_search_that_comes_back_to_a_set_ends() {
+    let hull = Hull::generated_box();
+    let warthog = shipped::warthog().unwrap().vehicle().unwrap();
+    let all = cases(&[Family::Null], 12, 3);
+    let case = all.iter().find(|case| case.name == "null-010-surrogateerror").unwrap();
+    let made = generate(case, &Schedule::full(&warthog, 1), box_simulator(&hull));
+    let body = gap::body_of(&made.trials).unwrap();
+    let report = gap::run(&made.trials, &body, &mut |_| Predicted::default(), &Config::default()).unwrap();
+    assert!(report.effects.is_empty(), "{}", report.summary);
+}
+
 /// Folder of the published measurements, which are not part of the repository.
 fn published(source: &str) -> PathBuf {
     let folder = std::env::var_os("WADE_PUBLISHED_DATA").expect(

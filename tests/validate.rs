@@ -361,10 +361,7 @@ fn the_mesh_at_rest_is_what_the_golden_table_says() {
 
 fn wade(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
-    // the paper's network passes the paper's tests; README says in which the shipped weights do not
-    let bundle = common::paper_bundle("warthog");
-    let vehicles = bundle.parent().expect("a folder of bundles");
-    command.args(arguments).env("WADE_VEHICLES", vehicles).output().expect("the program runs")
+    command.args(arguments).env("WADE_VEHICLES", common::vehicles()).output().expect("the program runs")
 }
 
 fn validate(source: &[&str], out: &Path) -> Output {

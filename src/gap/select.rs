@@ -16,7 +16,15 @@ impl Judge<'_> {
     /// deletes until nothing changes.
     pub fn select(&self, library: &[Effect]) -> Vec<Member> {
         let mut set: Vec<Member> = Vec::new();
+        let mut seen: Vec<Vec<usize>> = Vec::new();
         while set.len() < self.config.most_effects {
+            // what one step adds another may delete: a set that comes back would come back for ever
+            let mut columns = self.columns(&set);
+            columns.sort_unstable();
+            if seen.contains(&columns) {
+                break;
+            }
+            seen.push(columns);
             let before = set.len();
             match self.best_addition(&set, library) {
                 Some(best) => set.push(best.member),
