@@ -1,5 +1,6 @@
 //! Every effect of the library as columns: the wrench of each coefficient at 1, sample by sample.
 
+use super::base_drag::BaseDrag;
 use super::series::Series;
 use crate::effects::{self, Body, Effect, MAX_COEFFICIENTS, Memory, Shape};
 use crate::frame::{GRAVITY, Vec3};
@@ -18,7 +19,7 @@ const ALL_CHANNELS: usize = 6;
 #[derive(Debug, Clone)]
 pub(super) struct Setting<'a> {
     pub body: &'a Body,
-    pub base_drag: Vec3,
+    pub base_drag: BaseDrag,
     pub channel_width: Option<f64>,
     pub mass: f64,
     /// Compared components.
@@ -148,8 +149,9 @@ pub(super) fn columns(
 fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Column]) {
     let mut memory = Memory::default();
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);
+    let base_drag = setting.base_drag.of(effect, shape);
     for (sample, &t) in series.t.iter().enumerate() {
-        let input = series.input(sample, setting.body, setting.base_drag, setting.channel_width);
+        let input = series.input(sample, setting.body, base_drag, setting.channel_width);
         if effect.has_memory() && sample > 0 {
             effects::advance(effect, shape, &mut memory, &input, t - series.t[sample - 1]);
         }

@@ -104,7 +104,6 @@ pub(super) fn compose(
         gap,
         excitation,
         validity: validity(all),
-        base_drag: setting.base_drag.into(),
         trials: all.len(),
         samples: all.iter().map(|s| s.t.len()).sum(),
         remarks: trials.remarks().iter().map(ToString::to_string).collect(),
@@ -166,6 +165,7 @@ fn named_effects(
             coefficients: one.coefficients.iter().map(|&(c, _)| specs[c].name).collect(),
             effect: one.effect,
             shape: one.shape,
+            base_drag: judge.setting.base_drag.of(one.effect, &one.shape).into(),
         });
         first += count;
     }
@@ -178,10 +178,11 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
     if named.effect.kind() != Kind::Physics {
         return loads;
     }
+    let base_drag = setting.base_drag.of(named.effect, &named.shape);
     for series in all {
         let mut memory = Memory::default();
         for (index, bin) in series.bins.iter().enumerate() {
-            let input = series.input(bin.start, setting.body, setting.base_drag, setting.channel_width);
+            let input = series.input(bin.start, setting.body, base_drag, setting.channel_width);
             if index > 0 {
                 let dt = series.t[bin.start] - series.t[series.bins[index - 1].start];
                 effects::advance(named.effect, &named.shape, &mut memory, &input, dt);

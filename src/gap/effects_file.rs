@@ -55,7 +55,7 @@ pub fn effects_file(
     if !provisional.is_empty() && !with_provisional {
         return Err(NotApplicable::Provisional { effects: provisional.join(" and ") });
     }
-    let effects = physical.into_iter().map(|effect| active(effect, report, trials)).collect();
+    let effects = physical.into_iter().map(|effect| active(effect, trials)).collect();
     Ok(EffectsFile::new(report.vehicle.clone(), evidence(report, trials), validity(report), effects))
 }
 
@@ -85,7 +85,7 @@ fn validity(report: &Report) -> Validity {
     }
 }
 
-fn active(effect: &NamedEffect, report: &Report, trials: &Trials) -> ActiveEffect {
+fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
     let parameters = effect.parameters.iter().map(|(name, parameter)| {
         let unit = parameter.unit.to_owned();
         ((*name).to_owned(), ParameterValue { value: parameter.value, std: parameter.std, unit })
@@ -96,7 +96,7 @@ fn active(effect: &NamedEffect, report: &Report, trials: &Trials) -> ActiveEffec
         provisional: effect.provisional,
         share_of_gap: effect.share_of_gap,
         shape: effect.shape,
-        base_drag: report.base_drag,
+        base_drag: effect.base_drag,
         channel_width: trials.manifest.channel_width,
         coefficients: effect.coefficients.iter().map(|name| (*name).to_owned()).collect(),
         covariance: effect.covariance.clone(),

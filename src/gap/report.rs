@@ -52,6 +52,8 @@ pub struct NamedEffect {
     pub effect: Effect,
     /// Nonlinear parameters.
     pub shape: Shape,
+    /// Drag of the model itself as coefficients along x, y, z, with which some effects scale.
+    pub base_drag: [f64; 3],
 }
 
 /// An effect that the trials could not have shown.
@@ -156,8 +158,6 @@ pub struct Report {
     pub excitation: Vec<Excitation>,
     /// Ranges of the state in which the effects were seen: least and largest.
     pub validity: BTreeMap<&'static str, [f64; 2]>,
-    /// Drag of the model itself as coefficients along x, y, z: some effects scale with it.
-    pub base_drag: [f64; 3],
     /// Trials used.
     pub trials: usize,
     /// Samples used.

@@ -1,6 +1,6 @@
 //! The workflow from trials to report.
 
-use super::base_drag::base_drag;
+use super::base_drag::BaseDrag;
 use super::candidates::{Setting, is_computed, is_inferred, shapes, unavailable};
 use super::compose::compose;
 use super::design::Design;
@@ -50,9 +50,9 @@ pub fn run(
     let (all, components) = series(trials, body, predict, config)?;
     let (naming, held) = hold_out(&all, config);
     let floors = floors(&all, &naming, &trials.manifest, &components);
-    let mut setting = Setting {
+    let setting = Setting {
         body,
-        base_drag: Vec3::zeros(),
+        base_drag: BaseDrag::new(&all, body),
         channel_width: trials.manifest.channel_width,
         mass: trials.manifest.mass.unwrap_or(body.mass),
         components,
@@ -61,7 +61,6 @@ pub fn run(
         one_clock: one_clock(&all),
         first_stamp: all.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min),
     };
-    setting.base_drag = base_drag(&all, &setting);
     let mut library: Vec<Effect> = config
         .library
         .iter()
