@@ -16,7 +16,6 @@ use super::verdict::{Found, floor_loss};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Block, Body, Effect, Shape};
-use crate::frame::Vec3;
 use crate::trials::Trials;
 
 /// The body that `trials.toml` describes, for another simulator's prediction; its wheels are as large as they roll.
