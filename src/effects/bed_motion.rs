@@ -8,7 +8,7 @@
 //! cases; there is no published band.
 
 use super::input::{Input, Part};
-use super::library::Shape;
+use super::library::{Effect, Shape};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
@@ -20,7 +20,7 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
     let speed = ground.norm();
     let at_bed = |point: Vec3| Vec3::new(point.x, point.y, input.body.z0);
     let middle = at_bed(input.immersion.center_of_buoyancy);
-    if shape[0] > 1.5 {
+    if Effect::BedMotion.is_in_proportion(shape) {
         let load = input.half_density() * area_of_drag(input) * speed;
         emit(0, Part::Hull, input.at(ground * -load, &middle));
         emit(1, Part::Hull, input.at(up * (load * speed), &middle));

@@ -8,12 +8,12 @@
 //! gravity, whatever law it follows.
 
 use super::input::{Input, Part};
-use super::library::Shape;
+use super::library::{Effect, Shape};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
 pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    if shape[0] > 1.5 {
+    if Effect::DragCoefficientError.is_in_proportion(shape) {
         return of_the_model(input, emit);
     }
     let velocity = input.condition.velocity;

@@ -331,6 +331,11 @@ impl Effect {
         }
     }
 
+    /// True for the form that takes the drag of the prediction itself, in proportion.
+    pub fn is_in_proportion(self, shape: &Shape) -> bool {
+        matches!(self, Self::DragCoefficientError | Self::BedMotion) && shape[0] > 1.5
+    }
+
     /// Names and units of the nonlinear parameters that a report states.
     pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
         match self {

@@ -33,10 +33,7 @@ impl BaseDrag {
 
     /// What an effect of a shape is told: those that take the prediction's drag itself are told what a hull is said to have.
     pub fn of(&self, effect: Effect, shape: &Shape) -> Vec3 {
-        match effect {
-            Effect::DragCoefficientError | Effect::BedMotion if shape[0] > 1.5 => self.level,
-            _ => self.all,
-        }
+        if effect.is_in_proportion(shape) { self.level } else { self.all }
     }
 }
 

@@ -40,13 +40,12 @@ fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
 
 pub(super) fn compose(
     trials: &Trials,
-    all: &[Series],
     judge: &Judge,
     found: Found,
     held: Vec<usize>,
     library: &[Effect],
 ) -> Report {
-    let (design, setting, config) = (judge.design, judge.setting, judge.config);
+    let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
     let fitted = fit(design, &found.members, all, setting, config);
     // nothing that does not fit is applied or shown as if it did
     let holds = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
@@ -55,12 +54,12 @@ pub(super) fn compose(
         _ => Vec::new(),
     };
     let effects = match &fitted {
-        Some(fitted) if holds => named_effects(judge, &found, &named, fitted, all),
+        Some(fitted) if holds => named_effects(judge, &found, &named, fitted),
         _ => Vec::new(),
     };
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
     let gated = match found.verdict {
-        Verdict::NoCandidateFits => gated(all, judge, library),
+        Verdict::NoCandidateFits => gated(judge, library),
         _ => None,
     };
     let (regions, regions_tried) = match found.verdict {
@@ -118,13 +117,7 @@ fn names(judge: &Judge, set: &[Member]) -> Vec<&'static str> {
     set.iter().map(|member| judge.effect(member).name()).collect()
 }
 
-fn named_effects(
-    judge: &Judge,
-    found: &Found,
-    named: &[Named],
-    fitted: &Fit,
-    all: &[Series],
-) -> Vec<NamedEffect> {
+fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) -> Vec<NamedEffect> {
     let design = judge.design;
     let whole = (design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
     let mut first = 0;
@@ -158,7 +151,7 @@ fn named_effects(
             share_of_gap: ((without - found.loss) / whole).clamp(0.0, 1.0),
             provisional: fitted.provisional[index],
             placebo: [placebo.0, placebo.1],
-            surfaces: surfaces(one, all, judge.setting),
+            surfaces: surfaces(one, judge.all, judge.setting),
             covariance: (0..count)
                 .map(|i| (0..count).map(|j| fitted.covariance[(first + i, first + j)]).collect())
                 .collect(),

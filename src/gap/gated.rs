@@ -10,7 +10,6 @@ use super::design::Design;
 use super::features::{Features, of_bins};
 use super::judge::Judge;
 use super::locate::{Limits, OPEN, inside};
-use super::series::Series;
 use crate::effects::Effect;
 
 /// Features that may limit an effect of the water: depth, Froude number, speed.
@@ -34,10 +33,10 @@ pub(super) struct Gated {
 }
 
 /// The effect and region that explain most of the gap, where one limit or more is worth it.
-pub(super) fn gated(all: &[Series], judge: &Judge, library: &[Effect]) -> Option<Gated> {
+pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
     let design = judge.design;
     let whole = (design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
-    let features: Vec<Vec<Features>> = all.iter().map(of_bins).collect();
+    let features: Vec<Vec<Features>> = judge.all.iter().map(of_bins).collect();
     let places: Vec<Features> =
         design.rows.rows.iter().step_by(design.rows.width).map(|row| features[row.trial][row.bin]).collect();
     let one = |candidate: &super::design::Candidate| {

@@ -9,6 +9,7 @@
 use nalgebra::DVector;
 
 use super::design::Design;
+use super::robust::strided;
 use super::statistics::median;
 
 /// Windows of bins apart.
@@ -77,7 +78,7 @@ fn in_window(trial: &[Products], first: usize, last: usize, memory: f64) -> Last
 }
 
 fn products(rows: &[f64], component: usize, width: usize) -> Products {
-    let values: Vec<f64> = rows.iter().skip(component).step_by(width).copied().collect();
+    let values = strided(rows, component, width);
     let of = |lag: usize| values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b).sum();
     Products { lags: std::array::from_fn(of), count: values.len() as f64 }
 }

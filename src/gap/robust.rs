@@ -181,7 +181,7 @@ impl<'a> Noise<'a> {
 }
 
 /// The rows of one component.
-fn strided(rows: &[f64], component: usize, width: usize) -> Vec<f64> {
+pub(super) fn strided(rows: &[f64], component: usize, width: usize) -> Vec<f64> {
     rows.iter().skip(component).step_by(width).copied().collect()
 }
 

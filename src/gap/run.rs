@@ -90,8 +90,8 @@ pub fn run(
     // what stood in for a shape that was not yet right has no place any more
     let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
     members = judge.confirmed(&members);
-    let found = Found::of(&judge, &members, &library, &general, &gap_structure, config, &all);
-    Ok(compose(trials, &all, &judge, found, held, &library))
+    let found = Found::of(&judge, &members, &library, &general, &gap_structure);
+    Ok(compose(trials, &judge, found, held, &library))
 }
 
 /// Radius at which the wheels roll [m]: the median of speed over turning, where wheels turn the way the vehicle goes. Most

@@ -8,6 +8,7 @@
 use nalgebra::DVector;
 
 use super::design::Design;
+use super::robust::strided;
 use super::statistics::white_variance;
 
 /// Share of the product of a column and the gap that must hang together.
@@ -38,12 +39,11 @@ pub(super) fn exceeds_noise(
 ) -> bool {
     let bound = |component: usize| {
         let energy = |rows: &DVector<f64>| -> f64 {
-            let trials = design.rows.of_trial.iter();
-            let values = |trial: &std::ops::Range<usize>| -> Vec<f64> {
-                let own = trial.clone().skip(component).step_by(design.rows.width);
-                own.map(|row| rows[row]).collect()
+            let of_trial = |trial: &std::ops::Range<usize>| {
+                let values = strided(&rows.as_slice()[trial.clone()], component, design.rows.width);
+                white_variance(&values) * values.len() as f64
             };
-            trials.map(values).map(|values| white_variance(&values) * values.len() as f64).sum()
+            design.rows.of_trial.iter().map(of_trial).sum()
         };
         (energy(sum) * energy(source)).sqrt()
     };

@@ -2,7 +2,6 @@
 
 use nalgebra::DVector;
 
-use super::Config;
 use super::design::Design;
 use super::detect::sizes;
 use super::features::energy;
@@ -10,7 +9,6 @@ use super::general::{General, Structure};
 use super::judge::{Judge, Member};
 use super::lasting::lasting;
 use super::report::Verdict;
-use super::series::Series;
 use crate::effects::{Effect, Kind};
 
 /// Deviates that structure without a name needs.
@@ -48,10 +46,8 @@ impl Found {
         library: &[Effect],
         general: &General,
         gap_structure: &Structure,
-        config: &Config,
-        all: &[Series],
     ) -> Self {
-        let design = judge.design;
+        let (design, config) = (judge.design, judge.config);
         let columns = judge.columns(members);
         let (beta, loss) =
             design.solve(&columns).unwrap_or_else(|| (DVector::zeros(columns.len()), design.empty_loss()));
@@ -65,7 +61,7 @@ impl Found {
         let mut found =
             Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
         found.verdict = if members.is_empty() {
-            match found.is_structured(judge, gap_structure, config, all) {
+            match found.is_structured(judge, gap_structure) {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
@@ -86,8 +82,8 @@ impl Found {
     }
 
     /// Predictable from the state, or lasting in a trial, and large enough to matter.
-    fn is_structured(&self, judge: &Judge, structure: &Structure, config: &Config, all: &[Series]) -> bool {
-        let design = judge.design;
+    fn is_structured(&self, judge: &Judge, structure: &Structure) -> bool {
+        let (design, all, config) = (judge.design, judge.all, judge.config);
         let rows = design.y.len().max(1) as f64;
         // gain per row is in bins' noise; relevance is in samples' noise
         let relative = judge
