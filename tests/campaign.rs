@@ -64,7 +64,11 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
     let mut first = command(&["campaign", "run", &campaign, "--jobs", "1"]).spawn().expect("wade runs");
     let outcomes = Path::new(&campaign).join("work/outcomes");
     let started = Instant::now();
-    let done = || std::fs::read_dir(&outcomes).map_or(0, Iterator::count);
+    // one that is being written has another name
+    let is_whole = |entry: &std::io::Result<std::fs::DirEntry>| {
+        entry.as_ref().is_ok_and(|entry| entry.path().extension().is_some_and(|end| end == "json"))
+    };
+    let done = || std::fs::read_dir(&outcomes).map_or(0, |entries| entries.filter(is_whole).count());
     while done() == 0 {
         assert!(started.elapsed() < Duration::from_secs(300), "no case was done");
         std::thread::sleep(Duration::from_millis(20));
