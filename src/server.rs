@@ -18,6 +18,7 @@ use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
 use crate::service::http::{self, HttpError};
 use crate::service::shm::{ShmError, ShmServer};
+use crate::service::shm_remains;
 
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -240,10 +241,12 @@ impl Running {
             }
         })?;
         self.threads.push(thread);
-        opened
-            .recv()
-            .unwrap_or_else(|_| Err(ShmError::new("the thread")(&"it ended")))
-            .map_err(StartError::from)
+        opened.recv().unwrap_or_else(|_| Err(ShmError::new("the thread")(&"it ended")))?;
+        // nothing depends on it, and it may take minutes: it is not waited for at the end either
+        let stop = Arc::clone(&self.stop_shm);
+        let clearing = std::thread::Builder::new().name("wade-shm-remains".into());
+        clearing.spawn(move || shm_remains::clear(&stop))?;
+        Ok(())
     }
 
     fn spawn(&self, name: &str, body: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, StartError> {

@@ -74,7 +74,7 @@ impl ShmLink {
         if is_absent(&at()) {
             return Err(why_not(names, vehicle));
         }
-        let node = shm::node::<Ipc>(&config()).map_err(failed)?;
+        let node = shm::node::<Ipc>().map_err(failed)?;
         let not_open = |error: OpenError| match error {
             OpenError::Absent => why_not(names, vehicle),
             OpenError::OtherTypes => {
@@ -234,15 +234,6 @@ fn is_absent(service: &str) -> bool {
     name.is_ok_and(|name| {
         matches!(Ipc::details(&name, Config::global_config(), MessagingPattern::RequestResponse), Ok(None))
     })
-}
-
-/// The settings of a client's node: what others left that were killed is the servers' to clear away, and that of those in a
-/// service is cleared when it is opened. All of the machine may be minutes of work.
-fn config() -> Config {
-    let mut config = Config::global_config().clone();
-    config.global.node.cleanup_dead_nodes_on_creation = false;
-    config.global.node.cleanup_dead_nodes_on_destruction = false;
-    config
 }
 
 /// A listener under a name that no other client has.

@@ -6,6 +6,7 @@ pub mod http;
 mod sessions;
 pub mod shm;
 pub mod shm_layout;
+pub(crate) mod shm_remains;
 pub(crate) mod shm_served;
 pub mod wire;
 

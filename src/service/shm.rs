@@ -23,7 +23,7 @@ use super::shm_layout::{
     Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
 };
 use super::wire::{InvalidState, Refusal, State};
-use super::{Evaluator, nanoseconds_since, shm_served};
+use super::{Evaluator, nanoseconds_since, shm_remains, shm_served};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
 use crate::served::ServedVehicle;
@@ -94,8 +94,9 @@ impl ShmError {
 }
 
 /// A node that leaves the signals to their owner.
-pub(crate) fn node<S: Service>(config: &iceoryx2::config::Config) -> Result<Node<S>, ShmError> {
-    let builder = NodeBuilder::new().config(config).signal_handling_mode(SignalHandlingMode::Disabled);
+pub(crate) fn node<S: Service>() -> Result<Node<S>, ShmError> {
+    let config = shm_remains::config();
+    let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
     builder.create::<S>().map_err(|error| {
         let hint = "; its files lie in /tmp/iceoryx2 and /dev/shm and serve the one user who owns them";
         ShmError::new("a node")(&format!("{error}{hint}"))
@@ -237,8 +238,7 @@ struct Desk {
 impl ShmServer {
     /// Opens the services of every vehicle that is served.
     pub fn new(config: Config, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Result<Self, ShmError> {
-        // clears away what servers left that were killed
-        let node = node(iceoryx2::config::Config::global_config())?;
+        let node = node()?;
         let names = Names::new(&config.namespace);
         let wake = events(&node, &names.wake())?.listener_builder().create();
         let done = events(&node, &names.done())?.notifier_builder().create();
