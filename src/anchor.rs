@@ -1,5 +1,7 @@
 //! What is known about a state before anything is learnt, for the `anchored` model: exact hydrostatics (E1), a simple
-//! drag (E2 on the box around the wet part), and what the network is told, all without a dimension.
+//! drag (E2 on the windward part of the box around the wet part), and what the network is told, all without a dimension.
+//! The drag is what is left where nothing was learnt, so it has to be right in the mean: that of whole boxes, a front, a rear
+//! and four wheels one behind the other, was twice the Warthog's.
 //!
 //! The model is `F_s = H_s + D_s + q A_s R_s`: the pressure load `H_s` of still water, the drag `D_s`, and a remainder
 //! `R_s` that the network answers, in units of the dynamic pressure `q = rho U^2 / 2` on the area `A_s` that the water may
@@ -21,6 +23,9 @@ use crate::geometry::mesh::Bounds;
 use crate::geometry::wetting::{Wetting, WettingTable};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
+
+/// What the network's answer is a remainder of: weights that were taught beside another are of no use here.
+pub const BASE: &str = "archimedes + windward drag";
 
 /// Names of what is told of a state, in order.
 pub const GLOBAL_NAMES: [&str; 11] = [
@@ -101,6 +106,30 @@ struct AnchorSurface {
     side: f64,
     normal: Vec3,
     area: f64,
+    windward: Windward,
+}
+
+/// Shares of the sides of a surface's box that it takes up as seen from along an axis; a face that looks back takes up nothing.
+/// For motion ahead and astern, to the left and to the right.
+#[derive(Debug, Clone, Copy)]
+struct Windward([[f64; 2]; 2]);
+
+impl Windward {
+    fn of(area_vectors: impl Iterator<Item = Vec3>, bounds: &Bounds) -> Self {
+        let box_sides = [bounds.extent().y, bounds.extent().x].map(|width| width * bounds.extent().z);
+        let mut shares = [[0.0; 2]; 2];
+        for area in area_vectors {
+            for (axis, side) in box_sides.into_iter().enumerate().filter(|(_, side)| *side > 0.0) {
+                shares[axis][usize::from(area[axis] < 0.0)] += area[axis].abs() / side;
+            }
+        }
+        Self(shares)
+    }
+
+    /// Share of the side that motion along an axis meets.
+    fn share(&self, axis: usize, ahead: f64) -> f64 {
+        self.0[axis][usize::from(ahead < 0.0)]
+    }
 }
 
 /// What is known of a state.
@@ -195,8 +224,11 @@ impl Anchor {
             let corners = vehicle.hull.faces_of(index).flat_map(|face| vehicle.hull.mesh.triangle(face));
             let corners: Vec<Vec3> = corners.collect();
             let alone = surface.mirror_left_right == index;
+            let bounds = Bounds::around(&corners).unwrap_or(whole);
+            let faces = vehicle.hull.faces_of(index).map(|face| vehicle.hull.mesh.area_vector(face));
             AnchorSurface {
-                bounds: Bounds::around(&corners).unwrap_or(whole),
+                windward: Windward::of(faces, &bounds),
+                bounds,
                 side: if alone { 0.0 } else { surface.centroid.y.signum() },
                 normal: surface.normal,
                 area: surface.area,
@@ -270,7 +302,9 @@ impl Anchor {
         let hydrostatic =
             Wrench { force: wetting.pressure.force * weight, moment: wetting.pressure.moment * weight };
         let ahead = &flow.direction;
-        let front = (wet.y * ahead.x.abs() + wet.x * ahead.y.abs()) * wet.z;
+        // pressure acts along the sides' normals: across for the sides, along for the ends
+        let met = |axis: usize| surface.windward.share(axis, ahead[axis]) * ahead[axis];
+        let front = Vec3::new(wet.y * met(0), wet.x * met(1), 0.0) * wet.z;
         let place = center.dot(ahead) / flow.half_length(&self.bounds);
         let shelter = 0.5 * (1.0 + SHELTERING * place.clamp(-1.0, 1.0));
         let pressure = 0.5 * condition.density * flow.speed * flow.speed;
@@ -297,7 +331,7 @@ impl Anchor {
             wet_fraction: fraction,
             center,
             hydrostatic,
-            drag: ahead * -(CD0 * shelter * front * pressure),
+            drag: front * -(CD0 * shelter * pressure),
             onset,
             unit: pressure * surface.area * reached * onset,
             lateral: if surface.side == 0.0 { [ahead.y, condition.up.y] } else { [surface.side, 0.0] },

@@ -73,6 +73,12 @@ pub enum TensorError {
         /// The names in the file.
         found: String,
     },
+    /// Weights for a remainder of something else.
+    #[error("the weights answer what is left of {found}, not of {expected}: train them anew", expected = anchor::BASE)]
+    Base {
+        /// What the file says.
+        found: String,
+    },
     /// The paper's weights without the convention that they have baked in.
     #[error("metadata: the paper's weights must state their ground_contact")]
     NoGroundContact,
@@ -95,6 +101,9 @@ struct WeightsMetadata {
     /// Of weights that have a convention baked in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ground_contact: Option<GroundContact>,
+    /// Of weights that answer a remainder: [`anchor::BASE`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    base: Option<String>,
 }
 
 /// Kinds of model.
@@ -108,6 +117,13 @@ enum Kind {
 }
 
 impl Kind {
+    fn base(self) -> Option<&'static str> {
+        match self {
+            Self::Paper => None,
+            Self::Anchored => Some(anchor::BASE),
+        }
+    }
+
     fn global_features(self) -> Vec<String> {
         let names: &[&str] = match self {
             Self::Paper => &GLOBAL_NAMES,
@@ -302,6 +318,9 @@ pub fn read_weights(bytes: &[u8]) -> Result<Weights, TensorError> {
         let found = [meta.surface_features, meta.global_features].concat().join(" ");
         return Err(TensorError::Features { found });
     }
+    if meta.base.as_deref() != kind.base() {
+        return Err(TensorError::Base { found: meta.base.unwrap_or_else(|| "an earlier drag".into()) });
+    }
     let network = read_network(&file, of_surface.len() + of_state.len(), kind.outputs())?;
     let form = match kind {
         Kind::Paper => Form::Paper(Paper {
@@ -388,6 +407,7 @@ pub fn write_weights(weights: &Weights) -> Vec<u8> {
         surface_features: kind.surface_features(),
         provenance: weights.provenance.clone(),
         ground_contact: weights.ground_contact(),
+        base: kind.base().map(str::to_owned),
     };
     write(&tensors, Some(&meta))
 }

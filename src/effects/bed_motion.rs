@@ -38,12 +38,9 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
 /// Area that meets the flow as the model's drag across gravity has it [m2]; none where there is hardly a flow.
 fn area_of_drag(input: &Input) -> f64 {
     const SLOWEST: f64 = 0.1;
-    let state = input.condition;
-    let up = state.up.into_inner();
-    let force = input.predicted.force;
-    let pressure = input.half_density() * state.velocity.norm_squared() * input.base_drag.x;
-    if state.velocity.norm() < SLOWEST || input.base_drag.x < 1e-3 {
+    let speed = input.condition.velocity.norm();
+    if speed < SLOWEST || input.base_drag.x < 1e-3 {
         return 0.0;
     }
-    (force - up * force.dot(&up)).norm() / pressure
+    input.predicted_drag().norm() / (input.half_density() * speed * speed * input.base_drag.x)
 }

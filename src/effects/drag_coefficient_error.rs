@@ -34,9 +34,7 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
 }
 
 fn of_the_model(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let up = input.condition.up.into_inner();
-    let force = input.predicted.force;
-    let drag = force - up * force.dot(&up);
+    let drag = input.predicted_drag();
     let center = input.immersion.center_of_buoyancy;
     for axis in (0..2).filter(|&axis| input.base_drag[axis] > 1e-3) {
         let share = Vec3::ith(axis, drag[axis] / input.base_drag[axis]);

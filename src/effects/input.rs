@@ -44,6 +44,12 @@ impl Input<'_> {
         Wrench::from_force_at(force, point, &self.body.center_of_mass)
     }
 
+    /// The model's own force across gravity [N], which is its drag.
+    pub(super) fn predicted_drag(&self) -> Vec3 {
+        let (force, up) = (self.predicted.force, self.condition.up.into_inner());
+        force - up * force.dot(&up)
+    }
+
     /// Half the density [kg/m3].
     pub(super) fn half_density(&self) -> f64 {
         0.5 * self.condition.density

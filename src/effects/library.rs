@@ -184,7 +184,9 @@ impl Effect {
             }
             Self::WaterEntrySlamming => "F = -C rho (dV/dt)+ u, on entry only",
             Self::WaveMemory => "F = -k rho V Re z, z' = -(1/T - i W) z + motion",
-            Self::ChannelBlockage => "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d)",
+            Self::ChannelBlockage => {
+                "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d), or W = k D (((1 - m)(1 - s / d))^-2 - 1) with m and s of squat in a channel"
+            }
             Self::Squat => {
                 "Fz = -c rho g A_wp s, s = v^2 / 2g (or / sqrt(|1 - Fr_h^2|), at most twice), in a channel s / d = Fr_h^2 / 2 (((1 - m)(1 - s / d))^-2 - 1) up to Schijf's limit and from there to 0 at faded_at, m = V / (L w d) but at most b / w, and a trim"
             }
@@ -333,14 +335,18 @@ impl Effect {
 
     /// True for the form that takes the drag of the prediction itself, in proportion.
     pub fn is_in_proportion(self, shape: &Shape) -> bool {
-        matches!(self, Self::DragCoefficientError | Self::BedMotion) && shape[0] > 1.5
+        match self {
+            Self::DragCoefficientError | Self::BedMotion => shape[0] > 1.5,
+            Self::ChannelBlockage => shape[0] > 0.0,
+            _ => false,
+        }
     }
 
     /// Names and units of the nonlinear parameters that a report states.
     pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::HullFlooding => &[("opening_ratio", "1")],
-            Self::Squat => &[("faded_at", "1")],
+            Self::Squat | Self::ChannelBlockage => &[("faded_at", "1")],
             Self::WaterEntrySlamming => &[("wet_at", "m")],
             Self::WaveMemory => &[("time_constant", "s"), ("frequency", "rad/s")],
             _ => &[],

@@ -18,6 +18,7 @@ mod added_mass;
 mod bed_motion;
 mod body;
 mod channel_blockage;
+mod channel_flow;
 mod current;
 mod density_error;
 mod drag_coefficient_error;
@@ -69,7 +70,7 @@ pub fn basis(
         Effect::HullFlooding => hull_flooding::basis(memory, input, &mut emit),
         Effect::WaterEntrySlamming => water_entry_slamming::basis(shape, input, &mut emit),
         Effect::WaveMemory => wave_memory::basis(shape, memory, input, &mut emit),
-        Effect::ChannelBlockage => channel_blockage::basis(input, &mut emit),
+        Effect::ChannelBlockage => channel_blockage::basis(shape, input, &mut emit),
         Effect::Squat => squat::basis(shape, input, &mut emit),
         Effect::WheelPaddleThrust => wheel_paddle_thrust::basis(shape, input, &mut emit),
         Effect::BedMotion => bed_motion::basis(shape, input, &mut emit),

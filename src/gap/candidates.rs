@@ -12,6 +12,9 @@ const DELAY_ARM: f64 = 0.15;
 /// Speed below which rolling resistance fades out [m/s].
 const ROLLING_SPEED: f64 = 0.05;
 
+/// Shapes of one-dimensional flow in a channel, by the Froude number where it ends.
+const IN_CHANNEL: [Shape; 2] = [[0.7, 0.0, 0.0], [1.0, 0.0, 0.0]];
+
 /// Coefficient of a gain that all channels share.
 const ALL_CHANNELS: usize = 6;
 
@@ -97,10 +100,10 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::AddedMass | Effect::WheelPaddleThrust => vec![[0.0; 3], [1.0, 0.0, 0.0]],
         Effect::BedMotion => [0.0, 1.0, 2.0].map(|area| [area, 0.0, 0.0]).into(),
         Effect::Squat => {
-            let in_channel = [0.7, 1.0].map(|faded| [faded, 0.0, 0.0]);
-            let walls = if setting.channel_width.is_some() { &in_channel[..] } else { &[] };
+            let walls = if setting.channel_width.is_some() { &IN_CHANNEL[..] } else { &[] };
             [&[[0.0; 3], [0.0, 1.0, 0.0]][..], walls].concat()
         }
+        Effect::ChannelBlockage => [&[[0.0; 3]][..], &IN_CHANNEL].concat(),
         Effect::WaterEntrySlamming => {
             // a bottom without deadrise, and of 10, 20 and 30 degrees
             [0.0, 0.18, 0.36, 0.58].map(|slope| [0.5 * slope * setting.body.width, 0.0, 0.0]).into()
@@ -174,6 +177,8 @@ fn chain(
     columns: &mut [Column],
 ) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
+    // along an axis that is hardly accelerated there is noise alone, which would pull an error of the mass to 0
+    let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(series.coherence[axis].is_mostly_signal())));
     for (sample, p) in series.predicted.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();
@@ -213,7 +218,8 @@ fn chain(
             Effect::DriveGain => columns[0][sample] = series.other[sample],
             Effect::MassError => {
                 // the acceleration that the wrench was inferred with
-                let inertia = (series.recorded_acceleration[sample] + up * GRAVITY) * -setting.mass;
+                let acceleration = series.recorded_acceleration[sample].component_mul(&accelerated);
+                let inertia = (acceleration + up * GRAVITY) * -setting.mass;
                 (0..3).for_each(|axis| columns[0][sample][axis] = inertia[axis]);
             }
             _ => {}

@@ -53,7 +53,10 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
             let candidate = members[index].candidate;
             match design.candidates[candidate].effect {
                 Effect::Current | Effect::SensorDelay => iterate(design, all, setting, candidate, &others),
-                Effect::HullFlooding | Effect::WaterEntrySlamming | Effect::Squat => {
+                Effect::HullFlooding
+                | Effect::WaterEntrySlamming
+                | Effect::Squat
+                | Effect::ChannelBlockage => {
                     search(design, all, setting, &members[index], &others, &[0]);
                 }
                 Effect::WaveMemory => search(design, all, setting, &members[index], &others, &[0, 1]),

@@ -23,9 +23,16 @@ pub(super) struct Coherence {
     /// Mean square of the signal alone: the autocovariance beyond the reach `r` of the filters, back to 0 by a parabola,
     /// `c(0) = c(r) + (c(r) - c(2 r)) / 3`, since the noise of one sample does not reach the other.
     pub signal: f64,
+    /// Number of samples.
+    count: f64,
 }
 
 impl Coherence {
+    /// True where there is more signal than noise.
+    pub fn is_mostly_signal(&self) -> bool {
+        self.signal * self.count > 0.5 * self.power
+    }
+
     /// Of the samples of a trial.
     pub fn of(t: &[f64], value: impl Fn(usize) -> f64) -> Self {
         let values: Vec<f64> = (0..t.len()).map(value).collect();
@@ -43,7 +50,7 @@ impl Coherence {
         let (near, far) = (mean(at(reach)), mean(at(2 * reach)));
         let (power, count) = at(0);
         let signal = (near + (near - far) / 3.0).clamp(0.0, power / f64::max(count, 1.0));
-        Self { power, covariance: at(lag(COHERENT)).0, signal }
+        Self { power, covariance: at(lag(COHERENT)).0, signal, count }
     }
 }
 
