@@ -83,14 +83,14 @@ fn lists(vehicles: &[String]) -> Vec<String> {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use iceoryx2::prelude::{NodeBuilder, ipc};
+    use iceoryx2::prelude::ipc;
 
     use super::*;
 
     #[test]
     fn more_names_than_one_attribute_holds_are_told() {
         let names = Names::new(&format!("told-{}", std::process::id()));
-        let node = NodeBuilder::new().create::<ipc::Service>().unwrap();
+        let node = super::super::shm::node::<ipc::Service>().unwrap();
         assert_eq!(served::<ipc::Service>(&names), None);
         // 40 names of 40 letters: 6 fit into 256 with their spaces
         let vehicles: Vec<String> = (0..40).map(|i| format!("{i:040}")).collect();
