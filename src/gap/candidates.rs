@@ -178,7 +178,7 @@ fn chain(
 ) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
     // along an axis that is hardly accelerated there is noise alone, which would pull an error of the mass to 0
-    let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(series.coherence[axis].is_mostly_signal())));
+    let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(series.coherence[axis].is_a_motion())));
     for (sample, p) in series.predicted.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();

@@ -7,6 +7,9 @@ use super::series::Series;
 use crate::effects::{Effect, Shape};
 use crate::frame::GRAVITY;
 
+/// Last and smallest factor of the search.
+const SHORTEST_STEP: f64 = 1.015;
+
 /// Sets the shapes that are estimates of the effect's own coefficients: a current, a delay.
 pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
     for candidate in 0..design.candidates.len() {
@@ -66,6 +69,16 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
     }
 }
 
+/// Time constant below which no memory is looked for [s]: it is gone before waves leave the hull, which is inertia.
+fn shortest_memory(setting: &Setting) -> f64 {
+    0.8 * (setting.body.length / GRAVITY).sqrt()
+}
+
+/// True for a memory that the search would have made shorter still: what it stands for is no memory.
+pub(super) fn is_too_short(effect: Effect, shape: &Shape, setting: &Setting) -> bool {
+    effect == Effect::WaveMemory && shape[0] < SHORTEST_STEP * shortest_memory(setting)
+}
+
 /// Coordinate search over the nonlinear parameters of a member, by factors that shrink.
 fn search(
     design: &mut Design,
@@ -78,11 +91,11 @@ fn search(
     const TRIES: usize = 8;
     let coefficients: Vec<usize> = member.columns.iter().map(|(_, coefficient)| *coefficient).collect();
     let loss = |shape: &Shape| design.loss_with(all, setting, member.candidate, shape, &coefficients, others);
-    let memory = design.candidates[member.candidate].effect == Effect::WaveMemory;
-    let shortest = if memory { 0.8 * (setting.body.length / GRAVITY).sqrt() } else { 0.0 };
+    let effect = design.candidates[member.candidate].effect;
+    let shortest = if effect == Effect::WaveMemory { shortest_memory(setting) } else { 0.0 };
     let mut shape = design.candidates[member.candidate].shape;
     let mut best = loss(&shape);
-    for step in [1.5, 1.15, 1.05, 1.015] {
+    for step in [1.5, 1.15, 1.05, SHORTEST_STEP] {
         for &axis in axes {
             for factor in [step, 1.0 / step] {
                 for _ in 0..TRIES {

@@ -13,6 +13,9 @@ const REACH: usize = 11;
 /// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
 const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
 
+/// Share of signal from which samples are those of a motion; along an axis that is hardly accelerated there is less.
+const LEAST_SIGNAL: f64 = 0.25;
+
 /// How a rate hangs together in time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Coherence {
@@ -28,9 +31,9 @@ pub(super) struct Coherence {
 }
 
 impl Coherence {
-    /// True where there is more signal than noise.
-    pub fn is_mostly_signal(&self) -> bool {
-        self.signal * self.count > 0.5 * self.power
+    /// True where there is enough signal to speak of a motion.
+    pub fn is_a_motion(&self) -> bool {
+        self.signal * self.count > LEAST_SIGNAL * self.power
     }
 
     /// Of the samples of a trial.

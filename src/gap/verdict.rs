@@ -8,6 +8,7 @@ use super::features::energy;
 use super::general::{General, Structure};
 use super::judge::{Judge, Member};
 use super::lasting::lasting;
+use super::nonlinear::is_too_short;
 use super::report::Verdict;
 use crate::effects::{Effect, Kind};
 
@@ -57,6 +58,10 @@ impl Found {
         let coverage = if whole > 0.0 { (design.empty_loss() - loss) / whole } else { 1.0 };
         let faults = members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
         let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
+        let unresolved = members.iter().any(|member| {
+            let candidate = &design.candidates[member.candidate];
+            is_too_short(candidate.effect, &candidate.shape, judge.setting)
+        });
         let alternatives = judge.alternatives(members, library);
         let mut found =
             Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
@@ -65,7 +70,7 @@ impl Found {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
-        } else if coverage < needed || found.leaves_much(design) {
+        } else if coverage < needed || found.leaves_much(design) || unresolved {
             Verdict::NoCandidateFits
         } else if found.alternatives.is_empty() {
             Verdict::Named
@@ -118,8 +123,8 @@ pub(super) fn floor_loss(design: &Design, structure: &Structure) -> f64 {
             }
         }
     }
-    let rows = design.y.len() as f64;
-    let freedom = rows / (rows - columns.len() as f64).max(1.0);
-    let library = design.solve(&columns).map_or(f64::INFINITY, |(_, loss)| loss * freedom);
+    // midway between the loss in sample, which chance lowers, and the cross-validated one, which it raises as much: noise that
+    // hangs together lets each number take more than its share of the rows
+    let library = design.fit(&columns).map_or(f64::INFINITY, |fit| 0.5 * (fit.loss + fit.cv_loss));
     library.min(structure.loss).min(design.empty_loss()).max(0.0)
 }
