@@ -15,6 +15,8 @@
 //! surface on the plane of symmetry only what does not change under reflection, with lateral answers multiplied by
 //! something that does. So the mirror image of a state gets the mirror image of the answer, by construction.
 
+use nalgebra::UnitVector3;
+
 use crate::condition::{Condition, GroundContact};
 use crate::features::direction;
 use crate::forces::SurfaceForce;
@@ -278,6 +280,24 @@ impl Anchor {
                 }
             }
         }
+    }
+
+    /// How far loads had set in on each surface in a case of these coordinates: 0 on one that it left dry.
+    pub fn onsets(&self, vehicle: &Vehicle, coordinates: &[f64; COORDINATES]) -> impl Iterator<Item = f64> {
+        let [_, _, depth, _, _, x, y, _] = *coordinates;
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        // the side to which it leaned is not told: either may have been the lower one
+        let planes = [y, -y].map(|y| {
+            let up = UnitVector3::new_normalize(Vec3::new(x, y, z));
+            let state = Condition { up, ..Condition::level(Vec3::zeros(), depth * self.height) };
+            state.water_plane(vehicle.z0)
+        });
+        self.surfaces.iter().map(move |surface| {
+            let corners = surface.bounds.corners();
+            let depths =
+                corners.iter().flat_map(|corner| planes.iter().map(|plane| plane.depth_below(corner)));
+            ramp(depths.fold(0.0, f64::max))
+        })
     }
 
     fn surface(

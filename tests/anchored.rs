@@ -224,6 +224,34 @@ fn far_from_what_was_learnt_the_known_physics_is_left_and_marked() {
 }
 
 #[test]
+fn a_surface_that_no_case_wetted_has_nothing_learnt_however_near_the_state() {
+    let lesson = Lesson::new();
+    let trained = lesson.train(&short(), None);
+    let models = bundles(&trained, Isa::available()[0]);
+    let model = &models["husky"];
+    // the paper's Husky stands in 0.20 m at most; its upper front begins at 0.25 m
+    let deep = Condition::level(Vec3::new(0.8, 0.2, 0.0), 0.27);
+    let forces = evaluate(model, &deep);
+    assert!(
+        forces.outside.excess[Quantity::Distance as usize - 1] < 1.0,
+        "not far: the rest is what was learnt"
+    );
+    let mut reading = Reading::default();
+    wade::anchor::Anchor::new(model.vehicle()).read(model.vehicle(), &deep, &mut reading);
+    let learnt = |name: &str| {
+        let index = model.vehicle().surface_index(name).unwrap();
+        let known = &reading.surfaces[index];
+        assert!(known.wet_fraction > 0.0 && known.drag.norm() > 0.1, "{name} {known:?}");
+        (forces.surfaces[index].force - known.hydrostatic.force - known.drag).norm() / known.drag.norm()
+    };
+    assert!(learnt("front_upper") < 1e-12);
+    assert!(learnt("front_lower") > 1e-3 && learnt("wheel_fl") > 1e-3);
+    let shallow = evaluate(model, &Condition::level(Vec3::new(0.8, 0.2, 0.0), 0.19));
+    let upper = model.vehicle().surface_index("front_upper").unwrap();
+    assert!(forces.uncertainty.x > shallow.uncertainty.x && shallow.surfaces[upper].wetted_fraction == 0.0);
+}
+
+#[test]
 fn a_network_that_learnt_little_states_how_far_it_is_off() {
     let lesson = Lesson::new();
     let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);

@@ -38,6 +38,12 @@ impl Bounds {
         self.max - self.min
     }
 
+    /// The eight corners [m].
+    pub fn corners(&self) -> [Vec3; 8] {
+        let ends = [self.min, self.max];
+        std::array::from_fn(|i| Vec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2].z))
+    }
+
     /// Midpoint [m].
     pub fn center(&self) -> Vec3 {
         (self.min + self.max) * 0.5

@@ -52,28 +52,31 @@ pub struct Model {
     statics: StaticRows,
     /// What is known of the vehicle before anything is learnt, where the weights build on it.
     anchor: Option<Anchor>,
+    /// How much of the learnt part of each surface counts at most: nothing of one that no case wetted.
+    learnt: Vec<f64>,
 }
 
 impl Model {
     /// Packs the weights for an instruction set and precomputes what the vehicle contributes to layer 1.
     pub fn new(vehicle: Vehicle, version: u32, domain: Domain, weights: Weights, isa: Isa) -> Self {
         let network = &weights.network;
-        let (kernel, statics, anchor) = match &weights.form {
+        let (kernel, statics, anchor, learnt) = match &weights.form {
             Form::Paper(_) => {
                 let kernel = Kernel::new(network, (features::STATIC, features::DYNAMIC), isa);
                 let fixed =
                     |surface| features::surface_static(surface, &vehicle.dimensions).map(|x| x as f32);
                 let statics = kernel.static_rows(&vehicle.surfaces.iter().map(fixed).collect::<Vec<_>>());
-                (kernel, statics, None)
+                (kernel, statics, None, Vec::new())
             }
-            Form::Anchored(_) => {
+            Form::Anchored(form) => {
                 let kernel = Kernel::new(network, (anchor::STATIC, anchor::DYNAMIC), isa);
                 let anchor = Anchor::new(&vehicle);
                 let statics = kernel.static_rows(&anchor.static_rows(&vehicle));
-                (kernel, statics, Some(anchor))
+                let learnt = form.learnt(&anchor, &vehicle);
+                (kernel, statics, Some(anchor), learnt)
             }
         };
-        Self { vehicle, version, domain, weights, kernel, statics, anchor }
+        Self { vehicle, version, domain, weights, kernel, statics, anchor, learnt }
     }
 
     /// The vehicle.
@@ -140,7 +143,8 @@ impl Model {
         forces.uncertainty = Vec3::from(form.held_out_rms) * condition.density;
     }
 
-    /// Hydrostatics and simple drag, and the network's remainder as far as the state is near those that it learnt from.
+    /// Hydrostatics and simple drag, and the network's remainder as far as the state is near those that it learnt from and the
+    /// surface was in the water there.
     fn evaluate_anchored(
         &self,
         (form, anchor): (&Anchored, &Anchor),
@@ -163,16 +167,16 @@ impl Model {
         }
         let global = form.standardize(&reading.global);
         let outputs = self.kernel.forward(&global, &self.statics, wet, buffers);
-        let (mut learnt, mut spread) = (Vec3::zeros(), 0.0);
+        let (mut doubtful, mut spread) = (Vec3::zeros(), 0.0);
         for (WetSurface { surface, .. }, output) in wet.iter().zip(outputs) {
-            let known = &reading.surfaces[*surface];
-            let answer = faded(output, trust);
-            forces.surfaces[*surface] = known.load(&answer);
-            learnt += (known.force(&faded(output, 1.0)) - known.drag).abs();
+            let (known, learnt) = (&reading.surfaces[*surface], self.learnt[*surface]);
+            forces.surfaces[*surface] = known.load(&faded(output, trust * learnt));
+            let doubt = Anchored::doubt(distance).max(1.0 - learnt);
+            doubtful += (known.force(&faded(output, 1.0)) - known.drag).abs() * doubt;
             spread += known.unit * Anchored::softplus(output[SPREAD]);
         }
         let stated = Vec3::from(form.spread.map(f64::from)) * spread;
-        forces.uncertainty = stated + learnt * Anchored::doubt(distance);
+        forces.uncertainty = stated + doubtful;
     }
 
     /// Fills in where the water reaches and lists the wet surfaces with their features.

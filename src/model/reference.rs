@@ -46,15 +46,16 @@ impl Model {
         let mut reading = Reading::default();
         anchor.read(&self.vehicle, condition, &mut reading);
         let trust = Anchored::trust(form.distance(&reading.coordinates));
-        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle));
-        let force = surfaces.map(|(known, fixed)| {
+        let learnt = form.learnt(&anchor, &self.vehicle);
+        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(learnt);
+        let force = surfaces.map(|((known, fixed), learnt)| {
             if known.wet_fraction == 0.0 {
                 return Vec3::zeros();
             }
             let of_surface = fixed.into_iter().chain(known.dynamic);
             let row: Vec<f32> = of_surface.chain(form.standardize(&reading.global)).collect();
             let output = self.weights.network.forward(&row);
-            let answer: [f32; anchor::OUTPUTS] = std::array::from_fn(|i| output[i] * trust as f32);
+            let answer: [f32; anchor::OUTPUTS] = std::array::from_fn(|i| output[i] * (trust * learnt) as f32);
             known.hydrostatic.force + known.force(&answer)
         });
         force.collect()

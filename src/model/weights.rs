@@ -1,8 +1,9 @@
 //! What is learnt, and how a network's answers become forces.
 
-use crate::anchor::{COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS};
+use crate::anchor::{Anchor, COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS};
 use crate::condition::GroundContact;
 use crate::model::network::{Network, OUTPUTS, Scaling};
+use crate::vehicle::Vehicle;
 
 /// What the weights are and where they come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +74,18 @@ impl Anchored {
         };
         let nearest = self.cases.iter().map(squared).fold(f32::INFINITY, f32::min);
         f64::from(nearest.sqrt() / self.near)
+    }
+
+    /// How far loads had set in on each surface of a vehicle in the case that wetted it most: what was dry in all has nothing
+    /// learnt, and what the network says of it is anybody's guess.
+    pub fn learnt(&self, anchor: &Anchor, vehicle: &Vehicle) -> Vec<f64> {
+        let mut learnt = vec![0.0; vehicle.surfaces.len()];
+        for case in &self.cases {
+            let coordinates = std::array::from_fn(|i| f64::from(case[i] * self.coordinate_scale[i]));
+            let onsets = anchor.onsets(vehicle, &coordinates);
+            learnt.iter_mut().zip(onsets).for_each(|(most, onset)| *most = f64::max(*most, onset));
+        }
+        learnt
     }
 
     /// Coordinates of a state in the units of the cases.
