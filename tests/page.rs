@@ -97,6 +97,34 @@ fn the_numbers_of_the_page_are_those_of_the_query() {
     assert!(trouble.is_some_and(|trouble| trouble.contains("hidden")), "{trouble:?}");
 }
 
+#[test]
+fn the_colors_hold_the_surfaces_share_of_the_effects() {
+    let vehicles = common::copy_with_every_effect();
+    let served = Served::with(|config| config.vehicles = vehicles.path().into());
+    let address = address(&served);
+    let url = format!("http://{address}/#vehicle=husky&speed=0.8&direction=0&depth=0.18&color=fx");
+    let Some(output) = browse(&["--dump-dom".into(), url]) else { return };
+    let page = String::from_utf8(output.stdout).expect("text");
+    let query = json!({"vehicle": "husky", "state": {"velocity_mps": {"x": 0.8}, "depth_m": 0.18}});
+    let answer = http::post(address, "/v1/query", &query.to_string()).json();
+    let numbers = |field: &str| -> Vec<f64> {
+        answer[field].as_array().expect("an array").iter().filter_map(serde_json::Value::as_f64).collect()
+    };
+    let (own, share) = (numbers("surface_force_n"), numbers("effect_surface_force_n"));
+    let largest =
+        |of: &dyn Fn(usize) -> f64| (0..own.len()).step_by(3).map(|i| of(i).abs()).fold(0.0, f64::max);
+    let (with, without) = (largest(&|i| own[i] + share[i]), largest(&|i| own[i]));
+    // the scale ends at one of a few round numbers, the smallest that is not below the largest force
+    let ticks = &page[page.find("id=\"ticks\"").expect("ticks")..];
+    let end = ticks.find(" N<").expect("the last tick has the unit");
+    let top = ticks[..end].rsplit('>').next().and_then(|text| text.parse::<f64>().ok()).expect("a number");
+    assert!(
+        top >= with && top < 1.51 * with && !(top >= without && top < 1.51 * without),
+        "{top} {with} {without}"
+    );
+    assert!(page.contains("share of the effects"));
+}
+
 /// The picture of a page of this size as rows of red, green and blue.
 fn picture(url: &str, name: &str, width: usize, height: usize) -> Option<Vec<Vec<[u8; 3]>>> {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../page");

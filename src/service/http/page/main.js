@@ -59,13 +59,15 @@ async function ask() {
   }
 }
 
-/** The surfaces with their names, areas, and what the answer says of them. */
+/** The surfaces with their names, areas, and what the answer says of them; `force` with the effects' share, `own` without. */
 function loadsOf(answer) {
   const row = (values, index) => values.slice(3 * index, 3 * index + 3);
+  const share = (index) => (answer.effects.length ? row(answer.effect_surface_force_n, index) : [0, 0, 0]);
   return vehicle.surfaces.map((surface, index) => ({
     name: surface.name,
     area: surface.area_m2,
-    force: row(answer.surface_force_n, index),
+    force: add(row(answer.surface_force_n, index), share(index)),
+    own: row(answer.surface_force_n, index),
     point: row(answer.surface_point_m, index),
     wet: answer.wetted_fraction[index],
   }));
@@ -101,7 +103,8 @@ function newtonsPerMeter() {
 
 function arrows(world) {
   const perMeter = newtonsPerMeter();
-  element("arrows").textContent = `arrows: 0.1 m is ${short(0.1 * perMeter)} N; black: net force; gray hull: dry`;
+  element("arrows").textContent = `arrows: 0.1 m is ${short(0.1 * perMeter)} N; black: net force; gray hull: dry` +
+    (answer.effects.length ? "; colors and arrows with the surfaces' share of the effects" : "");
   const place = (point) => transform(world, point).slice(0, 3);
   const turn = (vector) => transform(world, vector).map((x, k) => x - world[12 + k]).slice(0, 3);
   const arrow = (from, force, color, wide) => ({ from: place(from), vector: scale(turn(force), 1 / perMeter), color, wide });

@@ -77,7 +77,7 @@ export function showSurfaces(surfaces, answer, pointed) {
   const head = row("th", ["surface", "wet", "Fx [N]", "Fy [N]", "Fz [N]", "|F| [N]"]);
   const lines = surfaces.map((surface, index) => {
     const made = row("td", [
-      [swatch(surface.color), surface.name], `${Math.round(100 * surface.wet)} %`, ...numbers(surface.force), fixed(Math.hypot(...surface.force)),
+      [swatch(surface.color), surface.name], `${Math.round(100 * surface.wet)} %`, ...numbers(surface.own), fixed(Math.hypot(...surface.own)),
     ]);
     made.addEventListener("mouseenter", () => pointed(index));
     made.addEventListener("mouseleave", () => pointed(undefined));
