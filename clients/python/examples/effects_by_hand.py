@@ -45,7 +45,7 @@ LIBRARY = {
     "wave_memory": Spec(
         _plain(surge=0.15, sway=0.15, heave=0.15), {"time_constant": (0.8, "s"), "frequency": (2.0, "rad/s")}
     ),
-    "channel_blockage": Spec(_plain(strength=0.5)),
+    "channel_blockage": Spec(_plain(strength=0.5), _plain(faded_at=0.0)),
     "squat": Spec(_plain(sinkage=0.3, trim=0.1), _plain(faded_at=0.0)),
     "wheel_paddle_thrust": Spec(_plain(thrust=0.4, torque=0.0)),
     "bed_motion": Spec(_plain(drag=0.1, lift=0.1)),
