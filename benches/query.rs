@@ -25,9 +25,20 @@ use wade::model::kernel::Isa;
 use wade::model::network::WIDTH;
 use wade::model::{Model, Workspace};
 
-fn model(vehicle: &str, isa: Isa) -> Model {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles").join(vehicle);
+fn shipped(path: &str, isa: Isa) -> Model {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles").join(path);
     bundle::load(&path, isa).expect("the shipped bundles are sound")
+}
+
+fn model(vehicle: &str, isa: Isa) -> Model {
+    shipped(vehicle, isa)
+}
+
+/// The version before, with the paper's network.
+fn paper(vehicle: &str, isa: Isa) -> Model {
+    let model = shipped(&format!("{vehicle}.versions/3/{vehicle}"), isa);
+    assert_eq!(model.weights().form.name(), "paper");
+    model
 }
 
 /// Deep enough that every surface is wet.
@@ -113,6 +124,7 @@ fn queries(vehicle: &str) -> Vec<Subject> {
     let tilted = Condition { up: up_from_roll_pitch(0.02, 0.05), ..wet };
     let every_isa = Isa::available().into_iter().map(|isa| query(name("query", isa), of(isa), wet, 1));
     let mut subjects: Vec<Subject> = every_isa.collect();
+    subjects.push(query(name("query of the paper's network", best), paper(vehicle, best), wet, 1));
     subjects.push(query(name("tilted query", best), of(best), tilted, 1));
     subjects.push(query(name("256 queries", best), of(best), wet, 256));
     let plain = of(best);
