@@ -300,6 +300,31 @@ fn a_density_error_scales_the_model() {
 }
 
 #[test]
+fn a_channel_multiplies_the_drag_by_continuity_and_more_where_the_surface_falls() {
+    let (width, depth, faded_at) = (4.0, 0.17, 0.8);
+    let mut blockage = effect(Effect::ChannelBlockage, 1.0);
+    blockage.shape = [faded_at, 0.0, 0.0];
+    blockage.parameters.get_mut("faded_at").unwrap().value = faded_at;
+    let served = served_with("husky", effects_file("husky", vec![blockage]));
+    let vehicle = served.model().vehicle();
+    // share of the channel's section that the hull's mean section takes
+    let plane = Condition::level(Vec3::zeros(), depth).water_plane(vehicle.z0);
+    let hydrostatics = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &vehicle.center_of_mass);
+    let share = hydrostatics.displaced_volume / (vehicle.dimensions.length * width * depth);
+    let by_continuity = (1.0 - share).powi(-2) - 1.0;
+    let more = |froude: f64| {
+        let speed = froude * (wade::frame::GRAVITY * depth).sqrt();
+        let loads = evaluate(&served, &Condition::level(Vec3::new(speed, 0.0, 0.0), depth), &told());
+        let drag: f64 = loads.forces.surfaces.iter().map(|load| load.force.x).sum();
+        load(&loads, Effect::ChannelBlockage).wrench.force.x / drag / by_continuity
+    };
+    // slow flow has a level surface, and so has that above the end of the fade
+    assert!((more(0.02) - 1.0).abs() < 0.03, "{}", more(0.02));
+    assert!((more(0.85) - 1.0).abs() < 0.03, "{}", more(0.85));
+    assert!(more(0.4) > 1.1 && more(0.6) > more(0.4), "{} {}", more(0.4), more(0.6));
+}
+
+#[test]
 fn a_water_level_offset_lifts_by_the_waterplane() {
     let served = only("warthog", Effect::WaterLevelOffset, 0.01);
     let vehicle = served.model().vehicle();
