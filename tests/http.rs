@@ -11,6 +11,8 @@ use std::io::Write as _;
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use common::{Numbers, PATIENCE, Served, VEHICLES};
@@ -273,18 +275,29 @@ fn json_is_refused_while_grpc_takes_every_place() {
     let mut client =
         GrpcClient::tcp(&served.url(), "husky", Method::Unary, patience).expect("the server is there");
     let states = vec![State { depth: 0.1, ..State::default() }; 1 << 13];
-    let long = std::thread::spawn(move || client.evaluate_batch(&states));
+    // one batch after the other, since on a busy machine a single one may be done before anybody asks; now and then it is the
+    // batch that finds the place taken
+    let enough = Arc::new(AtomicBool::new(false));
+    let until = Arc::clone(&enough);
+    let long = std::thread::spawn(move || {
+        let mut answered = 0;
+        while !until.load(Ordering::Relaxed) {
+            answered += u32::from(client.evaluate_batch(&states).is_ok());
+        }
+        answered
+    });
     let start = Instant::now();
     let refused = loop {
         let answer = post(address, "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
         if answer.status != 200 {
             break answer;
         }
-        assert!(start.elapsed() < patience && !long.is_finished(), "never refused");
+        assert!(start.elapsed() < patience, "never refused");
     };
+    enough.store(true, Ordering::Relaxed);
     assert_eq!(refusal(&refused), (429, "RESOURCE_EXHAUSTED".into(), String::new()));
     assert_eq!(refused.header("retry-after"), Some("1"));
-    long.join().expect("joined").expect("the batch is answered");
+    assert!(long.join().expect("joined") > 0, "batches are answered");
 }
 
 #[test]
