@@ -47,6 +47,7 @@ fn a_server_goes_on_when_clients_are_killed() {
     let served = Served::start();
     let mut survivor = served.shm("husky", Wait::Block);
     survivor.evaluate(&state()).expect("answered");
+    let out = TempDir::new().expect("a folder");
     for _ in 0..6 {
         // a client that asks without end, until it is killed in the middle of it
         let mut child = Command::new(env!("CARGO_BIN_EXE_wade"))
@@ -57,7 +58,7 @@ fn a_server_goes_on_when_clients_are_killed() {
             .arg("--vehicles")
             .arg(vehicles())
             .arg("--out")
-            .arg(TempDir::new().expect("a folder").path())
+            .arg(out.path())
             .stdin(Stdio::null())
             .spawn()
             .expect("the client starts");
