@@ -25,18 +25,14 @@ use wade::model::kernel::Isa;
 use wade::model::network::WIDTH;
 use wade::model::{Model, Workspace};
 
-fn shipped(path: &str, isa: Isa) -> Model {
+fn model(path: &str, isa: Isa) -> Model {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles").join(path);
     bundle::load(&path, isa).expect("the shipped bundles are sound")
 }
 
-fn model(vehicle: &str, isa: Isa) -> Model {
-    shipped(vehicle, isa)
-}
-
 /// The version before, with the paper's network.
 fn paper(vehicle: &str, isa: Isa) -> Model {
-    let model = shipped(&format!("{vehicle}.versions/3/{vehicle}"), isa);
+    let model = model(&format!("{vehicle}.versions/3/{vehicle}"), isa);
     assert_eq!(model.weights().form.name(), "paper");
     model
 }

@@ -45,6 +45,15 @@ impl OwnIceoryx {
         ours.map(|entry| entry.path())
     }
 
+    /// Servers that were answering, and were killed.
+    fn leave_remains<const N: usize>(&self, namespaces: [&str; N]) {
+        let servers = namespaces.map(|namespace| self.start(namespace));
+        for namespace in namespaces {
+            until_answered(&mut client("husky", namespace));
+        }
+        servers.into_iter().for_each(Process::kill);
+    }
+
     fn start(&self, namespace: &str) -> Process {
         let settings = self.folder.path().join(namespace);
         std::fs::create_dir_all(&settings).expect("a folder");
@@ -96,13 +105,7 @@ fn the_reason_is_right_among_the_remains_of_other_servers() {
     let own = OwnIceoryx::new();
     // names that begin as ours does, and the other way round
     let others = ["ford", "ford-2", "for", "bed"];
-    let servers = others.map(|namespace| own.start(namespace));
-    for namespace in others {
-        until_answered(&mut client("husky", namespace));
-    }
-    for server in servers {
-        server.kill();
-    }
+    own.leave_remains(others);
 
     let error_without_server = error("husky", "ford-1");
     assert!(matches!(error_without_server, ClientError::NoServer { .. }), "{error_without_server:?}");
@@ -139,13 +142,7 @@ fn the_reason_is_right_among_the_remains_of_other_servers() {
 
     // as after a loss of power: iceoryx2 waits half a second for each file to be finished by whoever began it, and longer than
     // anybody's patience for all
-    let servers = others.map(|namespace| own.start(namespace));
-    for namespace in others {
-        until_answered(&mut client("husky", namespace));
-    }
-    for server in servers {
-        server.kill();
-    }
+    own.leave_remains(others);
     let damaged: Vec<_> =
         own.files().filter(|file| file.extension().is_some_and(|it| it == "dynamic")).collect();
     assert!(damaged.len() >= 4 * others.len(), "{damaged:?}");

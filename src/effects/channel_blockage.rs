@@ -20,7 +20,7 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
         emit(0, Part::Hull, input.at(input.predicted_drag() * more, &immersion.center_of_buoyancy));
         return;
     }
-    let Some(width) = input.channel_width.filter(|_| immersion.depth > 1e-3) else { return };
+    let Some(width) = channel_flow::width(input) else { return };
     let wet = input.body.panels.iter().zip(&immersion.panels);
     let front: f64 = wet.map(|(panel, wet)| panel.windward(&velocity).x * wet.fraction).sum();
     let blockage = (front / (width * immersion.depth)).min(MOST);

@@ -9,7 +9,7 @@ use super::input::Input;
 use crate::frame::GRAVITY;
 
 /// Shallowest water that there is a flow in [m].
-const LEAST_DEPTH: f64 = 1e-3;
+pub(super) const LEAST_DEPTH: f64 = 1e-3;
 /// Most of the section that a hull may take [-].
 pub(super) const MOST: f64 = 0.8;
 
@@ -31,11 +31,15 @@ pub(super) fn excess(input: &Input, gone_at: f64) -> Option<f64> {
     Some(((1.0 - blockage) * (1.0 - depression)).powi(-2) - 1.0)
 }
 
+/// Width of the channel [m]; none without walls or water.
+pub(super) fn width(input: &Input) -> Option<f64> {
+    input.channel_width.filter(|_| input.immersion.depth > LEAST_DEPTH)
+}
+
 /// Share of the channel's section that the hull's mean section takes [-], at most `b / w` since no hull stands deeper in the
 /// water than the water is; none without walls or water.
 fn blockage(input: &Input) -> Option<f64> {
-    let immersion = input.immersion;
-    let width = input.channel_width.filter(|_| immersion.depth > LEAST_DEPTH)?;
+    let (width, immersion) = (width(input)?, input.immersion);
     let section = immersion.volume / input.body.length;
     Some((section / (width * immersion.depth)).min(input.body.width / width).min(MOST))
 }

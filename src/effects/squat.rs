@@ -9,7 +9,7 @@
 //! All are laws of ships at Fr_h below 0.7: low confidence for us. The shape is that Froude number, 0 for open water, and 1
 //! for Tuck instead of Bernoulli.
 
-use super::channel_flow::{depression, froude_squared};
+use super::channel_flow::{LEAST_DEPTH, depression, froude_squared};
 use super::input::{Input, Part};
 use super::library::Shape;
 use crate::frame::{GRAVITY, Vec3};
@@ -26,7 +26,7 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
     } else {
         head
     };
-    let depression = relative * immersion.depth.max(1e-3);
+    let depression = relative * immersion.depth.max(LEAST_DEPTH);
     let load = state.density * GRAVITY * depression * immersion.waterplane_area;
     let down = state.up.into_inner() * -load;
     emit(0, Part::Hull, input.at(down, &immersion.waterplane_center));

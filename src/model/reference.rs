@@ -46,8 +46,7 @@ impl Model {
         let mut reading = Reading::default();
         anchor.read(&self.vehicle, condition, &mut reading);
         let trust = Anchored::trust(form.distance(&reading.coordinates));
-        let learnt = form.learnt(&anchor, &self.vehicle);
-        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(learnt);
+        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&self.learnt);
         let force = surfaces.map(|((known, fixed), learnt)| {
             if known.wet_fraction == 0.0 {
                 return Vec3::zeros();
