@@ -15,6 +15,9 @@ mod common;
 /// Coarse, and too short to settle: seconds a case.
 const COARSE: &str = "settle_s = [0.6, 0.6]\nwindow_s = 0.4\nwindows = 1\n[mesh]\ncells_per_length = 4.0\n\
                       channel_m = [6.0, 5.0, 1.5]\n";
+/// As coarse, and long enough for a surface that is not held still to have moved.
+const STILL: &str = "settle_s = [2.0, 2.0]\nwindow_s = 1.0\nwindows = 1\n[mesh]\ncells_per_length = 4.0\n\
+                     channel_m = [6.0, 5.0, 1.5]\n";
 
 fn openfoam() -> Option<OpenFoam> {
     match OpenFoam::find() {
@@ -109,11 +112,11 @@ fn a_still_case_feels_archimedes_on_its_own_mesh() {
     if openfoam().is_none() {
         return;
     }
-    let (_folder, campaign) = planned(COARSE);
+    let (_folder, campaign) = planned(STILL);
     let path = Path::new(&campaign);
     let mut plan = Plan::read(path).expect("a plan");
     plan.cases.truncate(1);
-    (plan.cases[0].speed_mps, plan.cases[0].end_speed_mps, plan.cases[0].depth_m) = (0.0, 0.0, 0.18);
+    (plan.cases[0].speed_mps, plan.cases[0].end_speed_mps, plan.cases[0].depth_m) = (0.0, 0.0, 0.10);
     plan.write(path).expect("written");
     let output = wade(&["campaign", "run", &campaign, "--jobs", "1"]);
     assert!(output.status.success(), "{}", stderr(&output));
@@ -123,7 +126,8 @@ fn a_still_case_feels_archimedes_on_its_own_mesh() {
     let rest: f64 = first.surfaces.iter().map(|s| s.rest.expect("at rest").force.z).sum();
     let error = first.net_force().z / rest - 1.0;
     println!("at rest the solver is {:+.2} % off Archimedes on the mesh", 100.0 * error);
-    assert!(error.abs() < 0.02, "{error}");
+    // -2.5 % where faces between cells of two sizes drive the air above them
+    assert!(error.abs() < 0.01, "{error}");
 }
 
 #[test]
