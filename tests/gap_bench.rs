@@ -191,16 +191,35 @@ fn the_workflow_keeps_silent_on_noise_and_names_what_is_hidden() {
     assert!(value("held-out closure, median, 3 x").unwrap() > 0.9);
 }
 
-#[test]
-fn a_search_that_comes_back_to_a_set_ends() {
+/// The report on one of the first `count` cases of a family at full size.
+fn report_at_full_size(family: Family, count: usize, seed: u64, name: &str) -> gap::Report {
     let hull = Hull::generated_box();
     let warthog = shipped::warthog().unwrap().vehicle().unwrap();
-    let all = cases(&[Family::Null], 12, 3);
-    let case = all.iter().find(|case| case.name == "null-010-surrogateerror").unwrap();
+    let all = cases(&[family], count, seed);
+    let case = all.iter().find(|case| case.name == name).unwrap();
     let made = generate(case, &Schedule::full(&warthog, 1), box_simulator(&hull));
     let body = gap::body_of(&made.trials).unwrap();
-    let report = gap::run(&made.trials, &body, &mut |_| Predicted::default(), &Config::default()).unwrap();
+    gap::run(&made.trials, &body, &mut |_| Predicted::default(), &Config::default()).unwrap()
+}
+
+#[test]
+fn a_search_that_comes_back_to_a_set_ends() {
+    let report = report_at_full_size(Family::Null, 12, 3, "null-010-surrogateerror");
     assert!(report.effects.is_empty(), "{}", report.summary);
+}
+
+#[test]
+fn an_effect_of_a_region_is_not_called_what_imitates_it_everywhere() {
+    let report = report_at_full_size(Family::Gated, 8, 1, "gated-007-linear_damping");
+    assert_eq!(report.verdict, gap::Verdict::NoCandidateFits, "{}", report.summary);
+    let text = report.gap.unexplained.unwrap_or_default();
+    assert!(text.contains("where depth <=") && text.contains("it is like linear damping"), "{text}");
+}
+
+#[test]
+fn a_load_that_no_function_of_the_state_predicts_is_not_called_nothing() {
+    let report = report_at_full_size(Family::Outside, 8, 1, "outside-003-mud_suction");
+    assert_eq!(report.verdict, gap::Verdict::NoCandidateFits, "{}", report.summary);
 }
 
 /// Folder of the published measurements, which are not part of the repository.

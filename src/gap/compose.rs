@@ -9,7 +9,7 @@ use super::design::Design;
 use super::detect::{self, Excitation};
 use super::experiment::separating;
 use super::fit::{Fit, Parameter, fit};
-use super::gated::{Gated, gated};
+use super::gated::Gated;
 use super::holdout::{closures, explained, worse};
 use super::judge::{Judge, Member};
 use super::noise::{Floor, floors_of};
@@ -58,13 +58,9 @@ pub(super) fn compose(
         _ => Vec::new(),
     };
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
-    let gated = match found.verdict {
-        Verdict::NoCandidateFits => gated(judge, library),
-        _ => None,
-    };
     let (regions, regions_tried) = match found.verdict {
         Verdict::NothingMissing => (Vec::new(), 0),
-        _ => locate::locate(all, &design.trials, gap_excess, gated.map(|gated| gated.limits), config),
+        _ => locate::locate(all, &design.trials, gap_excess, found.gated.map(|gated| gated.limits), config),
     };
     let excitation =
         detect::excitations(design, all, setting, &trials.manifest, &found.residual, &config.library, config);
@@ -78,7 +74,7 @@ pub(super) fn compose(
         separating(&effects(&found.members), &effects(rival))
     });
     let held_floors = floors_of(all, &held, judge.floors, &setting.components);
-    let unexplained = unexplained(judge, &found, gated);
+    let unexplained = unexplained(judge, &found);
     let gap = GapReport {
         held_out: closures(&named, all, &held, setting, &held_floors, config),
         size: detect::sizes(all, judge.floors, &setting.components, config),
@@ -109,7 +105,7 @@ pub(super) fn compose(
         sources: Sources { trials: hash(trials), ..Sources::default() },
         traces: traces(&named, all, &held, setting, judge.floors),
     };
-    report.summary = summary(&report);
+    report.summary = summary(&report, found.gated);
     report
 }
 
@@ -235,7 +231,7 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
     ])
 }
 
-fn unexplained(judge: &Judge, found: &Found, gated: Option<Gated>) -> Option<String> {
+fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
     let left = &found.left;
     let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
     let share = left.gain / whole;
@@ -254,7 +250,7 @@ fn unexplained(judge: &Judge, found: &Found, gated: Option<Gated>) -> Option<Str
         (100.0 * share).clamp(0.0, 100.0),
         functions.join(", ")
     );
-    if let Some(gated) = gated {
+    if let Some(gated) = found.gated.filter(|_| found.verdict == Verdict::NoCandidateFits) {
         text += &format!(
             "; where {} it is like {}, and {:.0} % of it goes with that there",
             locate::in_words(&gated.limits),
@@ -358,7 +354,7 @@ fn trace(
     }
 }
 
-fn summary(report: &Report) -> String {
+fn summary(report: &Report, gated: Option<Gated>) -> String {
     let names = |effects: &[NamedEffect]| {
         effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
     };
@@ -371,7 +367,12 @@ fn summary(report: &Report) -> String {
             "Nothing is missing that these trials can show: the gap holds no structure beyond its noise."
                 .into()
         }
-        Verdict::Named => format!("What is missing is {}.{closed}", names(&report.effects)),
+        Verdict::Named => {
+            let there = gated.map_or_else(String::new, |gated| {
+                format!(" It explains more of it where {} alone.", locate::in_words(&gated.limits))
+            });
+            format!("What is missing is {}.{closed}{there}", names(&report.effects))
+        }
         Verdict::Ambiguous => format!(
             "What is missing is {}, or {}: these trials cannot tell them apart.{closed}",
             names(&report.effects),

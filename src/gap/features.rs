@@ -20,6 +20,10 @@ pub(super) const FEATURES: [(&str, &str); 9] = [
     ("roll", "rad"),
 ];
 
+/// Places in [`FEATURES`].
+pub(super) const DEPTH: usize = 0;
+pub(super) const SPEED: usize = 2;
+
 /// The features of a place, in the order of [`FEATURES`].
 pub(super) type Features = [f64; FEATURES.len()];
 
@@ -58,6 +62,21 @@ pub(super) fn time_in_water(series: &Series) -> Vec<f64> {
     series.t.iter().zip(series.conditions.iter().map(|c| c.depth)).map(&mut of).collect()
 }
 
+/// A target that has the rows of the design without the mean of each component in each trial.
+pub(super) fn without_zeros(design: &Design, target: &DVector<f64>) -> DVector<f64> {
+    let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+    let mut zero = vec![[(0.0, 0.0); 6]; trials];
+    for (row, place) in design.rows.rows.iter().enumerate() {
+        let (sum, count) = &mut zero[place.trial][place.component];
+        (*sum, *count) = (*sum + target[row], *count + 1.0);
+    }
+    DVector::from_fn(target.len(), |row, _| {
+        let place = &design.rows.rows[row];
+        let (sum, count) = zero[place.trial][place.component];
+        target[row] - sum / count
+    })
+}
+
 /// How the energy of the rows that no trend explains grows with the state: the deviate of the strongest quantity, its
 /// name, and the root of the energy in its upper third, in noises of a bin. White noise of any size is taken off block by
 /// block, so that noise that grows with speed is no structure.
@@ -65,15 +84,8 @@ pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> 
     let blocks = design.rows.blocks;
     let mut series: Vec<[Vec<f64>; 6]> = vec![Default::default(); blocks];
     // the zero of a trial is no force that comes and goes
-    let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
-    let mut zero = vec![[(0.0, 0.0); 6]; trials];
-    for (row, place) in design.rows.rows.iter().enumerate() {
-        let (sum, count) = &mut zero[place.trial][place.component];
-        (*sum, *count) = (*sum + target[row], *count + 1.0);
-    }
-    for (row, place) in design.rows.rows.iter().enumerate() {
-        let (sum, count) = zero[place.trial][place.component];
-        series[place.block][place.component].push(target[row] - sum / count);
+    for (place, value) in design.rows.rows.iter().zip(&without_zeros(design, target)) {
+        series[place.block][place.component].push(*value);
     }
     let excess: Vec<f64> = series
         .iter()

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::Config;
 use super::candidates::Setting;
 use super::design::Design;
+use super::features::{DEPTH, Features, SPEED, of_bins};
 use super::judge::Member;
 use super::rates::accelerations;
 use super::robust::errors;
@@ -24,9 +25,9 @@ use crate::random::Random;
 const Z90: f64 = 1.645;
 /// Fewest trials, in effect, that let an interval rest on the scatter between trials.
 const ENOUGH_TRIALS: f64 = 8.0;
-/// Share of a coefficient of the water that its formula leaves open, one standard deviation: no law of the library holds
-/// to better than some per cent on a hull, and no number of trials shows it.
-const FORMULA: f64 = 0.03;
+/// Share of a load of the water that its formula leaves open, one standard deviation: no law of the library holds to
+/// better than some per cent on a hull, and no number of trials shows it.
+const FORMULA: f64 = 0.05;
 /// Fewer trials than this, in effect: one condition.
 const ONE_CONDITION: f64 = 2.5;
 
@@ -97,14 +98,32 @@ pub(super) fn fit(
     let draws = bootstrap(&groups, &noise, config);
     let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
     let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
-    let formula = |i: usize| match design.candidates[set[used[i].0].candidate].effect.kind() {
-        Kind::Physics => FORMULA * values[i],
-        _ => 0.0,
-    };
-    let covariance = DMatrix::from_fn(count, count, |i, j| {
-        let open = if i == j { formula(i).powi(2) } else { 0.0 };
-        covariance(&draws, i, j) / (scale[i] * scale[j]) + open
+    let is_law = |m: usize| design.candidates[set[m].candidate].effect.kind() == Kind::Physics;
+    let laws: Vec<usize> = (0..set.len()).filter(|&m| is_law(m)).collect();
+    let loads = laws.iter().map(|&m| {
+        let own = used.iter().enumerate().filter(|(_, (member, ..))| *member == m);
+        let add = |mut sum: DVector<f64>, (i, (_, column, _)): (usize, &(usize, usize, usize))| {
+            sum.axpy(best[i], &design.x.column(*column), 1.0);
+            sum
+        };
+        own.fold(DVector::zeros(design.y.len()), add)
     });
+    let bent = bent(design, all, loads);
+    let whole = sum_of(&groups, &vec![1.0; groups.len()], &noise).0.cholesky()?;
+    let leaks: Vec<DVector<f64>> = bent
+        .iter()
+        .map(|load| {
+            let own = columns.iter().map(|&c| design.x.column(c).dot(load));
+            let moved = moved.iter().map(|column| column.dot(load));
+            whole.solve(&DVector::from_iterator(noise.len(), own.chain(moved))) * FORMULA
+        })
+        .collect();
+    let open = |i: usize, j: usize| {
+        let own = if i == j && is_law(used[i].0) { (FORMULA * values[i]).powi(2) } else { 0.0 };
+        own + leaks.iter().map(|leak| leak[i] * leak[j]).sum::<f64>() / (scale[i] * scale[j])
+    };
+    let covariance =
+        DMatrix::from_fn(count, count, |i, j| covariance(&draws, i, j) / (scale[i] * scale[j]) + open(i, j));
     let interval = |i: usize| {
         let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale[i]).collect();
         let drawn = [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)];
@@ -113,14 +132,15 @@ pub(super) fn fit(
         let expansion = student_from_normal(Z90, freedom) / Z90 * ((freedom + 1.0) / freedom).sqrt();
         drawn.map(|end| {
             let reach = (end - values[i]) * expansion;
-            values[i] + reach.signum() * reach.hypot(Z90 * formula(i))
+            values[i] + reach.signum() * reach.hypot(Z90 * open(i, i).sqrt())
         })
     };
     let intervals = (0..count).map(interval).collect();
     let mut shape_std = vec![[0.0; 3]; set.len()];
     for (place, &(m, axis)) in shapes.iter().enumerate() {
         let value = design.candidates[set[m].candidate].shape[axis];
-        shape_std[m][axis] = value * covariance_of(&draws, count + place).sqrt();
+        let leaked: f64 = leaks.iter().map(|leak| leak[count + place].powi(2)).sum();
+        shape_std[m][axis] = value * (covariance_of(&draws, count + place) + leaked).sqrt();
     }
     let provisional = (0..set.len())
         .map(|m| {
@@ -131,6 +151,31 @@ pub(super) fn fit(
         })
         .collect();
     Some(Fit { values, covariance, intervals, provisional, shape_std })
+}
+
+/// Each load as it would be missing where its law holds less well the deeper, or the faster: the load times the depth, and
+/// the speed, in standard deviations over where it acts. What the law then leaves, the others of the set take up.
+fn bent(design: &Design, all: &[Series], loads: impl Iterator<Item = DVector<f64>>) -> Vec<DVector<f64>> {
+    let features: Vec<Vec<Features>> = all.iter().map(of_bins).collect();
+    let mut bent = Vec::new();
+    for load in loads {
+        for feature in [DEPTH, SPEED] {
+            let at = |row: usize| {
+                let place = &design.rows.rows[row];
+                features[place.trial][place.bin][feature]
+            };
+            let weighted = |of: &dyn Fn(usize) -> f64| {
+                (0..load.len()).map(|row| load[row].powi(2) * of(row)).sum::<f64>()
+                    / load.norm_squared().max(f64::MIN_POSITIVE)
+            };
+            let mean = weighted(&at);
+            let deviation = weighted(&|row| (at(row) - mean).powi(2)).sqrt();
+            if deviation > 1e-6 {
+                bent.push(DVector::from_fn(load.len(), |row, _| load[row] * (at(row) - mean) / deviation));
+            }
+        }
+    }
+    bent
 }
 
 /// Members and axes of the nonlinear parameters that were searched for.
@@ -195,6 +240,12 @@ fn clusters(design: &Design, columns: &[usize], moved: &[DVector<f64>]) -> Clust
 }
 
 fn weighted(groups: &[Group], weights: &[f64], noise: &[f64]) -> Option<DVector<f64>> {
+    let (xx, xy) = sum_of(groups, weights, noise);
+    xx.cholesky().map(|factor| factor.solve(&xy))
+}
+
+/// Normal equations of weighted clusters, without the noise of the columns.
+fn sum_of(groups: &[Group], weights: &[f64], noise: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let count = noise.len();
     let mut xx = DMatrix::zeros(count, count);
     let mut xy = DVector::zeros(count);
@@ -205,7 +256,7 @@ fn weighted(groups: &[Group], weights: &[f64], noise: &[f64]) -> Option<DVector<
     for i in 0..count {
         xx[(i, i)] *= 1.0 - noise[i] + 1e-9;
     }
-    xx.cholesky().map(|factor| factor.solve(&xy))
+    (xx, xy)
 }
 
 /// Estimates from clusters drawn with replacement.

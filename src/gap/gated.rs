@@ -19,7 +19,7 @@ const CUTS: usize = 24;
 /// Limits of a region.
 const MOST: usize = 3;
 /// Share of the gap above the floor that a limit must add.
-const WORTH: f64 = 0.03;
+pub(super) const WORTH: f64 = 0.03;
 /// Share of the gap above the floor that the effect must explain within its region.
 const EXPLAINED: f64 = 0.6;
 

@@ -217,7 +217,9 @@ impl<'a> Judge<'a> {
             let weakest = (0..own.len()).min_by(|&a, &b| deviate(a).total_cmp(&deviate(b)));
             let bad = (0..own.len()).find(|&i| outside(i)).filter(|_| own.len() > 1);
             let drop = bad.or(weakest.filter(|&i| own.len() > 1 && deviate(i) < COLUMN_DEVIATE));
-            if let Some(drop) = drop {
+            if let Some(drop) =
+                drop.or_else(|| self.of_noise(effect, base, &own, &beta.as_slice()[at..], &residual))
+            {
                 own.remove(drop);
                 continue;
             }
@@ -452,6 +454,28 @@ impl<'a> Judge<'a> {
             judged.refused = Some(Refusal::SharedNoise);
         }
         Some(judged)
+    }
+
+    /// The first of several columns that agrees with the gap from sample to sample alone: a channel that carries nothing but
+    /// noise of the motion seems to have a gain of -1, and would lend the others what it takes off the loss.
+    fn of_noise(
+        &self,
+        effect: Effect,
+        base: &[usize],
+        own: &[(usize, usize)],
+        beta: &[f64],
+        residual: &DVector<f64>,
+    ) -> Option<usize> {
+        if own.len() < 2 || lives_on_a_rate(effect) {
+            return None;
+        }
+        let outlasts = |i: usize| {
+            let others = own.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, (column, _))| *column);
+            let base: Vec<usize> = base.iter().copied().chain(others).collect();
+            contribution(self.design, &base, &[own[i].0], &beta[i..=i])
+                .is_none_or(|sum| outlasts_noise(self.design, &sum, &(residual + &sum)))
+        };
+        (0..own.len()).find(|&i| !outlasts(i))
     }
 
     fn outlasts_noise(&self, set: &[Member], member: &Member) -> Option<bool> {

@@ -23,8 +23,9 @@ pub(super) struct Coherence {
     pub power: f64,
     /// Sum of the products [`COHERENT`] apart.
     pub covariance: f64,
-    /// Mean square of the signal alone: the autocovariance beyond the reach `r` of the filters, back to 0 by a parabola,
-    /// `c(0) = c(r) + (c(r) - c(2 r)) / 3`, since the noise of one sample does not reach the other.
+    /// Mean square of the signal alone: the autocovariance at one, one and a half and two reaches of the filters, beyond
+    /// which the noise of one sample does not reach the other, back to 0 by the even polynomial of the fourth degree through
+    /// them. One of the second degree loses a sixth of a change of speed that takes half a second, this one a sixteenth.
     pub signal: f64,
     /// Number of samples.
     count: f64,
@@ -50,11 +51,22 @@ impl Coherence {
             pairs.fold((0.0, 0.0), |(sum, count), product| (sum + product, count + 1.0))
         };
         let mean = |(sum, count): (f64, f64)| sum / f64::max(count, 1.0);
-        let (near, far) = (mean(at(reach)), mean(at(2 * reach)));
         let (power, count) = at(0);
-        let signal = (near + (near - far) / 3.0).clamp(0.0, power / f64::max(count, 1.0));
+        let lags = [reach, reach + reach.div_ceil(2), 2 * reach];
+        let signal = at_none(lags.map(|lag| lag as f64), lags.map(|lag| mean(at(lag))));
+        let signal = signal.clamp(0.0, power / f64::max(count, 1.0));
         Self { power, covariance: at(lag(COHERENT)).0, signal, count }
     }
+}
+
+/// The value at 0 of the even polynomial of the fourth degree through three points.
+fn at_none(lags: [f64; 3], values: [f64; 3]) -> f64 {
+    let squares = lags.map(|lag| lag * lag);
+    let weight = |i: usize| {
+        let others = squares.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, square)| square / (square - squares[i])).product::<f64>()
+    };
+    (0..3).map(|i| weight(i) * values[i]).sum()
 }
 
 /// Linear and angular acceleration in one row.
@@ -136,6 +148,14 @@ mod tests {
         let both = Coherence::of(&t, |i| filtered[i] + wave(i));
         // the wave's mean square is twice that of the noise
         assert!((both.signal / (2.0 * noise) - 1.0).abs() < 0.05, "{both:?} {noise}");
+        // changes of speed that take 0.6 s, as smooth as a driver's, every two seconds
+        let change = |i: usize| {
+            let u = (t[i] % 2.0 / 0.6).min(1.0);
+            30.0 * (u * (1.0 - u)).powi(2)
+        };
+        let power = (0..t.len()).map(|i| change(i).powi(2)).sum::<f64>() / t.len() as f64;
+        let pushes = Coherence::of(&t, change);
+        assert!((pushes.signal / power - 1.0).abs() < 0.1, "{pushes:?} {power}");
         let alone = Coherence::of(&t, |i| filtered[i]);
         assert!(alone.covariance / alone.power < 0.05 && alone.signal < 0.05 * noise, "{alone:?} {noise}");
     }

@@ -115,9 +115,12 @@ impl Judge<'_> {
     /// uncertainty leave open, for a member that explains `explained`.
     ///
     /// The scatter from trial to trial, and a hundredth for the formula. Where few trials tell the two apart that scatter
-    /// says nothing: there the noise alone counts, through what the two predict differently, and a twentieth.
+    /// says nothing: there the noise alone counts, through what the two predict differently, and more for the formula, whose
+    /// errors fewer trials average.
     fn difference(&self, rival: &[Member], set: &[Member], explained: f64) -> Option<(f64, f64)> {
         const ENOUGH: f64 = 8.0;
+        /// Share of what is explained that a formula leaves open in one trial, and the bounds of that in several.
+        const FORMULA: (f64, [f64; 2]) = (0.1, [0.01, 0.05]);
         let (a, b) = (self.predictions(rival)?, self.predictions(set)?);
         let design = self.design;
         let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
@@ -128,13 +131,15 @@ impl Judge<'_> {
         let count = trials.len() as f64;
         let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), d| (s + d.abs(), q + d * d));
         let total: f64 = trials.iter().sum();
-        if sum * sum >= ENOUGH * squares {
+        let telling = sum * sum / squares.max(f64::MIN_POSITIVE);
+        let formula = (FORMULA.0 / telling).clamp(FORMULA.1[0], FORMULA.1[1]) * explained;
+        if telling >= ENOUGH {
             let variance = trials.iter().map(|d| (d - total / count).powi(2)).sum::<f64>() / (count - 1.0);
-            return Some((total, (2.0 * (variance * count).sqrt()).max(0.01 * explained)));
+            return Some((total, (2.0 * (variance * count).sqrt()).max(formula)));
         }
         // the loss of the rival has the noise twice as often as the predictions differ
         let noise = 2.0 * noise_of(design, &(&design.y - &b), &(&a - &b)).sqrt();
-        Some((total, (2.0 * noise).max(0.05 * explained)))
+        Some((total, (2.0 * noise).max(formula)))
     }
 
     /// What a set predicts of each row by the fit without the row's fold.

@@ -4,7 +4,8 @@ use nalgebra::DVector;
 
 use super::design::Design;
 use super::detect::sizes;
-use super::features::energy;
+use super::features::{energy, without_zeros};
+use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
 use super::judge::{Judge, Member};
 use super::lasting::lasting;
@@ -21,10 +22,17 @@ const ENERGY: [f64; 2] = [4.5, 0.8];
 /// Deviates in one trial that what lasts needs: one of a hundred trials with noise alone reaches 3.5, and products of
 /// normal numbers have heavier tails than they.
 const LASTS: f64 = 7.0;
+/// What lasts beyond the zero of its trial and is clearly larger than the noise itself needs no more than what one of a hundred
+/// trials reaches by chance: noise that hangs together is no larger than all of the noise. Deviates, and root mean square
+/// in noises of a bin.
+const LOUD: [f64; 2] = [3.5, 1.2];
 
 /// Least share of the structure that must be explained where a fault of the sensor is named. Laws of the water hold in
 /// outline; a zero, a gain or a turned axis is exact, and where one leaves more it stands in for another thing.
 const EXACT: f64 = 0.8;
+
+/// Share of the gap above the floor that an effect may leave to a region of its own and still be named for everywhere.
+const LIMITED: f64 = 0.1;
 
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
@@ -35,6 +43,8 @@ pub(super) struct Found {
     pub members: Vec<Member>,
     pub alternatives: Vec<Vec<Member>>,
     pub residual: DVector<f64>,
+    /// One effect that explains more within a region than the members do everywhere.
+    pub gated: Option<Gated>,
     /// What is left, without a name.
     pub left: Structure,
     pub loss: f64,
@@ -63,14 +73,28 @@ impl Found {
             is_too_short(candidate.effect, &candidate.shape, judge.setting)
         });
         let alternatives = judge.alternatives(members, library);
-        let mut found =
-            Self { verdict: Verdict::Named, members: members.to_vec(), alternatives, residual, left, loss };
+        // what one effect explains in a region, a sum of others can imitate everywhere; never the other way round, since a limit
+        // takes from an effect
+        let gated = gated(judge, library).filter(|gated| gated.share > coverage + WORTH);
+        let imitated = gated.is_some_and(|gated| {
+            let same = matches!(members, [one] if judge.effect(one) == gated.effect);
+            !same || gated.share > coverage + LIMITED
+        });
+        let mut found = Self {
+            verdict: Verdict::Named,
+            members: members.to_vec(),
+            alternatives,
+            residual,
+            gated,
+            left,
+            loss,
+        };
         found.verdict = if members.is_empty() {
             match found.is_structured(judge, gap_structure) {
                 true => Verdict::NoCandidateFits,
                 false => Verdict::NothingMissing,
             }
-        } else if coverage < needed || found.leaves_much(design) || unresolved {
+        } else if coverage < needed || found.leaves_much(design) || unresolved || imitated {
             Verdict::NoCandidateFits
         } else if found.alternatives.is_empty() {
             Verdict::Named
@@ -103,6 +127,7 @@ impl Found {
         let (deviate, _, energy) = energy(all, design, &design.y);
         let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
         let kept = lasting(design, &design.y);
+        let moving = lasting(design, &without_zeros(design, &design.y));
         // a load that was computed has no noise that hangs together and could pass for a gap
         let setting = judge.setting;
         let above = || sizes(all, judge.floors, &setting.components, config).values().any(|s| s.above_floor);
@@ -110,6 +135,7 @@ impl Found {
             || structure.deviate > STRUCTURE && size > least
             || deviate > bar && energy > 2.0 * least.max(0.5)
             || kept.deviate > LASTS && kept.size > least
+            || moving.deviate > LOUD[0] && moving.size > LOUD[1].max(least)
     }
 }
 

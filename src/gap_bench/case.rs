@@ -93,7 +93,8 @@ const PAIRS: [Pair; 6] = [
         component: 0.0,
         inferred: false,
         plan: &[(OneSpeed, 9)],
-        resolving: Some(&[(OneSpeed, 9), (Steady, 7)]),
+        // other speeds tell the two apart; other depths and headings, a channel and a current from either
+        resolving: Some(&[(OneSpeed, 9), (Steady, 7), (Heading, 6)]),
     },
     Pair {
         hidden: Effect::AddedMass,
