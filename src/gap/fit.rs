@@ -28,6 +28,8 @@ const ENOUGH_TRIALS: f64 = 8.0;
 /// Share of a load of the water that its formula leaves open, one standard deviation: no law of the library holds to
 /// better than some per cent on a hull, and no number of trials shows it.
 const FORMULA: f64 = 0.05;
+/// The same of a delay, whose shift in time is a difference over a few tenths of a second here.
+const DELAY: f64 = 0.02;
 /// Fewer trials than this, in effect: one condition.
 const ONE_CONDITION: f64 = 2.5;
 
@@ -98,8 +100,13 @@ pub(super) fn fit(
     let draws = bootstrap(&groups, &noise, config);
     let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
     let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
-    let is_law = |m: usize| design.candidates[set[m].candidate].effect.kind() == Kind::Physics;
-    let laws: Vec<usize> = (0..set.len()).filter(|&m| is_law(m)).collect();
+    let effect = |m: usize| design.candidates[set[m].candidate].effect;
+    let laws: Vec<usize> = (0..set.len()).filter(|&m| effect(m).kind() == Kind::Physics).collect();
+    let formula = |m: usize| match effect(m) {
+        Effect::SensorDelay => DELAY,
+        _ if laws.contains(&m) => FORMULA,
+        _ => 0.0,
+    };
     let loads = laws.iter().map(|&m| {
         let own = used.iter().enumerate().filter(|(_, (member, ..))| *member == m);
         let add = |mut sum: DVector<f64>, (i, (_, column, _)): (usize, &(usize, usize, usize))| {
@@ -119,7 +126,7 @@ pub(super) fn fit(
         })
         .collect();
     let open = |i: usize, j: usize| {
-        let own = if i == j && is_law(used[i].0) { (FORMULA * values[i]).powi(2) } else { 0.0 };
+        let own = if i == j { (formula(used[i].0) * values[i]).powi(2) } else { 0.0 };
         own + leaks.iter().map(|leak| leak[i] * leak[j]).sum::<f64>() / (scale[i] * scale[j])
     };
     let covariance =
