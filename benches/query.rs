@@ -8,7 +8,7 @@
 mod common;
 
 use std::hint::black_box;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use common::{Row, Subject, Table};
@@ -25,16 +25,24 @@ use wade::model::kernel::Isa;
 use wade::model::network::WIDTH;
 use wade::model::{Model, Workspace};
 
-fn model(path: &str, isa: Isa) -> Model {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles").join(path);
-    bundle::load(&path, isa).expect("the shipped bundles are sound")
+fn vehicles() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles")
 }
 
-/// The version before, with the paper's network.
+fn load(path: &Path, isa: Isa) -> Model {
+    bundle::load(path, isa).expect("the shipped bundles are sound")
+}
+
+fn model(vehicle: &str, isa: Isa) -> Model {
+    load(&vehicles().join(vehicle), isa)
+}
+
+/// The version that is kept with the paper's network.
 fn paper(vehicle: &str, isa: Isa) -> Model {
-    let model = model(&format!("{vehicle}.versions/3/{vehicle}"), isa);
-    assert_eq!(model.weights().form.name(), "paper");
-    model
+    let kept = bundle::kept(&vehicles().join(vehicle)).expect("the shipped versions are sound");
+    let paper = kept.iter().find(|kept| kept.weights.as_ref().is_some_and(|(form, _)| *form == "paper"));
+    let version = paper.expect("the paper's weights are shipped").version.to_string();
+    load(&vehicles().join(format!("{vehicle}.versions")).join(version).join(vehicle), isa)
 }
 
 /// Deep enough that every surface is wet.

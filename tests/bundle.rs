@@ -31,6 +31,16 @@ fn text(change: impl FnOnce(String) -> String) -> impl FnOnce(Vec<u8>) -> Vec<u8
     move |bytes| change(String::from_utf8(bytes).expect("text")).into_bytes()
 }
 
+/// Puts one text in the place of another as long.
+fn header(from: &'static str, to: &'static str) -> impl FnOnce(Vec<u8>) -> Vec<u8> {
+    assert_eq!(from.len(), to.len());
+    move |mut bytes| {
+        let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect("in the file");
+        bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+        bytes
+    }
+}
+
 #[test]
 fn what_is_written_is_read_back() {
     let folder = tempfile::TempDir::new().expect("a folder");
@@ -110,12 +120,16 @@ fn faults_behind_a_good_checksum_are_named() {
     let cases: Vec<(&str, Change, &str)> = vec![
         ("network.safetensors", Box::new(nan("w2")), "tensor w2"),
         ("network.safetensors", Box::new(nan("global_std")), "tensor global_std"),
+        ("network.safetensors", Box::new(header("[256,256]", "[128,512]")), "network.safetensors"),
         (
             "network.safetensors",
-            Box::new(|bytes| {
-                String::from_utf8_lossy(&bytes).replacen("[256,256]", "[128,512]", 1).into_bytes()
-            }),
+            Box::new(header("froude_depth", "froude_width")),
+            "trained on other features",
+        ),
+        (
             "network.safetensors",
+            Box::new(header("windward drag", "standing drag")),
+            "what is left of archimedes + standing drag, not of archimedes + windward drag: train them anew",
         ),
         ("vehicle.toml", Box::new(text(|t| t.replacen("format = 1", "format = 2", 1))), "newer"),
         (
