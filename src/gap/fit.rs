@@ -96,7 +96,9 @@ pub(super) fn fit(
     let few = errors.iter().map(|e| e.trials).fold(f64::INFINITY, f64::min) < ENOUGH_TRIALS;
     let groups = if few { clusters.blocks } else { clusters.trials };
     let count = columns.len();
-    let best = weighted(&groups, &vec![1.0; groups.len()], &noise)?;
+    let (xx, xy) = sum_of(&groups, &vec![1.0; groups.len()], &noise);
+    let whole = xx.cholesky()?;
+    let best = whole.solve(&xy);
     let draws = bootstrap(&groups, &noise, config);
     let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
     let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
@@ -116,7 +118,6 @@ pub(super) fn fit(
         own.fold(DVector::zeros(design.y.len()), add)
     });
     let bent = bent(design, all, loads);
-    let whole = sum_of(&groups, &vec![1.0; groups.len()], &noise).0.cholesky()?;
     let leaks: Vec<DVector<f64>> = bent
         .iter()
         .map(|load| {

@@ -19,7 +19,7 @@ pub(super) fn outlasts_noise(design: &Design, sum: &DVector<f64>, residual: &DVe
     let reach = reach(design.noise.smoothing);
     let at = |lag: usize| common(design, sum, residual, lag);
     let (near, far) = (at(reach), at(2 * reach));
-    // a parabola back to no lag, as for a rate
+    // a parabola back to no lag
     near + (near - far) / 3.0 > LASTS * at(0)
 }
 
