@@ -94,6 +94,28 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
     let again = wade(&["campaign", "collect", &campaign]);
     assert!(stdout(&again).contains("0 of them new"), "{}", stdout(&again));
 
+    // one by an older method stays until it is asked for, and is replaced
+    let summaries = Path::new(&campaign).join("cases.csv");
+    let text = std::fs::read_to_string(&summaries).expect("summaries");
+    let at = text.lines().next().and_then(|names| names.split(',').position(|name| name == "method"));
+    let at = at.expect("a column");
+    let older = |line: &str| {
+        let mut fields: Vec<&str> = line.split(',').collect();
+        if fields[0] == "husky-paper-0001" {
+            fields[at] = "1";
+        }
+        fields.join(",") + "\n"
+    };
+    std::fs::write(&summaries, text.lines().map(older).collect::<String>()).expect("written");
+    let report = wade(&["campaign", "report", &campaign]);
+    assert!(stdout(&report).contains("1 of them are of an older method"), "{}", stdout(&report));
+    let left = wade(&["campaign", "run", &campaign]);
+    assert!(stdout(&left).contains("0 computed, 0 set aside"), "{}", stderr(&left));
+    let anew = wade(&["campaign", "run", &campaign, "--outdated"]);
+    assert!(stdout(&anew).contains("1 computed, 0 set aside"), "{}", stderr(&anew));
+    let collected = wade(&["campaign", "collect", &campaign]);
+    assert!(stdout(&collected).contains("2 of 2 cases, 1 of them new"), "{}", stdout(&collected));
+
     let data = dataset::read(&Path::new(&campaign).join("sections.parquet")).expect("a data set");
     assert_eq!(data.meta.provenance, solver.label());
     assert_eq!(data.samples.len(), 2 * 4);
@@ -105,6 +127,7 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
     }
     let report = wade(&["campaign", "report", &campaign, "--json"]);
     assert!(report.status.success() && stdout(&report).contains("\"suspicious\""), "{}", stderr(&report));
+    assert!(stdout(&report).contains("\"outdated\": 0"), "{}", stdout(&report));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::plan::{Bed, Case, Plan, Set};
 use super::run::{RunError, Work};
-use super::solve::{Load, Outcome};
+use super::solve::{Load, METHOD, Outcome, first_method};
 use crate::condition::GroundContact;
 use crate::dataset::{self, Dataset, DatasetError, Image, Meta, Rest, Sample, SurfaceLoad};
 use crate::frame::Vec3;
@@ -41,6 +41,9 @@ pub struct CaseSummary {
     pub density_kgpm3: f64,
     /// Size of the cells relative to the settings.
     pub cell_scale: f64,
+    /// How it was computed, see [`METHOD`].
+    #[serde(default = "first_method")]
+    pub method: u32,
     /// Cells of the mesh.
     pub cells: usize,
     /// Time steps.
@@ -100,6 +103,7 @@ impl CaseSummary {
             depth_m: case.depth_m,
             density_kgpm3: case.density_kgpm3,
             cell_scale: case.cell_scale,
+            method: outcome.method,
             cells: outcome.cells,
             steps: outcome.steps,
             core_s: outcome.core_s,
@@ -204,6 +208,11 @@ impl Collected {
         Ok(Self { cases: rows.into_iter().map(|row| (row.id.clone(), row)).collect() })
     }
 
+    /// Names of the cases that this version would compute another way.
+    pub fn outdated(&self) -> impl Iterator<Item = &str> {
+        self.cases.values().filter(|case| case.method < METHOD).map(|case| case.id.as_str())
+    }
+
     fn write(&self, folder: &Path) -> Result<(), CollectError> {
         let path = folder.join(CASES_FILE);
         let syntax = |message: String| CollectError::Syntax { path: path.clone(), message };
@@ -217,11 +226,14 @@ impl Collected {
 }
 
 /// Adds the outcomes of `work` to the data set and the summaries in `folder`; gives the number of new cases.
+///
+/// A case that was collected before and was computed again since, by a newer method, is replaced.
 pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Result<usize, CollectError> {
     let mut collected = Collected::read(folder, plan)?;
     let mut fresh = Vec::new();
-    for case in plan.cases.iter().filter(|case| !collected.cases.contains_key(&case.id)) {
-        fresh.extend(work.outcome(case)?);
+    for case in &plan.cases {
+        let before = collected.cases.get(&case.id).map_or(0, |summary| summary.method);
+        fresh.extend(work.outcome(case)?.filter(|outcome| outcome.method > before));
     }
     if fresh.is_empty() {
         return if collected.cases.is_empty() {
@@ -232,12 +244,11 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
     }
     let path = folder.join(SECTIONS_FILE);
     let mut dataset = if path.exists() { dataset::read(&path)? } else { empty(plan, vehicle, &fresh[0]) };
-    let known: BTreeSet<String> = dataset.samples.iter().map(|sample| sample.case.clone()).collect();
+    let replaced: BTreeSet<&str> = fresh.iter().map(|outcome| outcome.case.id.as_str()).collect();
+    dataset.samples.retain(|sample| !replaced.contains(sample.case.as_str()));
     for outcome in &fresh {
         collected.cases.insert(outcome.case.id.clone(), CaseSummary::of(outcome));
-        if !known.contains(&outcome.case.id) {
-            dataset.samples.extend(samples(&plan.campaign.vehicle, outcome));
-        }
+        dataset.samples.extend(samples(&plan.campaign.vehicle, outcome));
     }
     dataset.samples.sort_by(|a, b| a.case.cmp(&b.case).then(a.section.cmp(&b.section)));
     // the data set first: a summary without its sections would never be computed again

@@ -33,6 +33,8 @@ pub struct Report {
     pub provenance: String,
     /// Planned and computed cases of each set.
     pub sets: BTreeMap<String, Count>,
+    /// Of the computed ones, those that this version would compute another way.
+    pub outdated: usize,
     /// Processor time of all cases [h].
     pub core_hours: f64,
     /// Processor time of a case, median [s].
@@ -152,6 +154,7 @@ impl Report {
             vehicle: vehicle.name.clone(),
             provenance: dataset::read(&folder.join(SECTIONS_FILE))?.meta.provenance,
             sets,
+            outdated: collected.outdated().count(),
             core_hours: cases.iter().map(|case| case.core_s).sum::<f64>() / 3600.0,
             core_s_median: median(cases.iter().map(|case| case.core_s)),
             cells: [least, most],
@@ -179,6 +182,12 @@ impl Report {
         };
         for (set, count) in &self.sets {
             line(format_args!("  {set:<9} {} of {} cases", count.done, count.planned));
+        }
+        if self.outdated > 0 {
+            line(format_args!(
+                "  {} of them are of an older method: `wade campaign run --outdated` computes them again",
+                self.outdated
+            ));
         }
         let [least, most] = self.cells;
         line(format_args!(

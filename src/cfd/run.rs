@@ -12,7 +12,7 @@ use super::case::{Inputs, Settings};
 use super::openfoam::OpenFoam;
 use super::placement::Placement;
 use super::plan::Case;
-use super::solve::{Outcome, SolveError, solve};
+use super::solve::{METHOD, Outcome, SolveError, solve};
 use crate::vehicle::Vehicle;
 
 /// Disk that one case takes while it runs, with room [bytes].
@@ -172,6 +172,8 @@ pub struct Machine<'a> {
     pub solver: &'a OpenFoam,
     /// Where.
     pub work: &'a Work,
+    /// Compute those again that are done by an older [`METHOD`].
+    pub outdated: bool,
 }
 
 impl Machine<'_> {
@@ -184,7 +186,8 @@ impl Machine<'_> {
         check_disk(folder, jobs)?;
         let mut queue = VecDeque::new();
         for case in cases {
-            if self.work.outcome(case)?.is_none() {
+            let is_done = |outcome: Outcome| !self.outdated || outcome.method == METHOD;
+            if !self.work.outcome(case)?.is_some_and(is_done) {
                 self.work.check_untouched(&self.inputs(case, self.settings))?;
                 queue.push_back(case);
             }

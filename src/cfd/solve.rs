@@ -60,6 +60,9 @@ pub struct Outcome {
     pub case: Case,
     /// The solver, as data are labelled with it.
     pub solver: String,
+    /// How it was computed: [`METHOD`] of the version that did.
+    #[serde(default = "first_method")]
+    pub method: u32,
     /// Kind of the mesh.
     pub mesh_kind: MeshKind,
     /// Cells of the mesh.
@@ -86,6 +89,17 @@ pub struct Outcome {
     pub surfaces: Vec<String>,
     /// The sections of the last window; of an unsteady case, from half a second before the ramp to the end.
     pub sections: Vec<Section>,
+}
+
+/// How this version computes a case: raised whenever the same case with the same settings would come out otherwise.
+///
+/// 1: the gradient of the density was corrected for the tilt between cells of two sizes. 2: on castellated meshes it is
+/// not, since the correction drives the air above still water.
+pub const METHOD: u32 = 2;
+
+/// The method of outcomes from before methods had a number.
+pub(super) fn first_method() -> u32 {
+    1
 }
 
 /// Why a case gave nothing.
@@ -196,6 +210,7 @@ pub fn solve(folder: &Path, inputs: &Inputs, attempts: u32) -> Result<Outcome, S
     Ok(Outcome {
         case: inputs.case.clone(),
         solver: inputs.solver.label(),
+        method: METHOD,
         mesh_kind: inputs.solver.mesh_kind,
         cells: hull.cells,
         courant: settings.courant,

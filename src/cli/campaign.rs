@@ -1,5 +1,6 @@
 //! `wade campaign`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -204,6 +205,9 @@ struct Run {
     /// Try cases again that were set aside
     #[arg(long)]
     again: bool,
+    /// Compute cases again that an older version of wade computed another way; `collect` then replaces them
+    #[arg(long)]
+    outdated: bool,
 }
 
 impl Run {
@@ -217,8 +221,9 @@ impl Run {
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: self.keep };
         let collected = Collected::read(&self.campaign, &plan)?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
+        let outdated: BTreeSet<&str> = collected.outdated().collect();
         let is_chosen = |case: &plan::Case| {
-            !collected.cases.contains_key(&case.id)
+            (!collected.cases.contains_key(&case.id) || self.outdated && outdated.contains(case.id.as_str()))
                 && (sets.is_empty() || sets.contains(&case.set))
                 && (self.case.is_empty() || self.case.contains(&case.id))
                 && (self.again || !work.failure_path(&case.id).exists())
@@ -231,6 +236,7 @@ impl Run {
             settings: &plan.campaign.settings,
             solver: &solver,
             work: &work,
+            outdated: self.outdated,
         };
         let mut progress = Progress::new(cases.len(), self.jobs)?;
         let mut failed = Vec::new();
