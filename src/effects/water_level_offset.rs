@@ -1,7 +1,8 @@
 //! E16, the water stands higher than was said.
 //!
 //! `W = dF/dd` per meter: `rho g A_wp` upwards at the center of the waterplane (Archimedes), and the model's drag in
-//! proportion to the depth. Exact to first order in the offset; meant for offsets below a fifth of the depth.
+//! proportion to the wet part of each panel, whose area is taken as even over its height. Exact to first order in the
+//! offset; meant for offsets below a fifth of the depth.
 
 use super::input::{Input, Part};
 use crate::frame::GRAVITY;
@@ -14,10 +15,10 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let velocity = state.velocity;
     for (index, panel) in input.body.panels.iter().enumerate() {
         let part = &immersion.panels[index];
-        let wet = part.fraction;
-        // a panel that is wet in part grows with the level
-        if wet > 0.0 && wet < 1.0 && immersion.depth > 1e-3 {
-            let area = panel.windward(&velocity).component_mul(&input.base_drag) * (wet / immersion.depth);
+        // a panel that is wet in part grows with the level, by its height a meter
+        let height = 12_f64.sqrt() * panel.spread.z;
+        if part.fraction > 0.0 && part.fraction < 1.0 && height > 0.0 {
+            let area = panel.windward(&velocity).component_mul(&input.base_drag) / height;
             let force = area.component_mul(&velocity) * (-input.half_density() * velocity.norm());
             emit(0, Part::Panel(index), input.at(force, &part.point));
         }

@@ -1,11 +1,11 @@
 //! The noise floor: what no effect can explain.
 //!
-//! From repeats, where there are any; else from the part of the gap that changes from sample to sample; never below the
+//! From repeats, where there are any; else from the part of the gap that changes within a tenth of a second; never below the
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
 use super::design::{RowNoise, smooth};
 use super::series::Series;
-use super::statistics::{median, white_variance};
+use super::statistics::{median, noise_variance, white_variance};
 use crate::signal::interpolate;
 use crate::trials::{Manifest, WRENCH};
 use serde::Serialize;
@@ -16,7 +16,7 @@ use serde::Serialize;
 pub enum FloorSource {
     /// Trials that repeat each other.
     Repeats,
-    /// The part of the gap that changes from sample to sample.
+    /// The part of the gap that changes within a tenth of a second.
     HighFrequency,
     /// Stated in `trials.toml`.
     Stated,
@@ -89,10 +89,18 @@ fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -
     let (mut sum, mut count) = (0.0, 0.0);
     for series in all {
         let values: Vec<f64> = series.gap.iter().map(|gap| gap[component]).collect();
-        sum += white_variance(&values) * values.len() as f64;
+        sum += noise_variance(&values, scales(&series.t)) * values.len() as f64;
         count += values.len() as f64;
     }
     (sum / f64::max(count, 1.0)).sqrt()
+}
+
+/// Octaves below the rate of the samples in which noise is told from signal.
+fn scales(t: &[f64]) -> u32 {
+    /// What changes faster is no load [s].
+    const FAST: f64 = 0.08;
+    let step = (t[t.len() - 1] - t[0]) / (t.len() - 1).max(1) as f64;
+    (FAST / step.max(1e-6)).log2().max(0.0) as u32
 }
 
 /// The floors of some trials alone, where they come from the trials themselves: noise may differ from trial to trial.

@@ -28,6 +28,26 @@ pub(super) fn white_variance(values: &[f64]) -> f64 {
     squares.sum::<f64>() / (20.0 * (values.len() - 3) as f64)
 }
 
+/// Variance of noise on an otherwise smooth signal, be it colored down to `2^scales` samples: motion that is filtered before
+/// something is predicted from it leaves noise in which neighbors agree, and [`white_variance`] hardly sees that.
+///
+/// The white variance `w_j` of means over `2^j` samples is what noise has a band above and below; each halving of the rate
+/// parts off one octave, `sum over j < J of w_j / 2 + w_J`, and the last stands for all below it.
+pub(super) fn noise_variance(values: &[f64], scales: u32) -> f64 {
+    /// Means that are enough for a variance.
+    const ENOUGH: usize = 16;
+    let mut means = values.to_vec();
+    let mut above = 0.0;
+    for _ in 0..scales {
+        if means.len() < 2 * ENOUGH {
+            break;
+        }
+        above += 0.5 * white_variance(&means);
+        means = means.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    }
+    above + white_variance(&means)
+}
+
 /// Probability that a normal variable is further from 0 than `z`, both sides (Abramowitz and Stegun 7.1.26, and its
 /// asymptotic form beyond 5, where the former has lost its digits).
 pub(super) fn normal_tails(z: f64) -> f64 {
@@ -92,5 +112,20 @@ mod tests {
             .map(|i| (random.unit() - 0.5) * 12_f64.sqrt() * 2.0 + 1e-3 * f64::from(i * i) / 100.0)
             .collect();
         assert!((white_variance(&values).sqrt() - 2.0).abs() < 0.1);
+        assert!((noise_variance(&values, 3).sqrt() - 2.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn noise_that_a_filter_has_colored_keeps_its_size() {
+        // the mean of five, as a filter of motion leaves it, on a slow wave
+        let mut random = crate::random::Random::new(2);
+        let white: Vec<f64> = (0..20_000).map(|_| (random.unit() - 0.5) * 12_f64.sqrt()).collect();
+        let wave = |i: usize| 3.0 * (i as f64 / 400.0).sin();
+        let values: Vec<f64> =
+            white.windows(5).enumerate().map(|(i, w)| w.iter().sum::<f64>() / 5.0 + wave(i)).collect();
+        let exact = 1.0 / 5_f64.sqrt();
+        assert!(white_variance(&values).sqrt() < 0.6 * exact);
+        let colored = noise_variance(&values, 3).sqrt();
+        assert!((colored / exact - 1.0).abs() < 0.05, "{colored} for {exact}");
     }
 }
