@@ -179,7 +179,7 @@ fn chain(
     let since_start = |sample: usize| series.t[sample] - series.t[0];
     // along an axis that is hardly accelerated there is noise alone, which would pull an error of the mass to 0
     let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(series.coherence[axis].is_a_motion())));
-    for (sample, p) in series.predicted.iter().enumerate() {
+    for (sample, p) in series.seen.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();
         let mut own = |value: &dyn Fn(usize) -> f64| {
@@ -241,7 +241,7 @@ fn delayed(series: &Series, delay: f64, column: &mut Column) {
     };
     let arms = [DELAY_ARM, 2.0 * DELAY_ARM].map(|arm| [at(-arm), at(arm)]);
     for component in 0..6 {
-        let values = series.binned(|sample| series.predicted[sample][component]);
+        let values = series.binned(|sample| series.seen[sample][component]);
         let [near, far] = arms.each_ref().map(|[early, late]| {
             let [before, after] = [early, late].map(|t| crate::signal::interpolate(&centers, &values, t));
             let slope = |i: usize| {

@@ -1,10 +1,12 @@
 //! Parameters in which an effect is not linear: a current, a delay, a time to fill, a memory.
 
+use super::Named;
 use super::candidates::Setting;
 use super::design::Design;
+use super::holdout::explained;
 use super::judge::Member;
 use super::series::Series;
-use crate::effects::{Effect, Shape};
+use crate::effects::{Effect, Kind, Shape};
 use crate::frame::GRAVITY;
 
 /// Last and smallest factor of the search.
@@ -67,6 +69,59 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
             }
         }
     }
+}
+
+/// Lets the effects of sensors that scale, turn or delay a load do so with what the named effects of the water add to it as
+/// well, and fits all anew.
+///
+/// A set is a sum, and the fault of a sensor is not one of its terms but a map of the sum of the others.
+pub(super) fn through_sensors(
+    design: &mut Design,
+    all: &mut [Series],
+    setting: &Setting,
+    members: &[Member],
+) {
+    const TIMES: usize = 2;
+    let effect = |design: &Design, member: &Member| design.candidates[member.candidate].effect;
+    let water: Vec<&Member> = members.iter().filter(|m| effect(design, m).kind() == Kind::Physics).collect();
+    let has_map = members.iter().any(|m| maps_loads(effect(design, m)));
+    if water.is_empty() || !has_map {
+        return;
+    }
+    for _ in 0..TIMES {
+        let columns: Vec<usize> = members.iter().flat_map(|m| m.columns.iter().map(|(c, _)| *c)).collect();
+        let Some((beta, _)) = design.solve(&columns) else { return };
+        let value = |column: usize| {
+            let place = columns.iter().position(|&c| c == column).unwrap_or_default();
+            beta[place] / design.scale[column]
+        };
+        let found: Vec<Named> = water
+            .iter()
+            .map(|member| Named {
+                effect: effect(design, member),
+                shape: design.candidates[member.candidate].shape,
+                coefficients: member.columns.iter().map(|&(column, k)| (k, value(column))).collect(),
+            })
+            .collect();
+        for (rank, series) in all.iter_mut().enumerate() {
+            let added = explained(&found, series, rank, setting);
+            for ((seen, predicted), added) in series.seen.iter_mut().zip(&series.predicted).zip(added) {
+                *seen = std::array::from_fn(|c| predicted[c] + added[c]);
+            }
+        }
+        for candidate in 0..design.candidates.len() {
+            if maps_loads(design.candidates[candidate].effect) {
+                design.reshape(all, setting, candidate, design.candidates[candidate].shape);
+            }
+        }
+        refine(design, all, setting, members);
+    }
+}
+
+/// True for what a sensor or the ground makes of the load of the water.
+fn maps_loads(effect: Effect) -> bool {
+    use Effect::{AxisMisalignment, RollingResistance, SensorDelay, SensorGain};
+    matches!(effect, AxisMisalignment | RollingResistance | SensorDelay | SensorGain)
 }
 
 /// Time constant below which no memory is looked for [s]: it is gone before waves leave the hull, which is inertia.

@@ -7,7 +7,7 @@ use super::design::Design;
 use super::general::General;
 use super::judge::Judge;
 use super::noise::{floors, row_noise, smoothing};
-use super::nonlinear::{refine, settle};
+use super::nonlinear::{refine, settle, through_sensors};
 use super::report::Report;
 use super::series::{Series, series};
 use super::split::hold_out;
@@ -46,7 +46,7 @@ pub fn run(
         let (trials, asked) = (trials.manifest.vehicle.clone(), body.name.clone());
         return Err(GapError::Vehicle { trials, asked });
     }
-    let (all, components) = series(trials, body, predict, config)?;
+    let (mut all, components) = series(trials, body, predict, config)?;
     let (naming, held) = hold_out(&all, config);
     let floors = floors(&all, &naming, &trials.manifest, &components);
     let setting = Setting {
@@ -87,6 +87,7 @@ pub fn run(
         judge.select(&library)
     };
     refine(&mut design, &all, &setting, &members);
+    through_sensors(&mut design, &mut all, &setting, &members);
     // what stood in for a shape that was not yet right has no place any more
     let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
     members = judge.confirmed(&members);

@@ -25,6 +25,8 @@ pub(super) struct Series {
     pub wheels: Vec<[Option<f64>; 4]>,
     /// Model's wrench; 0 where another simulator has no column of a component.
     pub predicted: Vec<[f64; 6]>,
+    /// What sensors see of the water: the prediction, and the effects of the water that were found beside them.
+    pub seen: Vec<[f64; 6]>,
     /// The model's own standard deviation.
     pub uncertainty: Vec<[f64; 6]>,
     /// Measured minus predicted; 0 for components that are not compared.
@@ -183,6 +185,7 @@ fn of_trial(
         t: trial.t.clone(),
         conditions,
         immersions,
+        seen: predicted.clone(),
         predicted,
         uncertainty,
         bins,
