@@ -50,6 +50,33 @@ impl Input<'_> {
         force - up * force.dot(&up)
     }
 
+    /// Coefficients on windward wet areas with which the hull carries the model's own drag in this state [-]: those stated,
+    /// `K`, times `r = 1 + (D - P s) P s / ((P s)^2 + (P s0)^2)` along x and y, `D` the model's drag, `P s` what `K` makes of
+    /// it, and `s = |v| v`, or `|v_i| v_i` where each axis has its own speed. A model has its own law of depth, tilt and
+    /// speed; where there is hardly a flow it says nothing of one, and `K` stands.
+    pub(super) fn own_drag(&self, axes_apart: bool) -> BaseDrag {
+        /// Square of the speed below which `K` counts more than the model's drag [m2/s2].
+        const SLOW: f64 = 0.09;
+        const MOST: f64 = 3.0;
+        let velocity = self.condition.velocity;
+        let mut area = Vec3::zeros();
+        for (panel, wet) in self.body.panels.iter().zip(&self.immersion.panels) {
+            area += panel.windward(&velocity) * wet.fraction;
+        }
+        let drag = self.predicted_drag();
+        Vec3::from_fn(|axis, _| {
+            let k = self.base_drag[axis];
+            let per_square = self.half_density() * k * area[axis];
+            if axis == 2 || per_square <= 0.0 {
+                return k;
+            }
+            let speed = if axes_apart { velocity[axis].abs() } else { velocity.norm() };
+            let square = speed * velocity[axis];
+            let off = -drag[axis] / per_square - square;
+            k * (1.0 + off * square / (square * square + SLOW * SLOW)).clamp(0.0, MOST)
+        })
+    }
+
     /// Half the density [kg/m3].
     pub(super) fn half_density(&self) -> f64 {
         0.5 * self.condition.density

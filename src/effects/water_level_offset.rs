@@ -13,12 +13,13 @@ pub(super) fn basis(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
     let stiffness = state.density * GRAVITY * immersion.waterplane_area * state.up.z;
     emit(0, Part::Hull, input.at(state.up.into_inner() * stiffness, &immersion.waterplane_center));
     let velocity = state.velocity;
+    let drag = input.own_drag(false);
     for (index, panel) in input.body.panels.iter().enumerate() {
         let part = &immersion.panels[index];
         // a panel that is wet in part grows with the level, by its height a meter
         let height = 12_f64.sqrt() * panel.spread.z;
         if part.fraction > 0.0 && part.fraction < 1.0 && height > 0.0 {
-            let area = panel.windward(&velocity).component_mul(&input.base_drag) / height;
+            let area = panel.windward(&velocity).component_mul(&drag) / height;
             let force = area.component_mul(&velocity) * (-input.half_density() * velocity.norm());
             emit(0, Part::Panel(index), input.at(force, &part.point));
         }
