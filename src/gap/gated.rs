@@ -23,6 +23,9 @@ pub(super) const WORTH: f64 = 0.03;
 /// Share of the gap above the floor that the effect must explain within its region.
 const EXPLAINED: f64 = 0.6;
 
+/// Ridge over the energy of an effect's largest column everywhere: where hardly any of it is, rounding is most of what is left.
+const RIDGE: f64 = 1e-5;
+
 /// What a gap is like in a region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gated {
@@ -42,9 +45,13 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
     let one = |candidate: &super::design::Candidate| {
         let columns: Vec<usize> = candidate.columns.iter().map(|(column, _)| *column).collect();
         let bins = sums(design, &columns);
-        let mut found = (OPEN, gain(bins.iter()));
+        let Some(whole_sum) = total(bins.iter()) else {
+            return Gated { effect: candidate.effect, limits: OPEN, share: 0.0 };
+        };
+        let ridge = RIDGE * whole_sum.xx.diagonal().max();
+        let mut found = (OPEN, whole_sum.gain(ridge));
         for _ in 0..MOST {
-            let Some(next) = best_limit(&bins, &places, &found.0) else { break };
+            let Some(next) = best_limit(&bins, &places, &found.0, ridge) else { break };
             if next.1 < found.1 + WORTH * whole {
                 break;
             }
@@ -81,10 +88,6 @@ fn sums(design: &Design, columns: &[usize]) -> Vec<Sum> {
     (0..design.y.len() / width).map(of).collect()
 }
 
-fn gain<'a>(bins: impl Iterator<Item = &'a Sum>) -> f64 {
-    total(bins).map_or(0.0, |sum| sum.gain())
-}
-
 fn total<'a>(mut bins: impl Iterator<Item = &'a Sum>) -> Option<Sum> {
     let mut sum = bins.next()?.clone();
     bins.for_each(|bin| sum.add(bin));
@@ -98,9 +101,8 @@ impl Sum {
     }
 
     /// What least squares takes off the sum of squares.
-    fn gain(&self) -> f64 {
+    fn gain(&self, ridge: f64) -> f64 {
         let count = self.xy.len();
-        let ridge = 1e-7 * self.xx.diagonal().max();
         let matrix =
             DMatrix::from_fn(count, count, |i, j| self.xx[(i, j)] + if i == j { ridge } else { 0.0 });
         matrix.cholesky().map_or(0.0, |factor| self.xy.dot(&factor.solve(&self.xy)))
@@ -108,7 +110,7 @@ impl Sum {
 }
 
 /// The limit to add to a region with which the effect explains most, and what it explains then.
-fn best_limit(bins: &[Sum], places: &[Features], limits: &Limits) -> Option<(Limits, f64)> {
+fn best_limit(bins: &[Sum], places: &[Features], limits: &Limits, ridge: f64) -> Option<(Limits, f64)> {
     let mut best: Option<(Limits, f64)> = None;
     for feature in 0..FEATURES_USED {
         let mut order: Vec<usize> = (0..bins.len()).filter(|&bin| inside(limits, &places[bin])).collect();
@@ -130,7 +132,7 @@ fn best_limit(bins: &[Sum], places: &[Features], limits: &Limits) -> Option<(Lim
             let Some(low) = &below else { continue };
             let high = Sum { xx: &whole.xx - &low.xx, xy: &whole.xy - &low.xy };
             let at = 0.5 * (places[bin][feature] + next);
-            for (end, gain) in [(1, low.gain()), (0, high.gain())] {
+            for (end, gain) in [(1, low.gain(ridge)), (0, high.gain(ridge))] {
                 if best.as_ref().is_none_or(|(_, most)| gain > *most) {
                     let mut tried = *limits;
                     tried[feature][end] = at;

@@ -29,7 +29,8 @@ struct Smooth {
 pub(super) struct Structure {
     /// Cross-validated gain of the loss, not below 0.
     pub gain: f64,
-    /// Loss left in sample, with the fitted numbers counted.
+    /// Loss that is left: midway between that in sample, which chance lowers, and the cross-validated one, which it raises as
+    /// much. Noise that hangs together lets each number take more than its share of the rows.
     pub loss: f64,
     /// The gain over its standard error from trial to trial.
     pub deviate: f64,
@@ -87,9 +88,10 @@ impl General {
         order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
         let squares = target.norm_squared().max(f64::MIN_POSITIVE);
         let strongest = order.into_iter().take(3);
+        let gain = used.iter().sum::<f64>();
         Structure {
-            gain: used.iter().sum::<f64>().max(0.0),
-            loss: whole.loss,
+            gain: gain.max(0.0),
+            loss: 0.5 * (whole.loss + target.norm_squared() - gain),
             deviate: mean / (variance / count).sqrt().max(f64::MIN_POSITIVE),
             strongest: strongest.map(|i| (self.columns[i].name.clone(), shares[i] / squares)).collect(),
         }
@@ -124,11 +126,10 @@ impl General {
         let y = DVector::from_fn(rows.len(), |i, _| target[rows[i]]);
         let (xx, xy) = (x.tr_mul(&x), x.tr_mul(&y));
         let count = columns.len();
-        let freedom = (rows.len() as f64 / (rows.len() as f64 - count as f64).max(1.0)).max(1.0);
         let left = ridge(xx.clone(), &xy, rows.len())
             .map_or(y.norm_squared(), |beta| (&y - &x * beta).norm_squared());
         let shares = (0..count).map(|j| xy[j].powi(2) / xx[(j, j)].max(1e-12));
-        let mut part = Part { loss: left * freedom, gains: vec![0.0; trials], shares: shares.collect() };
+        let mut part = Part { loss: left, gains: vec![0.0; trials], shares: shares.collect() };
         for fold in 0..folds {
             let inside: Vec<usize> = (0..rows.len()).filter(|&i| fold_of(rows[i]) == fold).collect();
             let own = DMatrix::from_fn(inside.len(), count, |i, j| x[(inside[i], j)]);
@@ -147,7 +148,7 @@ impl General {
 
 /// What the functions do for some of the rows.
 struct Part {
-    /// Loss in sample, with the fitted numbers counted.
+    /// Loss in sample.
     loss: f64,
     /// Cross-validated gain in each trial.
     gains: Vec<f64>,

@@ -149,8 +149,7 @@ pub(super) fn floor_loss(design: &Design, structure: &Structure) -> f64 {
             }
         }
     }
-    // midway between the loss in sample, which chance lowers, and the cross-validated one, which it raises as much: noise that
-    // hangs together lets each number take more than its share of the rows
+    // midway, as the other
     let library = design.fit(&columns).map_or(f64::INFINITY, |fit| 0.5 * (fit.loss + fit.cv_loss));
     library.min(structure.loss).min(design.empty_loss()).max(0.0)
 }
