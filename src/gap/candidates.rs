@@ -154,7 +154,10 @@ fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, co
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);
     let base_drag = setting.base_drag.of(effect, shape);
     for (sample, &t) in series.t.iter().enumerate() {
-        let input = series.input(sample, setting.body, base_drag, setting.channel_width);
+        let mut input = series.input(sample, setting.body, base_drag, setting.channel_width);
+        if effect == Effect::AddedMass {
+            input.condition = &series.calibrated[sample];
+        }
         if effect.has_memory() && sample > 0 {
             effects::advance(effect, shape, &mut memory, &input, t - series.t[sample - 1]);
         }
@@ -230,28 +233,26 @@ fn chain(
     }
 }
 
-/// Change per second of delay, `-dp/dt` at `t - tau/2`, from bin means: `-(4 D_h - D_2h) / 3` with the central differences
-/// `D_h = (p(+h) - p(-h)) / 2h`, which follow a change within half a second where `D_h` alone takes a quarter off.
+/// Change per second of delay, `-dp/dt` at `t - tau/2`: `-(15 D_h - 6 D_2h + D_3h) / 10` with the central
+/// differences `D_h = (p(+h) - p(-h)) / 2h`, which follow a change within half a second where `D_h` alone takes a quarter off.
 fn delayed(series: &Series, delay: f64, column: &mut Column) {
-    let centers = series.binned(|sample| series.t[sample]);
-    let (first, last) = (centers[0], centers[centers.len() - 1]);
+    const WEIGHTS: [f64; 3] = [1.5, -0.6, 0.1];
+    let (first, last) = (series.t[0], series.t[series.t.len() - 1]);
     // beyond the ends nothing is known of the prediction
     let at = |shift: f64| -> Vec<f64> {
         series.t.iter().map(|t| (t - 0.5 * delay + shift).clamp(first, last)).collect()
     };
-    let arms = [DELAY_ARM, 2.0 * DELAY_ARM].map(|arm| [at(-arm), at(arm)]);
+    let arms = [1.0, 2.0, 3.0].map(|arms| [at(-arms * DELAY_ARM), at(arms * DELAY_ARM)]);
     for component in 0..6 {
-        let values = series.binned(|sample| series.seen[sample][component]);
-        let [near, far] = arms.each_ref().map(|[early, late]| {
-            let [before, after] = [early, late].map(|t| crate::signal::interpolate(&centers, &values, t));
-            let slope = |i: usize| {
+        let values: Vec<f64> = series.seen.iter().map(|seen| seen[component]).collect();
+        for (weight, [early, late]) in WEIGHTS.into_iter().zip(&arms) {
+            let [before, after] = [early, late].map(|t| crate::signal::interpolate(&series.t, &values, t));
+            for (i, value) in column.iter_mut().enumerate() {
                 let span = late[i] - early[i];
-                if span > DELAY_ARM { (after[i] - before[i]) / span } else { 0.0 }
-            };
-            (0..series.t.len()).map(slope).collect::<Vec<f64>>()
-        });
-        for (value, (near, far)) in column.iter_mut().zip(near.iter().zip(&far)) {
-            value[component] = -(4.0 * near - far) / 3.0;
+                if span > DELAY_ARM {
+                    value[component] -= weight * (after[i] - before[i]) / span;
+                }
+            }
         }
     }
 }

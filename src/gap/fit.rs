@@ -1,8 +1,6 @@
 //! Parameters of the named effects, with intervals.
 //!
-//! Least squares on the rows of the design, corrected for noise in the accelerations: a column with a share `s` of noise in
-//! its variance pulls its coefficient down by `1 - s` (Fuller, Measurement Error Models, section 1.2), so that share is
-//! taken off the normal matrix. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, its ends
+//! Least squares on the rows of the design. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, its ends
 //! moved out for the few that there are (the expanded percentile of Hesterberg, The American Statistician 2015), and what the
 //! formula itself leaves open.
 
@@ -14,7 +12,6 @@ use super::candidates::Setting;
 use super::design::Design;
 use super::features::{DEPTH, Features, SPEED, of_bins};
 use super::judge::Member;
-use super::rates::accelerations;
 use super::robust::errors;
 use super::series::Series;
 use super::statistics::{quantile, student_from_normal};
@@ -78,7 +75,6 @@ pub(super) fn fit(
         .flat_map(|(m, member)| member.columns.iter().map(move |&(column, k)| (m, column, k)))
         .collect();
     let columns: Vec<usize> = used.iter().map(|(_, column, _)| *column).collect();
-    let mut noise: Vec<f64> = used.iter().map(|&(m, _, k)| noise_share(design, &set[m], k, all)).collect();
     let (beta, _) = design.solve(&columns)?;
     let errors = errors(design, &columns, &design.residual(&columns, &beta))?;
     // a nonlinear parameter moves the rows like one more column; its draws are changes of its logarithm
@@ -91,15 +87,14 @@ pub(super) fn fit(
             design.shape_derivative(all, setting, set[m].candidate, axis, &own)
         })
         .collect();
-    noise.resize(columns.len() + moved.len(), 0.0);
     let clusters = clusters(design, &columns, &moved);
     let few = errors.iter().map(|e| e.trials).fold(f64::INFINITY, f64::min) < ENOUGH_TRIALS;
     let groups = if few { clusters.blocks } else { clusters.trials };
     let count = columns.len();
-    let (xx, xy) = sum_of(&groups, &vec![1.0; groups.len()], &noise);
+    let (xx, xy) = sum_of(&groups, &vec![1.0; groups.len()]);
     let whole = xx.cholesky()?;
     let best = whole.solve(&xy);
-    let draws = bootstrap(&groups, &noise, config);
+    let draws = bootstrap(&groups, config);
     let scale: Vec<f64> = columns.iter().map(|&c| design.scale[c]).collect();
     let values: Vec<f64> = best.iter().zip(&scale).map(|(b, s)| b / s).collect();
     let effect = |m: usize| design.candidates[set[m].candidate].effect;
@@ -123,7 +118,7 @@ pub(super) fn fit(
         .map(|load| {
             let own = columns.iter().map(|&c| design.x.column(c).dot(load));
             let moved = moved.iter().map(|column| column.dot(load));
-            whole.solve(&DVector::from_iterator(noise.len(), own.chain(moved))) * FORMULA
+            whole.solve(&DVector::from_iterator(best.len(), own.chain(moved))) * FORMULA
         })
         .collect();
     let open = |i: usize, j: usize| {
@@ -247,14 +242,14 @@ fn clusters(design: &Design, columns: &[usize], moved: &[DVector<f64>]) -> Clust
     Clusters { trials, blocks }
 }
 
-fn weighted(groups: &[Group], weights: &[f64], noise: &[f64]) -> Option<DVector<f64>> {
-    let (xx, xy) = sum_of(groups, weights, noise);
+fn weighted(groups: &[Group], weights: &[f64]) -> Option<DVector<f64>> {
+    let (xx, xy) = sum_of(groups, weights);
     xx.cholesky().map(|factor| factor.solve(&xy))
 }
 
-/// Normal equations of weighted clusters, without the noise of the columns.
-fn sum_of(groups: &[Group], weights: &[f64], noise: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
-    let count = noise.len();
+/// Normal equations of weighted clusters.
+fn sum_of(groups: &[Group], weights: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+    let count = groups.first().map_or(0, |group| group.xy.len());
     let mut xx = DMatrix::zeros(count, count);
     let mut xy = DVector::zeros(count);
     for (group, &weight) in groups.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
@@ -262,13 +257,13 @@ fn sum_of(groups: &[Group], weights: &[f64], noise: &[f64]) -> (DMatrix<f64>, DV
         xy += &group.xy * weight;
     }
     for i in 0..count {
-        xx[(i, i)] *= 1.0 - noise[i] + 1e-9;
+        xx[(i, i)] *= 1.0 + 1e-9;
     }
     (xx, xy)
 }
 
 /// Estimates from clusters drawn with replacement.
-fn bootstrap(groups: &[Group], noise: &[f64], config: &Config) -> Vec<DVector<f64>> {
+fn bootstrap(groups: &[Group], config: &Config) -> Vec<DVector<f64>> {
     let mut random = Random::new(config.seed ^ 0xb007);
     let draw = |random: &mut Random| {
         let mut weights = vec![0.0; groups.len()];
@@ -277,21 +272,5 @@ fn bootstrap(groups: &[Group], noise: &[f64], config: &Config) -> Vec<DVector<f6
         }
         weights
     };
-    (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random), noise)).collect()
-}
-
-/// Share of noise in the variance of a column of accelerations.
-fn noise_share(design: &Design, member: &Member, coefficient: usize, all: &[Series]) -> f64 {
-    let candidate = &design.candidates[member.candidate];
-    if candidate.effect != Effect::AddedMass {
-        return 0.0;
-    }
-    let (mut noise, mut power) = (0.0, 0.0);
-    for &trial in &design.trials {
-        let series = &all[trial];
-        noise += series.rate_noise[coefficient] * series.t.len() as f64;
-        power += series.conditions.iter().map(|c| accelerations(c)[coefficient].powi(2)).sum::<f64>();
-    }
-    // an axis that does not move has no coefficient worth a correction
-    if power > 0.0 { (noise / power).clamp(0.0, 0.3) } else { 0.0 }
+    (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random))).collect()
 }

@@ -24,7 +24,7 @@ pub(super) struct Lasting {
     pub deviate: f64,
     /// Its root mean square in that trial, in noises of a bin.
     pub size: f64,
-    /// Its sum of squares over all trials, a row each.
+    /// Its sum of squares over all trials, a row each, in the window where it is largest: what swings is against itself in some.
     pub energy: f64,
 }
 
@@ -48,18 +48,17 @@ pub(super) fn lasting(design: &Design, target: &DVector<f64>) -> Lasting {
         .collect();
     let memory = memory(&trials);
     let mut found = Lasting { deviate: 0.0, size: 0.0, energy: 0.0 };
+    let mut energies = [0.0; WINDOWS.len()];
     for trial in &trials {
-        for [first, last] in WINDOWS {
+        for ([first, last], energy) in WINDOWS.into_iter().zip(&mut energies) {
             let of = in_window(trial, first, last, memory);
-            if first == FIRST {
-                found.energy += of.energy;
-            }
+            *energy += of.energy;
             if of.deviate > found.deviate {
-                found = Lasting { energy: found.energy, ..of };
+                found = of;
             }
         }
     }
-    found
+    Lasting { energy: energies.into_iter().map(f64::abs).fold(0.0, f64::max), ..found }
 }
 
 /// What lasts of a trial over a window of lags.

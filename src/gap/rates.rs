@@ -2,6 +2,7 @@
 
 use super::statistics::white_variance;
 use crate::condition::Condition;
+use crate::frame::Vec3;
 use crate::signal::{SavitzkyGolay, pieces};
 
 /// Longer than the filters that differentiate a motion reach, shorter than a maneuver [s].
@@ -69,36 +70,63 @@ fn at_none(lags: [f64; 3], values: [f64; 3]) -> f64 {
     (0..3).map(|i| weight(i) * values[i]).sum()
 }
 
-/// Linear and angular acceleration in one row.
-pub(super) fn accelerations(condition: &Condition) -> [f64; 6] {
-    let (a, b) = (condition.acceleration, condition.angular_acceleration);
+/// Rates of the velocity and the angular velocity in body axes. Not the acceleration itself: the noise of a turn stands in
+/// `omega x v` as well, which laws of inertia take off again.
+pub(super) fn rates(condition: &Condition) -> [f64; 6] {
+    let (a, b) = (condition.acceleration - turning(condition), condition.angular_acceleration);
     [a.x, a.y, a.z, b.x, b.y, b.z]
 }
 
-/// Smooths accelerations that are noisy by local parabolas, which keep peaks; noise in them would pull an added mass down.
-pub(super) fn smooth_accelerations(t: &[f64], conditions: &mut [Condition]) {
+/// What turning axes have of the acceleration.
+fn turning(condition: &Condition) -> Vec3 {
+    condition.angular_velocity.cross(&condition.ground_velocity)
+}
+
+/// Smooths rates that are noisy by local parabolas, which keep peaks.
+pub(super) fn smooth_rates(t: &[f64], conditions: &mut [Condition]) {
     let pieces = pieces(t);
     for rate in 0..6 {
-        let values: Vec<f64> = conditions.iter().map(|c| accelerations(c)[rate]).collect();
-        let power = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
-        let share = white_variance(&values) / power.max(f64::MIN_POSITIVE);
-        let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) else {
-            continue;
-        };
-        for piece in &pieces {
-            let span = t[piece.end - 1] - t[piece.start];
-            let step = span / (piece.len().max(2) - 1) as f64;
-            let odd = (piece.len() - 1) / 2 * 2 + 1;
-            let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
-            let smooth = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
-            for (sample, value) in piece.clone().zip(smooth.into_iter().flatten()) {
-                let condition = &mut conditions[sample];
-                match rate {
-                    0..3 => condition.acceleration[rate] = value,
-                    _ => condition.angular_acceleration[rate - 3] = value,
-                }
-            }
+        let mut values: Vec<f64> = conditions.iter().map(|c| rates(c)[rate]).collect();
+        let share = white_variance(&values) / mean_square(&values).max(f64::MIN_POSITIVE);
+        if let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) {
+            pieces.iter().for_each(|piece| smooth(t, &mut values, piece.clone(), length));
+            conditions.iter_mut().zip(values).for_each(|(condition, value)| set(condition, rate, value));
         }
+    }
+}
+
+/// The same states with what is expected of the true rates: each scaled by the share of signal in it. A law in proportion to
+/// such a rate comes out neither pulled down by the noise nor weighed by trials that hold noise alone (regression
+/// calibration; Carroll, Ruppert, Stefanski, Crainiceanu, Measurement Error in Nonlinear Models, chapter 4). What
+/// remembers has averaged the noise already and takes the rates as they are.
+pub(super) fn calibrated(conditions: &[Condition], coherence: &[Coherence]) -> Vec<Condition> {
+    let mut calibrated = conditions.to_vec();
+    for rate in 0..6 {
+        let values: Vec<f64> = conditions.iter().map(|c| rates(c)[rate]).collect();
+        let signal = (coherence[rate].signal / mean_square(&values).max(f64::MIN_POSITIVE)).min(1.0);
+        calibrated.iter_mut().zip(values).for_each(|(condition, value)| set(condition, rate, value * signal));
+    }
+    calibrated
+}
+
+fn set(condition: &mut Condition, rate: usize, value: f64) {
+    match rate {
+        0..3 => condition.acceleration[rate] = value + turning(condition)[rate],
+        _ => condition.angular_acceleration[rate - 3] = value,
+    }
+}
+
+fn mean_square(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64
+}
+
+fn smooth(t: &[f64], values: &mut [f64], piece: std::ops::Range<usize>, length: f64) {
+    let step = (t[piece.end - 1] - t[piece.start]) / (piece.len().max(2) - 1) as f64;
+    let odd = (piece.len() - 1) / 2 * 2 + 1;
+    let window = ((length / step.max(1e-6)) as usize | 1).min(odd);
+    let smoothed = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
+    if let Ok(smoothed) = smoothed {
+        values[piece].copy_from_slice(&smoothed);
     }
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::measurement::{measured, other_force};
-use super::rates::{Coherence, accelerations, smooth_accelerations, wetting_rate};
+use super::rates::{Coherence, calibrated, rates, smooth_rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
@@ -17,7 +17,10 @@ use crate::wrench::Wrench;
 pub(super) struct Series {
     pub name: String,
     pub t: Vec<f64>,
+    /// States, with rates that are smoothed where they are noisy.
     pub conditions: Vec<Condition>,
+    /// The same with what is expected of the true rates, for inertia.
+    pub calibrated: Vec<Condition>,
     pub immersions: Vec<Immersion>,
     pub yaw: Vec<f64>,
     pub roll_pitch: Vec<[f64; 2]>,
@@ -35,10 +38,7 @@ pub(super) struct Series {
     pub other: Vec<[f64; 6]>,
     /// Acceleration as the trial has it, before any smoothing [m/s2].
     pub recorded_acceleration: Vec<Vec3>,
-    /// Noise that is left in the acceleration and the angular acceleration: an estimate of the variance of a sample, which
-    /// scatters about 0 where there is none.
-    pub rate_noise: [f64; 6],
-    /// Accelerations, angular accelerations, wetting rate and angular velocities: how far each hangs together.
+    /// Rates of velocity and angular velocity, angular accelerations, wetting rate and angular velocities: how far each hangs together.
     pub coherence: [Coherence; 10],
     /// Samples of each bin.
     pub bins: Vec<Range<usize>>,
@@ -150,15 +150,11 @@ fn of_trial(
     // before anything is smoothed, or noise would hang together as well
     let mut coherence = [Coherence::default(); 10];
     for axis in 0..3 {
-        coherence[axis] = Coherence::of(&trial.t, |i| conditions[i].acceleration[axis]);
-        coherence[axis + 3] = Coherence::of(&trial.t, |i| conditions[i].angular_acceleration[axis]);
+        coherence[axis] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis]);
+        coherence[axis + 3] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis + 3]);
         coherence[axis + 7] = Coherence::of(&trial.t, |i| conditions[i].angular_velocity[axis]);
     }
-    smooth_accelerations(&trial.t, &mut conditions);
-    let rate_noise = std::array::from_fn(|rate| {
-        let squares = conditions.iter().map(|c| accelerations(c)[rate].powi(2)).sum::<f64>();
-        squares / count.max(1) as f64 - coherence[rate].signal
-    });
+    smooth_rates(&trial.t, &mut conditions);
     let wetting_rate = wetting_rate(&trial.t, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
     let other: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| other_force(trial, c));
@@ -175,7 +171,6 @@ fn of_trial(
         other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
         wetting_rate,
         recorded_acceleration: trial.acceleration.clone(),
-        rate_noise,
         coherence,
         wheels: (0..count)
             .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
@@ -183,6 +178,7 @@ fn of_trial(
         yaw: trial.yaw.clone(),
         roll_pitch: trial.roll.iter().zip(&trial.pitch).map(|(r, p)| [*r, *p]).collect(),
         t: trial.t.clone(),
+        calibrated: calibrated(&conditions, &coherence),
         conditions,
         immersions,
         seen: predicted.clone(),

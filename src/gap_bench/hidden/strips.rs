@@ -28,9 +28,8 @@ pub(super) fn added_mass(hidden: &Hidden, setting: &Setting, track: &Track) -> V
         let strips = hull.strips(state, 0.0);
         let (first, last) = (i.saturating_sub(1), (i + 1).min(states.len() - 1));
         let span = (last - first) as f64 * track.step;
-        let (p, q) = momenta(&strips, hull.volume(state.depth), state);
-        let [(p0, q0), (p1, q1)] =
-            [first, last].map(|j| momenta(&strips, hull.volume(state.depth), &states[j]));
+        let (p, q) = momenta(&strips, state);
+        let [(p0, q0), (p1, q1)] = [first, last].map(|j| momenta(&strips, &states[j]));
         let (omega, v) = (state.angular_velocity, state.velocity);
         let force = -((p1 - p0) / span + omega.cross(&p));
         let moment = -((q1 - q0) / span + omega.cross(&q) + v.cross(&p));
@@ -40,14 +39,15 @@ pub(super) fn added_mass(hidden: &Hidden, setting: &Setting, track: &Track) -> V
 }
 
 /// Linear and angular momentum of the water that moves with the body, about its center of mass.
-fn momenta(strips: &[Strip], volume: f64, state: &State) -> (Vec3, Vec3) {
+fn momenta(strips: &[Strip], state: &State) -> (Vec3, Vec3) {
     let (v, omega) = (state.velocity, state.angular_velocity);
-    let along = SURGE_SHARE * DENSITY * volume / strips.len() as f64;
     let mut sum = (Vec3::zeros(), Vec3::zeros());
     for strip in strips {
         let [side, down] = section_mass(strip);
+        // dry strips of a tilted body move no water
+        let along = SURGE_SHARE * DENSITY * strip.beam * strip.draft;
         let place = Vec3::new(strip.x, 0.0, strip.z);
-        let mass = Vec3::new(along, side * strip.dx, down * strip.dx);
+        let mass = Vec3::new(along, side, down) * strip.dx;
         let p = mass.component_mul(&(v + omega.cross(&place)));
         sum.0 += p;
         sum.1 += place.cross(&p);
