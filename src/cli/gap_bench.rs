@@ -222,6 +222,10 @@ impl Bench {
             bar.set_length(progress.done[1] as u64);
             bar.set_position(progress.done[0] as u64);
             bar.set_message(progress.case.to_owned());
+            // in a log, a line a case
+            if bar.is_hidden() && !progress.case.is_empty() {
+                eprintln!("{}/{} {}", progress.done[0], progress.done[1], progress.case);
+            }
         };
         let outcomes = run(cases, schedule, simulator, &borrowed, self.invariance, &mut show);
         bar.finish_and_clear();
