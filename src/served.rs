@@ -1,7 +1,7 @@
 //! A vehicle as it is served: its model and the effects that were added to it.
 
 use crate::condition::Condition;
-use crate::effects::{ActiveEffects, Circumstances, EffectLoads, EffectsFile, Session};
+use crate::effects::{ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, Session};
 use crate::forces::Forces;
 use crate::model::{Form, Model, Workspace};
 
@@ -12,6 +12,8 @@ pub struct Loads {
     pub forces: Forces,
     /// The loads of the effects.
     pub effects: EffectLoads,
+    /// The model at the edge of the box of the effects.
+    edge: Forces,
 }
 
 /// One version of a bundle, ready to answer.
@@ -48,13 +50,18 @@ impl ServedVehicle {
         workspace: &mut Workspace,
         loads: &mut Loads,
     ) {
-        let Loads { forces, effects: added } = loads;
+        let Loads { forces, effects: added, edge } = loads;
         self.model.evaluate(condition, workspace, forces);
         match &self.effects {
             Some(effects) => {
                 // the wet parts of an anchored model are not those of the samples, with which effects are fitted
                 let known = matches!(self.model.weights().form, Form::Paper(_));
-                effects.evaluate(condition, circumstances, (forces, known), session, added);
+                let at_edge = effects.edge(condition).map(|state| {
+                    self.model.evaluate(&state, workspace, edge);
+                    edge.wrench
+                });
+                let answer = Answer { forces, wet_parts_known: known, at_edge };
+                effects.evaluate(condition, circumstances, &answer, session, added);
                 forces.wrench += added.sum();
             }
             None => added.clear(),

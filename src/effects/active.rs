@@ -156,6 +156,17 @@ struct Entry {
     channel_width: Option<f64>,
 }
 
+/// What the model says of a state.
+#[derive(Debug, Clone, Copy)]
+pub struct Answer<'a> {
+    /// Its forces.
+    pub forces: &'a Forces,
+    /// True where wetted fractions and points are those of the hull's samples.
+    pub wet_parts_known: bool,
+    /// Its wrench at the edge of the box, where [`ActiveEffects::edge`] asks for it.
+    pub at_edge: Option<Wrench>,
+}
+
 /// The effects of a vehicle, ready to be evaluated.
 #[derive(Debug, Clone)]
 pub struct ActiveEffects {
@@ -182,18 +193,26 @@ impl ActiveEffects {
         &self.file
     }
 
-    /// The loads in a state for which the model gave `forces`, of which `wet_parts_known` says that wetted fractions and
-    /// points are those of the hull's samples. Allocates nothing.
+    /// The state in which effects that act on the model's own drag are held, where it is another than that asked for: the model
+    /// must be asked there as well, or its drag would be that of one state and the effect's that of another.
+    pub fn edge(&self, condition: &Condition) -> Option<Condition> {
+        let needed = self.entries.iter().any(|entry| entry.effect.acts_on_own_drag());
+        let state = self.file.validity.clamped(condition);
+        (needed && state != *condition).then_some(state)
+    }
+
+    /// The loads in a state for which the model gave an answer. Allocates nothing.
     ///
     /// The memory of a session moves on by the time step with the state at its end, as it does along a trial in fitting.
     pub fn evaluate(
         &self,
         condition: &Condition,
         circumstances: &Circumstances,
-        (forces, wet_parts_known): (&Forces, bool),
+        answer: &Answer,
         mut session: Option<&mut Session>,
         out: &mut EffectLoads,
     ) {
+        let Answer { forces, wet_parts_known, at_edge } = *answer;
         out.clear();
         out.outside = self.file.validity.outside(condition);
         out.surface_forces.resize(forces.surfaces.len(), Vec3::zeros());
@@ -217,7 +236,10 @@ impl ActiveEffects {
                 body: &self.body,
                 condition: if implicit { &without_rate } else { &state },
                 immersion,
-                predicted: forces.wrench,
+                predicted: match at_edge {
+                    Some(wrench) if entry.effect.acts_on_own_drag() => wrench,
+                    _ => forces.wrench,
+                },
                 base_drag: entry.base_drag,
                 yaw: circumstances.heading.unwrap_or(0.0),
                 wetting_rate: rate.unwrap_or(0.0),

@@ -342,6 +342,11 @@ impl Effect {
         }
     }
 
+    /// True for an effect that changes the flow which the model's own drag speaks of.
+    pub(super) fn acts_on_own_drag(self) -> bool {
+        matches!(self, Self::Current | Self::WaterLevelOffset)
+    }
+
     /// Names and units of the nonlinear parameters that a report states.
     pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
         match self {

@@ -37,7 +37,7 @@ mod water_level_offset;
 mod wave_memory;
 mod wheel_paddle_thrust;
 
-pub use active::{ActiveEffects, Circumstances, EffectLoad, EffectLoads, LeftOut, Session};
+pub use active::{ActiveEffects, Answer, Circumstances, EffectLoad, EffectLoads, LeftOut, Session};
 pub use added_mass::{coefficients as added_mass_coefficients, matrix as added_mass_matrix};
 pub use body::{Block, Body, Panel};
 pub use file::{ActiveEffect, EffectsFile, EffectsFileError, Evidence, ParameterValue};

@@ -62,7 +62,7 @@ impl Evaluator {
         let circumstances = state.circumstances()?;
         let start = Instant::now();
         vehicle.evaluate(&condition, &circumstances, session, &mut self.workspace, &mut self.loads);
-        let Loads { forces, effects } = &self.loads;
+        let Loads { forces, effects, .. } = &self.loads;
         Ok(Evaluated { forces, effects, compute_ns: nanoseconds_since(start) })
     }
 }
