@@ -15,7 +15,7 @@ use common::{Row, Subject, Table};
 use wade::bundle;
 use wade::condition::Condition;
 use wade::effects::{
-    ActiveEffect, ActiveEffects, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind,
+    ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind,
     ParameterValue, Session, Validity,
 };
 use wade::forces::Forces;
@@ -197,7 +197,8 @@ fn effects(vehicle: &str) -> Vec<Subject> {
         model.evaluate(&condition, &mut Workspace::new(), &mut forces);
         let (mut session, mut loads) = (Session::default(), EffectLoads::default());
         let work = move || {
-            active.evaluate(black_box(&condition), &told, (&forces, true), Some(&mut session), &mut loads);
+            let answer = Answer { forces: &forces, wet_parts_known: true, at_edge: None };
+            active.evaluate(black_box(&condition), &told, &answer, Some(&mut session), &mut loads);
         };
         subjects.push((Row::new(format!("{vehicle} all 14 effects {name}"), 0), Box::new(work)));
     }

@@ -101,9 +101,9 @@ pub(super) fn smooth_rates(t: &[f64], conditions: &mut [Condition]) {
 /// remembers has averaged the noise already and takes the rates as they are.
 pub(super) fn calibrated(conditions: &[Condition], coherence: &[Coherence]) -> Vec<Condition> {
     let mut calibrated = conditions.to_vec();
-    for rate in 0..6 {
+    for (rate, coherence) in coherence.iter().enumerate().take(6) {
         let values: Vec<f64> = conditions.iter().map(|c| rates(c)[rate]).collect();
-        let signal = (coherence[rate].signal / mean_square(&values).max(f64::MIN_POSITIVE)).min(1.0);
+        let signal = (coherence.signal / mean_square(&values).max(f64::MIN_POSITIVE)).min(1.0);
         calibrated.iter_mut().zip(values).for_each(|(condition, value)| set(condition, rate, value * signal));
     }
     calibrated
