@@ -85,6 +85,11 @@ pub struct CaseSummary {
 }
 
 impl CaseSummary {
+    /// True where this version would compute the case another way.
+    pub fn is_outdated(&self) -> bool {
+        self.method < METHOD
+    }
+
     /// Summary of an outcome.
     pub fn of(outcome: &Outcome) -> Self {
         let nets: Vec<Vec3> = outcome.sections.iter().map(|section| net(&section.loads)).collect();
@@ -206,11 +211,6 @@ impl Collected {
             }
         }
         Ok(Self { cases: rows.into_iter().map(|row| (row.id.clone(), row)).collect() })
-    }
-
-    /// Names of the cases that this version would compute another way.
-    pub fn outdated(&self) -> impl Iterator<Item = &str> {
-        self.cases.values().filter(|case| case.method < METHOD).map(|case| case.id.as_str())
     }
 
     fn write(&self, folder: &Path) -> Result<(), CollectError> {

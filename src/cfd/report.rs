@@ -154,7 +154,7 @@ impl Report {
             vehicle: vehicle.name.clone(),
             provenance: dataset::read(&folder.join(SECTIONS_FILE))?.meta.provenance,
             sets,
-            outdated: collected.outdated().count(),
+            outdated: cases.iter().filter(|case| case.is_outdated()).count(),
             core_hours: cases.iter().map(|case| case.core_s).sum::<f64>() / 3600.0,
             core_s_median: median(cases.iter().map(|case| case.core_s)),
             cells: [least, most],

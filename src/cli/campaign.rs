@@ -1,6 +1,5 @@
 //! `wade campaign`.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -221,9 +220,10 @@ impl Run {
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: self.keep };
         let collected = Collected::read(&self.campaign, &plan)?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
-        let outdated: BTreeSet<&str> = collected.outdated().collect();
+        let is_due =
+            |id: &str| collected.cases.get(id).is_none_or(|summary| self.outdated && summary.is_outdated());
         let is_chosen = |case: &plan::Case| {
-            (!collected.cases.contains_key(&case.id) || self.outdated && outdated.contains(case.id.as_str()))
+            is_due(&case.id)
                 && (sets.is_empty() || sets.contains(&case.set))
                 && (self.case.is_empty() || self.case.contains(&case.id))
                 && (self.again || !work.failure_path(&case.id).exists())

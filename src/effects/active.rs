@@ -196,9 +196,10 @@ impl ActiveEffects {
     /// The state in which effects that act on the model's own drag are held, where it is another than that asked for: the model
     /// must be asked there as well, or its drag would be that of one state and the effect's that of another.
     pub fn edge(&self, condition: &Condition) -> Option<Condition> {
-        let needed = self.entries.iter().any(|entry| entry.effect.acts_on_own_drag());
-        let state = self.file.validity.clamped(condition);
-        (needed && state != *condition).then_some(state)
+        if !self.entries.iter().any(|entry| entry.effect.acts_on_own_drag()) {
+            return None;
+        }
+        Some(self.file.validity.clamped(condition)).filter(|state| state != condition)
     }
 
     /// The loads in a state for which the model gave an answer. Allocates nothing.

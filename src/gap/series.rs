@@ -38,7 +38,7 @@ pub(super) struct Series {
     pub other: Vec<[f64; 6]>,
     /// Acceleration as the trial has it, before any smoothing [m/s2].
     pub recorded_acceleration: Vec<Vec3>,
-    /// Rates of velocity and angular velocity, angular accelerations, wetting rate and angular velocities: how far each hangs together.
+    /// Rates of velocity and angular velocity, wetting rate and angular velocities: how far each hangs together.
     pub coherence: [Coherence; 10],
     /// Samples of each bin.
     pub bins: Vec<Range<usize>>,

@@ -149,7 +149,7 @@ pub(super) fn floor_loss(design: &Design, structure: &Structure) -> f64 {
             }
         }
     }
-    // midway, as the other
+    // midway between in sample and cross-validated, as the general model has it
     let library = design.fit(&columns).map_or(f64::INFINITY, |fit| 0.5 * (fit.loss + fit.cv_loss));
     library.min(structure.loss).min(design.empty_loss()).max(0.0)
 }
