@@ -51,7 +51,7 @@ fn of_law(samples: &[(&Series, usize)], body: &Body, law: &Shape) -> Option<(Vec
     let mut xx = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
     let mut xy = DVector::<f64>::zeros(COLUMNS);
     for &(series, sample) in samples {
-        let input = series.input(sample, body, Vec3::zeros(), None);
+        let input = series.input(sample, body, Vec3::zeros());
         let mut rows = [[0.0; COLUMNS]; 3];
         let drag = Effect::DragCoefficientError;
         effects::basis(drag, law, &Memory::default(), &input, |coefficient, _, load| {

@@ -23,7 +23,8 @@ const ALL_CHANNELS: usize = 6;
 pub(super) struct Setting<'a> {
     pub body: &'a Body,
     pub base_drag: BaseDrag,
-    pub channel_width: Option<f64>,
+    /// True where the width of some trial's channel is stated.
+    pub in_channel: bool,
     pub mass: f64,
     /// Compared components.
     pub components: Vec<usize>,
@@ -51,7 +52,7 @@ pub(super) fn unavailable(
         _ if effect.kind() == effects::Kind::Sensor && setting.computed => {
             Some("the wrench was computed: no sensor can have a fault".into())
         }
-        Effect::ChannelBlockage if setting.channel_width.is_none() => {
+        Effect::ChannelBlockage if !setting.in_channel => {
             Some("trials.toml states no channel_width".into())
         }
         Effect::WheelPaddleThrust if !has_wheels() => {
@@ -100,7 +101,7 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::AddedMass | Effect::WheelPaddleThrust => vec![[0.0; 3], [1.0, 0.0, 0.0]],
         Effect::BedMotion => [0.0, 1.0, 2.0].map(|area| [area, 0.0, 0.0]).into(),
         Effect::Squat => {
-            let walls = if setting.channel_width.is_some() { &IN_CHANNEL[..] } else { &[] };
+            let walls = if setting.in_channel { &IN_CHANNEL[..] } else { &[] };
             [&[[0.0; 3], [0.0, 1.0, 0.0]][..], walls].concat()
         }
         Effect::ChannelBlockage => [&[[0.0; 3]][..], &IN_CHANNEL].concat(),
@@ -154,7 +155,7 @@ fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, co
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);
     let base_drag = setting.base_drag.of(effect, shape);
     for (sample, &t) in series.t.iter().enumerate() {
-        let mut input = series.input(sample, setting.body, base_drag, setting.channel_width);
+        let mut input = series.input(sample, setting.body, base_drag);
         if effect == Effect::AddedMass {
             input.condition = &series.calibrated[sample];
         }

@@ -69,9 +69,10 @@ pub(super) fn compose(
         true => found.alternatives.iter().map(|set| names(judge, set)).collect(),
         false => Vec::new(),
     };
-    let separating_experiment = found.alternatives.first().filter(|_| holds).map(|rival| {
-        let effects = |set: &[Member]| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
-        separating(&effects(&found.members), &effects(rival))
+    let separating_experiment = (holds && !found.alternatives.is_empty()).then(|| {
+        let sets = std::iter::once(&found.members).chain(&found.alternatives);
+        let effects = |set: &Vec<Member>| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
+        separating(&sets.map(effects).collect::<Vec<_>>())
     });
     let held_floors = floors_of(all, &held, judge.floors, &setting.components);
     let unexplained = unexplained(judge, &found);
@@ -171,7 +172,7 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
     for series in all {
         let mut memory = Memory::default();
         for (index, bin) in series.bins.iter().enumerate() {
-            let input = series.input(bin.start, setting.body, base_drag, setting.channel_width);
+            let input = series.input(bin.start, setting.body, base_drag);
             if index > 0 {
                 let dt = series.t[bin.start] - series.t[series.bins[index - 1].start];
                 effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
@@ -301,7 +302,8 @@ fn hash(trials: &Trials) -> String {
         digest.update(&trial.name);
         let columns = [&trial.t, &trial.depth, &trial.density, &trial.roll, &trial.pitch, &trial.yaw];
         let measured = trial.measured.iter().chain(&trial.simulated).flatten();
-        for column in columns.into_iter().chain(measured).chain(trial.other_forces.values()) {
+        let stated = trial.other_forces.values().chain(trial.known_loads.values());
+        for column in columns.into_iter().chain(measured).chain(stated) {
             column.iter().for_each(|value| digest.update(value.to_le_bytes()));
         }
         for vectors in [&trial.velocity, &trial.current, &trial.angular_velocity, &trial.acceleration] {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::report::{NamedEffect, Report, Verdict};
 use crate::effects::{ActiveEffect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
-use crate::trials::Trials;
+use crate::trials::{Manifest, Trials};
 
 /// Why nothing of a report may be added to a model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -85,6 +85,11 @@ fn validity(report: &Report) -> Validity {
     }
 }
 
+/// The narrowest of the channels whose widths are stated by trial [m].
+fn narrowest(manifest: &Manifest) -> Option<f64> {
+    manifest.channel_widths.values().copied().filter(|width| width.is_finite()).reduce(f64::min)
+}
+
 fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
     let parameters = effect.parameters.iter().map(|(name, parameter)| {
         let unit = parameter.unit.to_owned();
@@ -97,7 +102,7 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         share_of_gap: effect.share_of_gap,
         shape: effect.shape,
         base_drag: effect.base_drag,
-        channel_width: trials.manifest.channel_width,
+        channel_width: trials.manifest.channel_width.or_else(|| narrowest(&trials.manifest)),
         coefficients: effect.coefficients.iter().map(|name| (*name).to_owned()).collect(),
         covariance: effect.covariance.clone(),
         parameters: parameters.collect::<BTreeMap<_, _>>(),

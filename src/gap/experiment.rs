@@ -1,25 +1,27 @@
-//! The trial that would tell two explanations apart.
+//! The trials that would tell explanations apart.
 
 use crate::effects::Effect;
 
-/// A trial in words, for sets that differ.
-pub(super) fn separating(named: &[Effect], rival: &[Effect]) -> String {
-    let only = |a: &[Effect], b: &[Effect]| -> Vec<Effect> {
-        a.iter().filter(|effect| !b.contains(effect)).copied().collect()
-    };
-    let (ours, theirs) = (only(named, rival), only(rival, named));
-    let names =
-        |effects: &[Effect]| effects.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(" and ");
-    let mut text = format!("{} or {}: ", names(&ours), names(&theirs));
+/// Trials in words that tell sets of effects apart.
+pub(super) fn separating(sets: &[Vec<Effect>]) -> String {
+    let shared = |effect: &Effect| sets.iter().all(|set| set.contains(effect));
+    let own: Vec<Vec<Effect>> =
+        sets.iter().map(|set| set.iter().filter(|effect| !shared(effect)).copied().collect()).collect();
+    let names = own.iter().filter(|set| !set.is_empty()).map(|set| {
+        set.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(" and ")
+    });
     let mut parts: Vec<String> = Vec::new();
-    for effect in ours.iter().chain(&theirs) {
+    for effect in own.iter().flatten() {
         let part = format!("{} ({} alone shows there)", alone(*effect), effect.name());
         if !parts.contains(&part) {
             parts.push(part);
         }
     }
-    text.push_str(&parts.join("; or "));
-    text
+    let names = names.collect::<Vec<_>>().join(" or ");
+    match parts.len() {
+        0..=2 => format!("{names}: {}", parts.join("; or ")),
+        _ => format!("{names}: all but one of these tell: {}", parts.join("; ")),
+    }
 }
 
 /// A trial in which an effect shows in a way of its own.
@@ -49,7 +51,7 @@ fn alone(effect: Effect) -> &'static str {
         Effect::WaveMemory => {
             "speed up within a second, then hold the speed for 10 s; repeat after 2 s and after 60 s of rest"
         }
-        Effect::ChannelBlockage => "repeat a steady run in a channel of another width, or in open water",
+        Effect::ChannelBlockage => "repeat steady runs in a channel of another width, or in open water (channel_widths in trials.toml)",
         Effect::Squat => "hold at least four steady speeds at two depths and measure the vertical force",
         Effect::WheelPaddleThrust => {
             "let the wheels turn at two speeds while the vehicle is held, at one depth"
@@ -63,7 +65,9 @@ fn alone(effect: Effect) -> &'static str {
         Effect::SensorBias => "read the sensor on dry ground before and after each trial",
         Effect::SensorBiasStep => "read the sensor on dry ground between all trials, in their order",
         Effect::SensorDrift => "read the sensor at rest on dry ground for as long as a trial lasts",
-        Effect::SensorGain => "hang three known weights on the sensor, in each direction that was measured",
+        Effect::SensorGain => {
+            "hang three known weights on the sensor, in each direction that was measured (measured.known_loads in trials.toml)"
+        }
         Effect::AxisMisalignment => {
             "hang a known weight on the sensor on level ground and read all components"
         }

@@ -5,10 +5,12 @@
 //! what the ground carries is unknown there. A dry twin, the same command without water, is taken off at the same time
 //! since the start, with the difference of the inertia.
 
+use std::collections::BTreeMap;
+
 use super::GapError;
 use crate::frame::GRAVITY;
 use crate::signal::interpolate;
-use crate::trials::{Manifest, Method, Trial, Trials, WRENCH};
+use crate::trials::{Method, Trial, Trials, component_of};
 
 /// The measured wrench of each sample; `None` for a component that was not measured [N, N m].
 pub(super) fn measured(trials: &Trials, trial: &Trial, mass: f64) -> Result<[Option<Vec<f64>>; 6], GapError> {
@@ -18,19 +20,18 @@ pub(super) fn measured(trials: &Trials, trial: &Trial, mass: f64) -> Result<[Opt
         return Ok(direct);
     }
     let mass = trials.manifest.mass.unwrap_or(mass);
-    let mut wrench = inferred(&trials.manifest, trial, mass);
+    let mut wrench = inferred(trial, mass);
     if let Some(name) = trials.manifest.measured.dry_twins.get(&trial.name) {
         let missing = || GapError::NoTwin { trial: trial.name.clone(), twin: name.clone() };
         let twin = trials.trials.iter().find(|other| other.name == *name).ok_or_else(missing)?;
-        take_off(&mut wrench, trial, twin, &inferred(&trials.manifest, twin, mass));
+        take_off(&mut wrench, trial, twin, &inferred(twin, mass));
     }
     Ok(wrench)
 }
 
-/// Sum of the known other forces on a component, by the end of the column's name.
-pub(super) fn other_force(trial: &Trial, component: usize) -> Option<Vec<f64>> {
-    let suffix = format!("_{}", WRENCH[component]);
-    let mut columns = trial.other_forces.iter().filter(|(name, _)| name.ends_with(&suffix));
+/// Sum of the columns of known forces that act on a component; `None` where there is none.
+pub(super) fn sum_on(component: usize, columns: &BTreeMap<String, Vec<f64>>) -> Option<Vec<f64>> {
+    let mut columns = columns.iter().filter(|(name, _)| component_of(name) == Some(component));
     let mut sum = columns.next()?.1.clone();
     for (_, column) in columns {
         sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += value);
@@ -38,9 +39,9 @@ pub(super) fn other_force(trial: &Trial, component: usize) -> Option<Vec<f64>> {
     Some(sum)
 }
 
-fn inferred(_manifest: &Manifest, trial: &Trial, mass: f64) -> [Option<Vec<f64>>; 6] {
+fn inferred(trial: &Trial, mass: f64) -> [Option<Vec<f64>>; 6] {
     let force = |axis: usize| {
-        let known = other_force(trial, axis)?;
+        let known = sum_on(axis, &trial.other_forces)?;
         let value = |(sample, other): (usize, f64)| {
             mass * (trial.acceleration[sample][axis] + GRAVITY * trial.up(sample)[axis]) - other
         };

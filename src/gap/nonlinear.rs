@@ -105,8 +105,9 @@ pub(super) fn through_sensors(
             .collect();
         for (rank, series) in all.iter_mut().enumerate() {
             let added = explained(&found, series, rank, setting);
-            for ((seen, predicted), added) in series.seen.iter_mut().zip(&series.predicted).zip(added) {
-                *seen = std::array::from_fn(|c| predicted[c] + added[c]);
+            let without = series.predicted.iter().zip(&series.known);
+            for ((seen, (predicted, known)), added) in series.seen.iter_mut().zip(without).zip(added) {
+                *seen = std::array::from_fn(|c| predicted[c] + known[c] + added[c]);
             }
         }
         for candidate in 0..design.candidates.len() {

@@ -25,7 +25,7 @@ impl Judge<'_> {
                     let mut rival = others.clone();
                     rival.push(judged.member);
                     let (difference, open) = self.difference(&rival, set, explained)?;
-                    (difference <= open).then_some((difference, rival))
+                    (difference <= open && !self.is_refuted(&rival, set)).then_some((difference, rival))
                 });
                 if let Some((difference, mut rival)) = rivals.min_by(|a, b| a.0.total_cmp(&b.0)) {
                     rival.sort_by_key(|member| self.effect(member));
@@ -140,6 +140,34 @@ impl Judge<'_> {
         // the loss of the rival has the noise twice as often as the predictions differ
         let noise = 2.0 * noise_of(design, &(&design.y - &b), &(&a - &b)).sqrt();
         Some((total, (2.0 * noise).max(formula)))
+    }
+
+    /// True where single trials rule a rival out, however little of all that is explained lies in them: what it misses there
+    /// is more than noise and more than an error of the formulas there, such as the gain that a hung weight should have shown.
+    fn is_refuted(&self, rival: &[Member], set: &[Member]) -> bool {
+        /// Share of what is explained of a trial, and of what is left of it, that formulas and errors of the motion leave open.
+        const OPEN: f64 = 0.1;
+        const DEVIATIONS: f64 = 3.0;
+        let (Some(a), Some(b)) = (self.predictions(rival), self.predictions(set)) else { return false };
+        let design = self.design;
+        let mut apart = &a - &b;
+        let mut missed = 0.0;
+        for rows in &design.rows.of_trial {
+            let of = |row: usize| {
+                let y = design.y[row];
+                [(y - a[row]).powi(2), (y - b[row]).powi(2), a[row] * a[row], b[row] * b[row]]
+            };
+            let [without, with, ours, theirs] =
+                rows.clone().map(of).fold([0.0; 4], |sum, row| std::array::from_fn(|i| sum[i] + row[i]));
+            let difference = without - with;
+            let open = OPEN * (f64::max(ours, theirs) + with);
+            if difference.abs() > open {
+                missed += difference - difference.clamp(-open, open);
+            } else {
+                rows.clone().for_each(|row| apart[row] = 0.0);
+            }
+        }
+        missed > DEVIATIONS * 2.0 * noise_of(design, &(&design.y - &b), &apart).sqrt()
     }
 
     /// What a set predicts of each row by the fit without the row's fold.

@@ -52,7 +52,7 @@ pub fn run(
     let setting = Setting {
         body,
         base_drag: BaseDrag::new(&all, body),
-        channel_width: trials.manifest.channel_width,
+        in_channel: all.iter().any(|series| series.channel_width.is_some()),
         mass: trials.manifest.mass.unwrap_or(body.mass),
         components,
         inferred: is_inferred(&trials.manifest),

@@ -1,8 +1,9 @@
 //! Trials as the workflow sees them: state, prediction and gap of every sample, and bins of samples.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::measurement::{measured, other_force};
+use super::measurement::{measured, sum_on};
 use super::rates::{Coherence, calibrated, rates, smooth_rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
@@ -28,11 +29,13 @@ pub(super) struct Series {
     pub wheels: Vec<[Option<f64>; 4]>,
     /// Model's wrench; 0 where another simulator has no column of a component.
     pub predicted: Vec<[f64; 6]>,
-    /// What sensors see of the water: the prediction, and the effects of the water that were found beside them.
+    /// Known loads that the sensor bears besides the water's.
+    pub known: Vec<[f64; 6]>,
+    /// What sensors bear: the prediction, the known loads, and the effects of the water that were found beside them.
     pub seen: Vec<[f64; 6]>,
     /// The model's own standard deviation.
     pub uncertainty: Vec<[f64; 6]>,
-    /// Measured minus predicted; 0 for components that are not compared.
+    /// Measured minus predicted and known; 0 for components that are not compared.
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one.
     pub other: Vec<[f64; 6]>,
@@ -44,17 +47,13 @@ pub(super) struct Series {
     pub bins: Vec<Range<usize>>,
     /// Bins of each run without a hole.
     pub runs: Vec<Range<usize>>,
+    /// Width of the channel [m].
+    pub channel_width: Option<f64>,
 }
 
 impl Series {
     /// The state of a sample as an effect sees it.
-    pub fn input<'a>(
-        &'a self,
-        sample: usize,
-        body: &'a Body,
-        base_drag: Vec3,
-        channel_width: Option<f64>,
-    ) -> Input<'a> {
+    pub fn input<'a>(&'a self, sample: usize, body: &'a Body, base_drag: Vec3) -> Input<'a> {
         let p = &self.predicted[sample];
         Input {
             body,
@@ -64,7 +63,7 @@ impl Series {
             base_drag,
             yaw: self.yaw[sample],
             wetting_rate: self.wetting_rate[sample],
-            channel_width,
+            channel_width: self.channel_width,
             wheel_speeds: self.wheels[sample],
         }
     }
@@ -157,10 +156,16 @@ fn of_trial(
     smooth_rates(&trial.t, &mut conditions);
     let wetting_rate = wetting_rate(&trial.t, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
-    let other: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| other_force(trial, c));
+    let of_columns = |columns: &BTreeMap<String, Vec<f64>>| -> Vec<[f64; 6]> {
+        let sums: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| sum_on(c, columns));
+        (0..count).map(|i| std::array::from_fn(|c| sums[c].as_ref().map_or(0.0, |sum| sum[i]))).collect()
+    };
+    let known = of_columns(&trial.known_loads);
+    let seen: Vec<[f64; 6]> =
+        predicted.iter().zip(&known).map(|(p, k)| std::array::from_fn(|c| p[c] + k[c])).collect();
     let gap = (0..count).map(|i| {
         std::array::from_fn(|c| match (&measured[c], present[c]) {
-            (Some(column), true) => column[i] - predicted[i][c],
+            (Some(column), true) => column[i] - seen[i][c],
             _ => 0.0,
         })
     });
@@ -168,7 +173,8 @@ fn of_trial(
     let series = Series {
         name: trial.name.clone(),
         gap: gap.collect(),
-        other: (0..count).map(|i| std::array::from_fn(|c| other[c].as_ref().map_or(0.0, |o| o[i]))).collect(),
+        other: of_columns(&trial.other_forces),
+        channel_width: trials.manifest.channel_width_of(&trial.name),
         wetting_rate,
         recorded_acceleration: trial.acceleration.clone(),
         coherence,
@@ -181,7 +187,8 @@ fn of_trial(
         calibrated: calibrated(&conditions, &coherence),
         conditions,
         immersions,
-        seen: predicted.clone(),
+        known,
+        seen,
         predicted,
         uncertainty,
         bins,

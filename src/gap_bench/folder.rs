@@ -44,7 +44,8 @@ fn csv(trial: &Trial) -> String {
             columns.extend(values.clone().map(|values| (*name, values)));
         }
     }
-    columns.extend(trial.other_forces.iter().map(|(name, values)| (name.as_str(), values.clone())));
+    let stated = trial.other_forces.iter().chain(&trial.known_loads);
+    columns.extend(stated.map(|(name, values)| (name.as_str(), values.clone())));
     let columns: Vec<(&str, &[f64])> = columns.iter().map(|(name, v)| (*name, v.as_slice())).collect();
     csv_text(&columns)
 }

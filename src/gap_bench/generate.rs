@@ -5,21 +5,21 @@ use std::collections::BTreeMap;
 use super::case::Case;
 use super::hidden::{Hidden, Parameter, Setting, parameters, strength};
 use super::noise::{CELL, QUANTUM, SmoothError, left_by_dropouts, of_wrench, recorded, rounded};
-use super::track::DENSITY;
+use super::track::{CHANNEL, DENSITY};
 use super::{NoiseKind, Region, Schedule, Simulator, State, Track, Wrench6};
 use crate::frame::Vec3;
 use crate::random::Random;
 use crate::signal::{SavitzkyGolay, UniformGrid, interpolate, pieces};
-use crate::trials::{Body, Gap, Manifest, Measured, Method, Trial, Trials, WRENCH};
+use crate::trials::{Body, Gap, Manifest, Measured, Method, Trial, Trials, WRENCH, component_of};
 
-/// Width of the channel [m].
-const CHANNEL: f64 = 3.0;
 /// How much better or worse than the stated load cell that of a case may be.
 const INSTRUMENTS: [f64; 2] = [0.1, 20.0];
 /// How much worse than stated the cameras may be: they do not get as bad as an inferred wrench.
 const CAMERAS: f64 = 3.0;
 /// Column of the drive force where the wrench is inferred.
 pub const DRIVE: &str = "drive_fx";
+/// Columns of known weights hung on the sensor.
+const HUNG: [&str; 3] = ["hung_fx", "hung_fy", "hung_fz"];
 /// Draft that the body's table states for the generated box [m].
 const DRAFT: f64 = 0.2032;
 
@@ -59,11 +59,11 @@ pub fn generate(case: &Case, schedule: &Schedule, simulator: Simulator) -> Gener
     let mut random = Random::new(case.seed);
     let tracks = schedule.tracks(&case.plan, simulator.hull.wheel[0], &mut random.fork());
     let session = tracks.last().map_or(1.0, |track| track.session_time + 10.0);
-    let setting = Setting { simulator, channel_width: CHANNEL, session };
+    let setting = Setting { simulator, session };
     let measured = if case.inferred { [true, true, false, false, false, true] } else { [true; 6] };
     let exact: Vec<Vec<Wrench6>> = tracks
         .iter()
-        .map(|track| track.states.iter().map(|state| simulator.predict(state)).collect())
+        .map(|track| track.states.iter().map(|state| simulator.predict(state) + state.known_load).collect())
         .collect();
     let (instruments, noise_seed) = (random.fork(), random.fork());
     let scene = Scene { case, setting, tracks: &tracks, exact: &exact, measured };
@@ -113,9 +113,10 @@ impl Scene<'_> {
             noise.push(cell);
             tracks.push(recorded);
         }
-        let gaps = self.exact.iter().zip(&predicted).zip(&noise);
-        let gaps = gaps.flat_map(|((exact, predicted), noise)| {
-            exact.iter().zip(predicted).zip(noise).map(|((e, p), n)| e - p + n)
+        let gaps = self.exact.iter().zip(&predicted).zip(self.tracks).zip(&noise);
+        let gaps = gaps.flat_map(|(((exact, predicted), track), noise)| {
+            let known = track.states.iter().map(|state| state.known_load);
+            exact.iter().zip(predicted).zip(known).zip(noise).map(|(((e, p), k), n)| e - p - k + n)
         });
         let floor = root_mean_square(gaps);
         Seen { tracks, predicted, noise, floor }
@@ -247,6 +248,10 @@ impl Scene<'_> {
             components.clone().map(|((name, cell), _)| (name.to_owned(), cell * scale * std)).collect()
         };
         let stated = self.case.seed.is_multiple_of(2);
+        let others = self.tracks.iter().filter(|track| track.channel_width != CHANNEL);
+        let states = || self.tracks.iter().flat_map(|track| &track.states);
+        let known_loads =
+            HUNG.iter().enumerate().filter(|(axis, _)| states().any(|state| state.known_load[*axis] != 0.0));
         let is_analytic = matches!(simulator.prediction, super::Prediction::Analytic);
         Manifest {
             vehicle: simulator.vehicle.to_owned(),
@@ -255,12 +260,13 @@ impl Scene<'_> {
                 self.case.seed
             )),
             fluid_density: Some(DENSITY),
-            channel_width: Some(self.setting.channel_width),
+            channel_width: Some(CHANNEL),
+            channel_widths: others.map(|track| (track.name.clone(), track.channel_width)).collect(),
             mass: Some(hull.mass),
-            nominal_depth: BTreeMap::new(),
             measured: Measured {
                 method: Some(if self.case.inferred { Method::InverseDynamics } else { Method::LoadCell }),
                 other_forces: if self.case.inferred { vec![DRIVE.to_owned()] } else { Vec::new() },
+                known_loads: known_loads.map(|(_, name)| (*name).to_owned()).collect(),
                 ..Measured::default()
             },
             sensor_noise: if stated { by_component(1.0) } else { BTreeMap::new() },
@@ -276,6 +282,7 @@ impl Scene<'_> {
                 displaced_volume: hull.volume(DRAFT),
                 center_of_mass: (hull.center_of_mass - Vec3::z() * (hull.z0 + 0.5 * DRAFT)).into(),
             }),
+            ..Manifest::default()
         }
     }
 
@@ -304,6 +311,8 @@ impl Scene<'_> {
             let analytic = matches!(self.setting.simulator.prediction, super::Prediction::Analytic);
             analytic.then(|| kept.iter().map(|&i| predicted[i][c]).collect())
         });
+        let known_loads = (0..3).map(|axis| (HUNG[axis], of(&|state| state.known_load[axis])));
+        let known_loads = known_loads.filter(|(_, load)| load.iter().any(|load| *load != 0.0));
         Trial {
             name: track.name.clone(),
             gaps,
@@ -324,6 +333,7 @@ impl Scene<'_> {
             }),
             simulated,
             other_forces: drive.map(|drive| (DRIVE.to_owned(), drive)).into_iter().collect(),
+            known_loads: known_loads.into_iter().map(|(name, load)| (name.to_owned(), load)).collect(),
             unknown_columns: Vec::new(),
             rows,
             t,
@@ -378,10 +388,17 @@ pub fn gap(trial: &Trial, sample: usize, predicted: &Wrench6) -> Wrench6 {
     Wrench6::from_fn(|c, _| trial.measured[c].as_ref().map_or(0.0, |values| values[sample] - predicted[c]))
 }
 
-/// What was predicted for a sample: the columns of the simulator, else the simulator's answer to the recorded state.
+/// What the sensor should read in a sample: the columns of the simulator, else the simulator's answer to the recorded state,
+/// and the known loads.
 pub fn predicted(trial: &Trial, sample: usize, simulator: &Simulator) -> Wrench6 {
+    let mut known = Wrench6::zeros();
+    for (name, values) in &trial.known_loads {
+        component_of(name).into_iter().for_each(|component| known[component] += values[sample]);
+    }
     if trial.simulated[0].is_some() {
-        return Wrench6::from_fn(|c, _| trial.simulated[c].as_ref().map_or(0.0, |values| values[sample]));
+        let simulated =
+            |c: usize| trial.simulated[c].as_ref().map_or(0.0, |values| values[sample]);
+        return known + Wrench6::from_fn(|c, _| simulated(c));
     }
     let state = State {
         t: trial.t[sample],
@@ -393,7 +410,7 @@ pub fn predicted(trial: &Trial, sample: usize, simulator: &Simulator) -> Wrench6
         depth: trial.depth[sample],
         ..State::default()
     };
-    simulator.predict(&state)
+    known + simulator.predict(&state)
 }
 
 /// Closure by the true change: scaled to fit every other second, judged on the rest, in floors. Halves of the trials would

@@ -179,11 +179,12 @@ mod tests {
 
     use super::*;
     use crate::gap_bench::State;
+    use crate::gap_bench::track::CHANNEL;
 
     fn track(count: usize) -> Track {
         let step = 1.0 / 111.0;
         let state = |i| State { t: i as f64 * step, depth: 0.2, ..State::default() };
-        Track { name: "generated".into(), session_time: 0.0, step, states: (0..count).map(state).collect() }
+        Track { name: "generated".into(), session_time: 0.0, channel_width: CHANNEL, step, states: (0..count).map(state).collect() }
     }
 
     fn moments(values: &[f64]) -> (f64, f64) {

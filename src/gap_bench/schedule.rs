@@ -38,6 +38,12 @@ pub enum Maneuver {
     Steady,
     /// The changes of speed of `Steps` on dry ground.
     Dry,
+    /// Steady speeds, headed one way, so shallow that the wheels carry much of the weight.
+    Shallow,
+    /// Steady speeds, headed one way, in a basin so wide that its walls do nothing.
+    Basin,
+    /// Standing on dry ground with known weights hung on the sensor, one direction after the other.
+    Weights,
 }
 
 /// Trials of one experiment.
@@ -104,6 +110,12 @@ pub struct Schedule {
 
 /// Depths of the other trials [m]: the paper's.
 const DEPTHS: [f64; 3] = [0.1016, 0.2032, 0.254];
+/// Depth of trials on dry ground [m].
+const DRY: f64 = -0.5;
+/// Least of the known weights [N]: 10 kg.
+const WEIGHT: f64 = 98.1;
+/// Width of a basin [m].
+const BASIN: f64 = 30.0;
 /// Time between the ends and beginnings of trials of a session [s].
 const PAUSE: f64 = 60.0;
 
@@ -140,7 +152,11 @@ impl Schedule {
             for index in 0..count {
                 let motion = motion(maneuver, index, self.duration, random);
                 let name = format!("{maneuver:?}").to_lowercase();
-                tracks.push(motion.track(name, self.duration, self.rate, wheel_radius));
+                let mut track = motion.track(name, self.duration, self.rate, wheel_radius);
+                if maneuver == Maneuver::Basin {
+                    track.channel_width = BASIN;
+                }
+                tracks.push(track);
             }
         }
         random.shuffle(&mut tracks);
@@ -171,7 +187,7 @@ fn motion(maneuver: Maneuver, index: usize, duration: f64, random: &mut Random) 
                 .step(5.0 * part, 0.5, first)
                 .step(6.2 * part, 0.6, -second);
             let depth = match maneuver {
-                Maneuver::Dry => -0.5,
+                Maneuver::Dry => DRY,
                 Maneuver::StepsOneDepth => DEPTHS[1],
                 _ => depth,
             };
@@ -238,9 +254,18 @@ fn motion(maneuver: Maneuver, index: usize, duration: f64, random: &mut Random) 
             let surge = Profile::constant(1.2);
             Motion { surge, depth: DEPTHS[1], ..Motion::default() }
         }
-        Maneuver::Steady => {
+        Maneuver::Steady | Maneuver::Shallow | Maneuver::Basin => {
             let surge = Profile::constant(0.4 + 0.25 * (index % 7) as f64);
-            Motion { surge, depth: DEPTHS[1], ..Motion::default() }
+            let depth = DEPTHS[if maneuver == Maneuver::Shallow { 0 } else { 1 }];
+            Motion { surge, depth, ..Motion::default() }
+        }
+        Maneuver::Weights => {
+            let start = |axis: usize| (0.5 + 2.1 * axis as f64) * part;
+            let hung = [0, 1, 2].map(|axis| {
+                let weight = if axis == 2 { -1.0 } else { side } * (1 + index) as f64 * WEIGHT;
+                Profile::default().step(start(axis), 0.3 * part, weight).step(start(axis) + 1.5 * part, 0.3 * part, -weight)
+            });
+            Motion { hung, depth: DRY, ..Motion::default() }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The exact motion of a trial.
 
+use super::Wrench6;
 use super::profile::Profile;
 use crate::condition::{Condition, GroundContact};
 use crate::frame::{Vec3, up_from_roll_pitch};
@@ -7,6 +8,8 @@ use crate::validate::generated::{Motion as RunMotion, Run};
 
 /// Density of the water of all generated trials [kg/m3].
 pub(super) const DENSITY: f64 = 1000.0;
+/// Width of the channel of most trials [m].
+pub(super) const CHANNEL: f64 = 3.0;
 /// Half the interval for accelerations of a run, whose velocity is known to 1e-10 m/s [s].
 const INSTANT: f64 = 1e-3;
 
@@ -31,6 +34,8 @@ pub struct State {
     pub depth: f64,
     /// Wheel speeds [rad/s]: front left and right, rear left and right.
     pub wheels: [f64; 4],
+    /// Known load on the sensor besides the water's.
+    pub known_load: Wrench6,
 }
 
 impl State {
@@ -65,6 +70,8 @@ pub struct Track {
     pub name: String,
     /// When the trial began in the session [s].
     pub session_time: f64,
+    /// Width of the channel [m].
+    pub channel_width: f64,
     /// Time between samples [s].
     pub step: f64,
     /// The samples.
@@ -85,6 +92,8 @@ pub(super) struct Motion {
     pub yaw: Profile,
     /// Wheel speed beyond that of rolling [rad/s].
     pub slip: Profile,
+    /// Known forces hung on the sensor, along the body's axes [N].
+    pub hung: [Profile; 3],
     /// Water depth where heave is 0 [m].
     pub depth: f64,
 }
@@ -102,7 +111,12 @@ impl Motion {
             state
         });
         let states = states.collect();
-        Track { name, session_time: 0.0, step: 1.0 / rate, states }
+        Track { name, session_time: 0.0, channel_width: CHANNEL, step: 1.0 / rate, states }
+    }
+
+    fn known_load(&self, t: f64) -> Wrench6 {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.hung[axis].at(t)[0]);
+        Wrench6::new(x, y, z, 0.0, 0.0, 0.0)
     }
 
     fn state(&self, t: f64, place: [f64; 2], wheel_radius: f64) -> State {
@@ -122,6 +136,7 @@ impl Motion {
             place,
             depth: self.depth - heave[0],
             wheels: [rolling; 4],
+            known_load: self.known_load(t),
         }
     }
 }
@@ -148,9 +163,11 @@ pub(super) fn of_run(name: &str, run: &Run, rate: f64, wheel_radius: f64) -> Tra
             place: [marker.x, marker.y],
             depth,
             wheels: [velocity.x / wheel_radius; 4],
+            known_load: Wrench6::zeros(),
         }
     });
-    Track { name: name.to_owned(), session_time: 0.0, step: 1.0 / rate, states: states.collect() }
+    let states = states.collect();
+    Track { name: name.to_owned(), session_time: 0.0, channel_width: CHANNEL, step: 1.0 / rate, states }
 }
 
 #[cfg(test)]

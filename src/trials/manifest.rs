@@ -32,6 +32,9 @@ pub struct Manifest {
     /// Water depth over the flat ground, by trial, as it was measured at rest [m].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub nominal_depth: BTreeMap<String, f64>,
+    /// Width of the channel of trials that were run in another, by trial [m]; `inf` is open water.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub channel_widths: BTreeMap<String, f64>,
     /// What was measured.
     #[serde(default, skip_serializing_if = "Measured::is_default")]
     pub measured: Measured,
@@ -60,6 +63,9 @@ pub struct Measured {
     pub dry_twins: BTreeMap<String, String>,
     /// Columns of known other forces, for inverse dynamics.
     pub other_forces: Vec<String>,
+    /// Columns of loads that a load cell bears besides the water's, such as known weights hung on it. A trial without the
+    /// column bears none.
+    pub known_loads: Vec<String>,
 }
 
 impl Measured {
@@ -98,6 +104,11 @@ pub struct Body {
     pub center_of_mass: [f64; 3],
 }
 
+/// The component on which a column of known forces acts, by the end of its name (`drive_fx`).
+pub fn component_of(column: &str) -> Option<usize> {
+    WRENCH.iter().position(|name| column.strip_suffix(name).is_some_and(|rest| rest.ends_with('_')))
+}
+
 impl Manifest {
     /// The text of the file.
     pub fn to_toml(&self) -> String {
@@ -112,6 +123,7 @@ impl Manifest {
             false => Err(Fault::UnknownTrial { key, name: name.clone() }),
         };
         self.nominal_depth.keys().try_for_each(|name| known("nominal_depth", name))?;
+        self.channel_widths.keys().try_for_each(|name| known("channel_widths", name))?;
         self.measured.repeats.iter().flatten().try_for_each(|name| known("measured.repeats", name))?;
         let twins = self.measured.dry_twins.iter().flat_map(|(wet, dry)| [wet, dry]);
         twins.into_iter().try_for_each(|name| known("measured.dry_twins", name))?;
@@ -123,7 +135,21 @@ impl Manifest {
         columns.into_iter().try_for_each(|name| component("measured.columns", name))?;
         self.sensor_noise.keys().try_for_each(|name| component("sensor_noise", name))?;
         self.trial_offset.keys().try_for_each(|name| component("trial_offset", name))?;
+        let Measured { other_forces, known_loads, method, .. } = &self.measured;
+        for (key, columns) in [("measured.other_forces", other_forces), ("measured.known_loads", known_loads)] {
+            if let Some(name) = columns.iter().find(|name| component_of(name).is_none()) {
+                return Err(Fault::NoComponentInName { key, name: name.clone() });
+            }
+        }
+        if *method == Some(Method::InverseDynamics) && !known_loads.is_empty() {
+            return Err(Fault::KnownLoadsInferred);
+        }
         self.check_numbers()
+    }
+
+    /// Width of the channel in which a trial was run [m].
+    pub fn channel_width_of(&self, trial: &str) -> Option<f64> {
+        self.channel_widths.get(trial).copied().or(self.channel_width)
     }
 
     fn check_numbers(&self) -> Result<(), Fault> {
@@ -145,6 +171,10 @@ impl Manifest {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(Fault::Number { key, value, expected: "positive" });
             }
+        }
+        if let Some((name, &value)) = self.channel_widths.iter().find(|(_, width)| !(**width > 0.0)) {
+            let key = format!("channel_widths.{name}");
+            return Err(Fault::Number { key, value, expected: "positive, or inf for open water" });
         }
         for (table, deviations) in
             [("sensor_noise", &self.sensor_noise), ("trial_offset", &self.trial_offset)]

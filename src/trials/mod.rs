@@ -16,7 +16,7 @@ mod write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method};
+pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method, component_of};
 pub use table::{Table, csv_text};
 pub use trial::{Gap, Trial, WHEELS, WRENCH};
 pub use write::{Columns, write};
@@ -189,6 +189,25 @@ pub enum Fault {
         /// The name.
         name: String,
     },
+    /// A column of known forces whose name does not say on what it acts.
+    #[error("{key} names \"{name}\", which ends in none of _fx, _fy, _fz, _mx, _my, _mz: name it after the component it acts on")]
+    NoComponentInName {
+        /// The key of the manifest.
+        key: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// Known loads of a cell where there is none.
+    #[error("measured.known_loads is what a load cell bears; with inverse_dynamics name the columns in other_forces")]
+    KnownLoadsInferred,
+    /// A column that is promised and that no trial has.
+    #[error("{key} names \"{name}\", which is a column of no trial")]
+    UnknownColumn {
+        /// The key of the manifest.
+        key: &'static str,
+        /// The name.
+        name: String,
+    },
     /// A number in the manifest that makes no sense.
     #[error("{key} = {value} must be {expected}")]
     Number {
@@ -260,7 +279,13 @@ impl Trials {
             return Err(at(directory)(Fault::NoTrial));
         }
         manifest.check(&files).map_err(at(&path))?;
-        let trials = files.iter().map(|file| Trial::read(file, &manifest)).collect::<Result<_, _>>()?;
+        let trials: Vec<Trial> =
+            files.iter().map(|file| Trial::read(file, &manifest)).collect::<Result<_, _>>()?;
+        let nowhere = |name: &&String| !trials.iter().any(|trial| trial.known_loads.contains_key(*name));
+        if let Some(name) = manifest.measured.known_loads.iter().find(nowhere) {
+            let key = "measured.known_loads";
+            return Err(at(&path)(Fault::UnknownColumn { key, name: name.clone() }));
+        }
         Ok(Self { manifest, trials })
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::acceleration::{acceleration, derivative};
-use super::manifest::Manifest;
+use super::manifest::{Manifest, Measured};
 use super::table::Table;
 use super::units::{check_accelerometer, check_angles, check_limits};
 use super::{Remark, TrialError, stem};
@@ -75,6 +75,8 @@ pub struct Trial {
     pub simulated: [Option<Vec<f64>>; 6],
     /// Known other forces by column.
     pub other_forces: BTreeMap<String, Vec<f64>>,
+    /// Known loads that the load cell bears besides the water's, by column.
+    pub known_loads: BTreeMap<String, Vec<f64>>,
     /// Columns that no trial has.
     pub unknown_columns: Vec<String>,
     /// Holes in time.
@@ -84,9 +86,10 @@ pub struct Trial {
 impl Trial {
     /// Reads and checks one file.
     pub(super) fn read(path: &Path, manifest: &Manifest) -> Result<Self, TrialError> {
-        let other_forces = manifest.measured.other_forces.iter().map(String::as_str);
+        let Measured { other_forces, known_loads, .. } = &manifest.measured;
+        let stated = other_forces.iter().chain(known_loads).map(String::as_str);
         let optional: Vec<&str> =
-            OPTIONAL.into_iter().chain(WHEELS).chain(WRENCH).chain(SIMULATED).chain(other_forces).collect();
+            OPTIONAL.into_iter().chain(WHEELS).chain(WRENCH).chain(SIMULATED).chain(stated).collect();
         let table = Table::read(path, &REQUIRED, &optional)?;
         check_presence(&table, manifest)?;
         table.check_time(2)?;
@@ -116,7 +119,9 @@ impl Trial {
         let angular_velocity = vectors(table, ["wx", "wy", "wz"]).unwrap_or_default();
         let angular_acceleration = vectors(table, ["alx", "aly", "alz"]);
         let current = vectors(table, ["cx", "cy", "cz"]);
-        let other_forces = manifest.measured.other_forces.iter();
+        let named = |names: &[String]| -> BTreeMap<String, Vec<f64>> {
+            names.iter().filter_map(|name| Some((name.clone(), column(name)?))).collect()
+        };
         Self {
             name: stem(&table.path),
             acceleration: acceleration(&t, &velocity, &angular_velocity),
@@ -133,7 +138,8 @@ impl Trial {
             wheel_speeds: WHEELS.map(column),
             measured: WRENCH.map(|name| column(name).filter(|_| listed(name))),
             simulated: SIMULATED.map(column),
-            other_forces: other_forces.filter_map(|name| Some((name.clone(), column(name)?))).collect(),
+            other_forces: named(&manifest.measured.other_forces),
+            known_loads: named(&manifest.measured.known_loads),
             unknown_columns: table.unknown_columns.clone(),
             gaps: gaps(table),
             rows: table.rows.clone(),

@@ -224,6 +224,7 @@ fn trial(name: &str, motion: &[State], added: &[[f64; 6]], noise: &Noise, random
         measured: present.map(|p| measured.next().filter(|_| p)),
         simulated: std::array::from_fn(|c| Some(sim.iter().map(|w| w[c]).collect())),
         other_forces: BTreeMap::new(),
+        known_loads: BTreeMap::new(),
         unknown_columns: Vec::new(),
         gaps: Vec::new(),
     }

@@ -48,16 +48,16 @@ pub(super) fn squeezed(speed: f64, depth: f64, width: f64, section: f64) -> Sque
     Squeezed { faster: beside(drop) / speed, drop }
 }
 
-fn around(setting: &Setting, state: &State) -> Squeezed {
+fn around(setting: &Setting, width: f64, state: &State) -> Squeezed {
     let hull = setting.simulator.hull;
     let section = hull.volume(state.depth) / hull.length;
-    squeezed(state.velocity.x.abs(), state.depth, setting.channel_width, section)
+    squeezed(state.velocity.x.abs(), state.depth, width, section)
 }
 
 /// The drag along x at the velocity past the body instead of the speed.
 pub(super) fn blockage(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<Wrench6> {
     let force = |state: &State| {
-        let more = around(setting, state).faster.powi(2) - 1.0;
+        let more = around(setting, track.channel_width, state).faster.powi(2) - 1.0;
         let drag = setting.simulator.drag_share(state);
         Wrench6::new(drag[0], 0.0, 0.0, 0.0, drag[4], 0.0) * (hidden.size * more)
     };
@@ -68,7 +68,7 @@ pub(super) fn blockage(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec
 pub(super) fn squat(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<Wrench6> {
     let hull = setting.simulator.hull;
     let force = |state: &State| {
-        let drop = hidden.size * around(setting, state).drop;
+        let drop = hidden.size * around(setting, track.channel_width, state).drop;
         let ahead = if state.velocity.x < 0.0 { -1.0 } else { 1.0 };
         let level = |x: f64, _: f64| -drop * (1.0 - TRIM * ahead * 2.0 * x / hull.length);
         hull.buoyancy(state, DENSITY, level) - hull.buoyancy(state, DENSITY, |_, _| 0.0)

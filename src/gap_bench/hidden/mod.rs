@@ -139,8 +139,6 @@ impl Effect {
 pub struct Setting<'a> {
     /// The body and what is predicted for it.
     pub simulator: Simulator<'a>,
-    /// Width of the channel [m].
-    pub channel_width: f64,
     /// Length of the session [s].
     pub session: f64,
 }
@@ -293,8 +291,8 @@ mod tests_support {
     pub fn on_box_with(hidden: Hidden, states: Vec<State>, wrench: &[Wrench6]) -> Vec<Wrench6> {
         let hull = Hull::generated_box();
         let simulator = Simulator { hull: &hull, prediction: Prediction::Analytic, vehicle: "generated-box" };
-        let setting = Setting { simulator, channel_width: 3.0, session: 100.0 };
-        let track = Track { name: "generated".into(), session_time: 0.0, step: 0.01, states };
+        let setting = Setting { simulator, session: 100.0 };
+        let track = Track { name: "generated".into(), session_time: 0.0, channel_width: crate::gap_bench::track::CHANNEL, step: 0.01, states };
         hidden.change(&setting, &track, wrench)
     }
 }
