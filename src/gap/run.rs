@@ -72,7 +72,9 @@ pub fn run(
         .iter()
         .flat_map(|&effect| shapes(effect, &all, &setting).into_iter().map(move |shape| (effect, shape)))
         .collect();
-    let noise = row_noise(&all, &naming, &setting.components, &floors, smoothing(&all, &naming));
+    let passes = smoothing(&all, &naming);
+    all.iter_mut().for_each(|series| series.calibrate(passes));
+    let noise = row_noise(&all, &naming, &setting.components, &floors, passes);
     let mut design = Design::new(&all, naming, &setting, &forms, noise, config);
     if design.rows.blocks < 2 * config.folds {
         let (blocks, block_s, folds) = (design.rows.blocks, config.block_s, config.folds);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::measurement::{measured, sum_on};
-use super::rates::{Coherence, calibrated, rates, smooth_rates, wetting_rate};
+use super::rates::{Coherence, Filtered, calibrated, rates, smooth_rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
@@ -20,7 +20,7 @@ pub(super) struct Series {
     pub t: Vec<f64>,
     /// States, with rates that are smoothed where they are noisy.
     pub conditions: Vec<Condition>,
-    /// The same with what is expected of the true rates, for inertia.
+    /// The same with what is expected of the true rates, for inertia; as they are until they are calibrated.
     pub calibrated: Vec<Condition>,
     pub immersions: Vec<Immersion>,
     pub yaw: Vec<f64>,
@@ -43,6 +43,8 @@ pub(super) struct Series {
     pub recorded_acceleration: Vec<Vec3>,
     /// Rates of velocity and angular velocity, wetting rate and angular velocities: how far each hangs together.
     pub coherence: [Coherence; 10],
+    /// Window over which each rate was smoothed [s].
+    smoothed: [Option<f64>; 6],
     /// Samples of each bin.
     pub bins: Vec<Range<usize>>,
     /// Bins of each run without a hole.
@@ -66,6 +68,13 @@ impl Series {
             channel_width: self.channel_width,
             wheel_speeds: self.wheels[sample],
         }
+    }
+
+    /// Calibrates the rates for a regression that smooths its rows by so many passes.
+    pub fn calibrate(&mut self, passes: usize) {
+        let Self { t, smoothed, bins, runs, .. } = &*self;
+        let filtered = Filtered { t, smoothed: *smoothed, bins, runs, passes };
+        self.calibrated = calibrated(&self.conditions, &self.coherence, &filtered);
     }
 
     /// Mean of a value over each bin.
@@ -147,13 +156,13 @@ fn of_trial(
         conditions.push(condition);
     }
     // before anything is smoothed, or noise would hang together as well
-    let mut coherence = [Coherence::default(); 10];
+    let mut coherence: [Coherence; 10] = Default::default();
     for axis in 0..3 {
         coherence[axis] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis]);
         coherence[axis + 3] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis + 3]);
         coherence[axis + 7] = Coherence::of(&trial.t, |i| conditions[i].angular_velocity[axis]);
     }
-    smooth_rates(&trial.t, &mut conditions);
+    let smoothed = smooth_rates(&trial.t, &mut conditions);
     let wetting_rate = wetting_rate(&trial.t, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
     let of_columns = |columns: &BTreeMap<String, Vec<f64>>| -> Vec<[f64; 6]> {
@@ -184,7 +193,8 @@ fn of_trial(
         yaw: trial.yaw.clone(),
         roll_pitch: trial.roll.iter().zip(&trial.pitch).map(|(r, p)| [*r, *p]).collect(),
         t: trial.t.clone(),
-        calibrated: calibrated(&conditions, &coherence),
+        calibrated: conditions.clone(),
+        smoothed,
         conditions,
         immersions,
         known,
