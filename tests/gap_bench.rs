@@ -10,7 +10,7 @@ use wade::gap_bench::case::{Case, Family, cases};
 use wade::gap_bench::generate::{gap, generate, predicted};
 use wade::gap_bench::hidden::{Effect, Hidden};
 use wade::gap_bench::real::{kvlcc2, rm2_rotor};
-use wade::gap_bench::score::rows;
+use wade::gap_bench::score::{Judged, rows};
 use wade::gap_bench::{Hull, NoiseKind, Prediction, Schedule, Simulator, Tool, folder, run};
 use wade::trials::Trials;
 use wade::vehicle::shipped;
@@ -32,7 +32,10 @@ fn single(effect: Effect, strength: f64) -> Case {
 #[test]
 fn a_folder_reads_back_as_the_trials_that_were_made() {
     let hull = Hull::generated_box();
-    for case in cases(&[Family::Null], 4, 2).iter().chain([&single(Effect::DriveGain, 1.0)]) {
+    // the second and the eighth of these have basins and hung weights among their trials
+    let pairs = cases(&[Family::Confounded], 8, 2);
+    let others = [&single(Effect::DriveGain, 1.0), &pairs[1], &pairs[7]];
+    for case in cases(&[Family::Null], 4, 2).iter().chain(others) {
         let generated = generate(case, &schedule(), box_simulator(&hull));
         assert_eq!(generated, generate(case, &schedule(), box_simulator(&hull)), "the same bits");
         let place = tempfile::tempdir().unwrap();
@@ -56,7 +59,7 @@ fn a_folder_reads_back_as_the_trials_that_were_made() {
             }
         }
         let text = std::fs::read_to_string(place.path().join("trials.toml")).unwrap();
-        assert!(!text.contains("drive_gain"), "the folder does not say what is hidden");
+        assert!(!text.contains(&case.hidden.first().map_or("hidden".into(), |hidden| hidden.effect.name())));
     }
 }
 
@@ -65,7 +68,8 @@ fn every_effect_has_its_strength_and_the_gap_is_noise_and_it() {
     let hull = Hull::generated_box();
     let simulator = box_simulator(&hull);
     let schedule = schedule();
-    for case in cases(&[Family::Single], 46, 3).iter().chain(&cases(&[Family::Outside], 5, 3)) {
+    let others = [cases(&[Family::Outside], 5, 3), cases(&[Family::Confounded], 12, 3)].concat();
+    for case in cases(&[Family::Single], 46, 3).iter().chain(&others) {
         let generated = generate(case, &schedule, simulator);
         let truth = &generated.truth;
         assert!(
@@ -220,6 +224,50 @@ fn an_effect_of_a_region_is_not_called_what_imitates_it_everywhere() {
 fn a_load_that_no_function_of_the_state_predicts_is_not_called_nothing() {
     let report = report_at_full_size(Family::Outside, 8, 1, "outside-003-mud_suction");
     assert_eq!(report.verdict, gap::Verdict::NoCandidateFits, "{}", report.summary);
+}
+
+#[test]
+fn the_trials_that_the_tool_asks_for_tell_a_pair_apart() {
+    let report = |name: &str| report_at_full_size(Family::Confounded, 8, 1, &format!("confounded-00{name}"));
+    // a basin, steady speeds and weights for a drag, weights for a density
+    for (open, asked, told, named) in [
+        (
+            "0-drag_coefficient_error",
+            &["channel of another width", "known weights", "Froude number below 0.1"][..],
+            "1-linear_damping-resolved",
+            "linear_damping",
+        ),
+        ("6-density_error", &["known weights"], "7-density_error-resolved", "density_error"),
+    ] {
+        let open = report(open);
+        assert_eq!(open.verdict, gap::Verdict::Ambiguous, "{}", open.summary);
+        let asks = open.separating_experiment.unwrap_or_default();
+        assert!(asked.iter().all(|part| asks.contains(part)), "{asks}");
+        let told = report(told);
+        assert_eq!(told.verdict, gap::Verdict::Named, "{} {:?}", told.summary, told.alternatives);
+        assert_eq!(told.effects.iter().map(|effect| effect.name).collect::<Vec<_>>(), [named]);
+    }
+}
+
+#[test]
+fn inertia_is_neither_pulled_down_by_noise_nor_pushed_up_by_a_slow_camera() {
+    let hull = Hull::generated_box();
+    let warthog = shipped::warthog().unwrap().vehicle().unwrap();
+    let all = cases(&[Family::Confounded], 69, 11);
+    let case = all.iter().find(|case| case.name == "confounded-003-added_mass-resolved").unwrap();
+    // 111 and 37 pictures a second
+    for schedule in [Schedule::full(&warthog, 1), Schedule::slice(&warthog, 1)] {
+        let made = generate(case, &schedule, box_simulator(&hull));
+        let body = gap::body_of(&made.trials).unwrap();
+        let report =
+            gap::run(&made.trials, &body, &mut |_| Predicted::default(), &Config::default()).unwrap();
+        let answer = Answer::from_report(&serde_json::to_value(&report).unwrap()).unwrap();
+        let judged = Judged::new(case, &made, Ok(answer), 0.0);
+        let [surge] = &judged.parameters[..] else { panic!("{}", report.summary) };
+        let ratio = surge.estimated / surge.planted;
+        assert!((0.9..1.15).contains(&ratio), "{ratio}");
+        assert!((surge.estimated - surge.planted).abs() < 2.5 * surge.std.unwrap(), "{surge:?}");
+    }
 }
 
 /// Folder of the published measurements, which are not part of the repository.

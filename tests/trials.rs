@@ -66,6 +66,8 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
         fluid_density = 1025.0
         channel_width = 6.0
         mass = 280.0
+        [channel_widths]
+        b = inf
         [nominal_depth]
         a = 0.2032
         [measured]
@@ -74,6 +76,7 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
         repeats = [["a", "b"]]
         dry_twins = { a = "b" }
         other_forces = ["drive_fx"]
+        known_loads = ["hung_fz"]
         [sensor_noise]
         fx = 4.0
         [trial_offset]
@@ -90,12 +93,15 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
         depth, vz,vy,vx,t,wx,wy,wz,roll,pitch,fx,fz,my,drive_fx,sim_fx,wheel_fl,temperature\n\
         0.2,0,0.1,1.5,10,0,0,0.3,0.01,-0.02,-50,9,1,70,-48,4.5,20\n\
         0.21,0,0.1,1.6,10.1,0,0,0.3,0.01,-0.02,-51,9,2,71,-49,4.6,20\n";
-    let read =
-        read(manifest, &[("b.csv", text), ("a.csv", text), ("notes.txt", "not a trial")]).expect("sound");
+    let weighed = text.replace("temperature", "hung_fz");
+    let files = [("b.csv", &weighed[..]), ("a.csv", text), ("notes.txt", "not a trial")];
+    let read = read(manifest, &files).expect("sound");
     let names: Vec<&str> = read.trials.iter().map(|trial| trial.name.as_str()).collect();
     assert_eq!(names, ["a", "b"]);
     assert_eq!(read.manifest.measured.method, Some(Method::LoadCell));
     assert_eq!(read.manifest.nominal_depth["a"], 0.2032);
+    let widths = ["a", "b"].map(|trial| read.manifest.channel_width_of(trial));
+    assert_eq!(widths, [Some(6.0), Some(f64::INFINITY)]);
     let trial = &read.trials[0];
     assert_eq!((trial.len(), &trial.rows[..]), (2, &[3, 4][..]));
     assert_eq!(trial.measured[0].as_deref(), Some(&[-50.0, -51.0][..]));
@@ -103,6 +109,8 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
     assert_eq!(trial.measured[4].as_deref(), Some(&[1.0, 2.0][..]));
     assert_eq!(trial.simulated[0].as_deref(), Some(&[-48.0, -49.0][..]));
     assert_eq!(trial.other_forces["drive_fx"], [70.0, 71.0]);
+    assert_eq!(trial.known_loads.get("hung_fz"), None, "a trial without the column bears none");
+    assert_eq!(read.trials[1].known_loads["hung_fz"], [20.0, 20.0]);
     assert_eq!(trial.wheel_speeds[0].as_deref(), Some(&[4.5, 4.6][..]));
     assert_eq!(trial.wheel_speeds[1], None);
     let condition = trial.condition(1, GroundContact::Dry);
@@ -278,6 +286,18 @@ fn a_manifest_with_unknown_names_or_numbers_is_refused() {
         ("vehicle = \"w\"\nmass = -1.0", "mass = -1 must be positive"),
         ("vehicle = \"w\"\n[nominal_depth]\nrun2 = 0.1", "nominal_depth names \"run2\""),
         ("vehicle = \"w\"\n[measured]\nrepeats = [[\"run\", \"again\"]]", "measured.repeats names \"again\""),
+        ("vehicle = \"w\"\n[channel_widths]\nrun2 = 3.0", "channel_widths names \"run2\""),
+        ("vehicle = \"w\"\n[channel_widths]\nrun = 0.0", "channel_widths.run = 0 must be positive, or inf"),
+        (
+            "vehicle = \"w\"\n[measured]\nknown_loads = [\"weight\"]",
+            "names \"weight\", which ends in none of",
+        ),
+        ("vehicle = \"w\"\n[measured]\nother_forces = [\"drive\"]", "names \"drive\", which ends in none of"),
+        ("vehicle = \"w\"\n[measured]\nknown_loads = [\"hung_fz\"]", "\"hung_fz\", which is a column of no"),
+        (
+            "vehicle = \"w\"\n[measured]\nmethod = \"inverse_dynamics\"\nknown_loads = [\"hung_fz\"]",
+            "name the columns in other_forces",
+        ),
         ("vehicle = \"w\"\n[measured]\nmethod = \"guess\"", "guess"),
         ("vehicle = \"w\"\n[sensor_noise]\nfw = 1.0", "sensor_noise names \"fw\""),
         ("vehicle = \"w\"\n[trial_offset]\nfx = -1.0", "trial_offset.fx = -1"),

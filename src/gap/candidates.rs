@@ -52,9 +52,7 @@ pub(super) fn unavailable(
         _ if effect.kind() == effects::Kind::Sensor && setting.computed => {
             Some("the wrench was computed: no sensor can have a fault".into())
         }
-        Effect::ChannelBlockage if !setting.in_channel => {
-            Some("trials.toml states no channel_width".into())
-        }
+        Effect::ChannelBlockage if !setting.in_channel => Some("trials.toml states no channel_width".into()),
         Effect::WheelPaddleThrust if !has_wheels() => {
             Some("no wheel speeds were recorded (wheel_fl, wheel_fr, wheel_rl, wheel_rr)".into())
         }
@@ -221,8 +219,11 @@ fn chain(
             }
             Effect::DriveGain => columns[0][sample] = series.other[sample],
             Effect::MassError => {
-                // the acceleration that the wrench was inferred with
-                let acceleration = series.recorded_acceleration[sample].component_mul(&accelerated);
+                // a wrench that comes inferred was so with an acceleration that nobody knows: with what is expected of it
+                let acceleration = match &series.inferred_with {
+                    Some(acceleration) => acceleration[sample].component_mul(&accelerated),
+                    None => series.calibrated[sample].acceleration,
+                };
                 let inertia = (acceleration + up * GRAVITY) * -setting.mass;
                 (0..3).for_each(|axis| columns[0][sample][axis] = inertia[axis]);
             }

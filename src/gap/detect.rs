@@ -208,7 +208,7 @@ fn signal(
 /// noise of a motion after differentiating it does not, however smooth it looks.
 fn is_coherent(effect: Effect, all: &[Series], components: &[usize]) -> bool {
     let share = |index: usize| {
-        let sums = all.iter().map(|series| &series.coherence[index]);
+        let sums = all.iter().map(|series| series.coherence[index]);
         let (power, covariance) = sums.fold((0.0, 0.0), |(p, c), s| (p + s.power, c + s.covariance));
         if power > 0.0 { covariance / power } else { 0.0 }
     };

@@ -7,9 +7,10 @@ pub(super) fn separating(sets: &[Vec<Effect>]) -> String {
     let shared = |effect: &Effect| sets.iter().all(|set| set.contains(effect));
     let own: Vec<Vec<Effect>> =
         sets.iter().map(|set| set.iter().filter(|effect| !shared(effect)).copied().collect()).collect();
-    let names = own.iter().filter(|set| !set.is_empty()).map(|set| {
-        set.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(" and ")
-    });
+    let names = own
+        .iter()
+        .filter(|set| !set.is_empty())
+        .map(|set| set.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(" and "));
     let mut parts: Vec<String> = Vec::new();
     for effect in own.iter().flatten() {
         let part = format!("{} ({} alone shows there)", alone(*effect), effect.name());
@@ -51,7 +52,9 @@ fn alone(effect: Effect) -> &'static str {
         Effect::WaveMemory => {
             "speed up within a second, then hold the speed for 10 s; repeat after 2 s and after 60 s of rest"
         }
-        Effect::ChannelBlockage => "repeat steady runs in a channel of another width, or in open water (channel_widths in trials.toml)",
+        Effect::ChannelBlockage => {
+            "repeat steady runs in a channel of another width, or in open water (channel_widths in trials.toml)"
+        }
         Effect::Squat => "hold at least four steady speeds at two depths and measure the vertical force",
         Effect::WheelPaddleThrust => {
             "let the wheels turn at two speeds while the vehicle is held, at one depth"

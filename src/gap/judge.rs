@@ -516,7 +516,7 @@ impl<'a> Judge<'a> {
 }
 
 /// True for an effect that comes and goes with a rate, as fast as the noise of a motion does.
-fn lives_on_a_rate(effect: Effect) -> bool {
+pub(super) fn lives_on_a_rate(effect: Effect) -> bool {
     use Effect::{AddedMass, MassError, SensorDelay, WaterEntrySlamming, WaveMemory};
     matches!(effect, AddedMass | MassError | SensorDelay | WaterEntrySlamming | WaveMemory)
 }

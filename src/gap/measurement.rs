@@ -14,10 +14,8 @@ use crate::trials::{Method, Trial, Trials, component_of};
 
 /// The measured wrench of each sample; `None` for a component that was not measured [N, N m].
 pub(super) fn measured(trials: &Trials, trial: &Trial, mass: f64) -> Result<[Option<Vec<f64>>; 6], GapError> {
-    let direct = trial.measured.clone();
-    if trials.manifest.measured.method != Some(Method::InverseDynamics) || direct.iter().any(Option::is_some)
-    {
-        return Ok(direct);
+    if !is_inferred_here(trials, trial) {
+        return Ok(trial.measured.clone());
     }
     let mass = trials.manifest.mass.unwrap_or(mass);
     let mut wrench = inferred(trial, mass);
@@ -27,6 +25,12 @@ pub(super) fn measured(trials: &Trials, trial: &Trial, mass: f64) -> Result<[Opt
         take_off(&mut wrench, trial, twin, &inferred(twin, mass));
     }
     Ok(wrench)
+}
+
+/// True where the wrench is inferred from the trial's own motion; false where it was measured, or comes inferred.
+pub(super) fn is_inferred_here(trials: &Trials, trial: &Trial) -> bool {
+    trials.manifest.measured.method == Some(Method::InverseDynamics)
+        && trial.measured.iter().all(Option::is_none)
 }
 
 /// Sum of the columns of known forces that act on a component; `None` where there is none.

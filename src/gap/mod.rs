@@ -10,6 +10,7 @@
 //! `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
 
 mod base_drag;
+mod calibrate;
 mod candidates;
 mod compose;
 mod config;

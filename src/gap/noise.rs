@@ -199,7 +199,7 @@ fn acceleration_noise(all: &[Series], trials: &[usize], passes: usize) -> f64 {
     let (mut noise, mut total) = (0.0, 0.0);
     for &trial in trials {
         let series = &all[trial];
-        let values = series.binned(|sample| series.conditions[sample].acceleration.x);
+        let values = series.binned(|sample| series.calibrated[sample].acceleration.x);
         for run in series.runs.iter().filter(|run| run.len() >= 8) {
             let raw = white_variance(&values[run.clone()]);
             let mut smoothed = values[run.clone()].to_vec();

@@ -1,8 +1,5 @@
 //! Rates of a motion that was differentiated: how much of them is signal, and smoothing where it is little.
 
-use std::ops::Range;
-
-use super::design::smooth as passes;
 use super::statistics::white_variance;
 use crate::condition::Condition;
 use crate::frame::Vec3;
@@ -14,8 +11,6 @@ const COHERENT: f64 = 0.35;
 /// with the sample's own at slower rates.
 const REACH_S: f64 = 0.155;
 const REACH: usize = 11;
-/// Longest lag at which the autocovariance is needed [s]: as many bins as passes of smoothing reach over.
-const LONGEST_S: f64 = 1.6;
 /// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
 const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
 
@@ -23,21 +18,16 @@ const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
 const LEAST_SIGNAL: f64 = 0.25;
 
 /// How a rate hangs together in time.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Coherence {
     /// Sum of the squares.
     pub power: f64,
     /// Sum of the products [`COHERENT`] apart.
     pub covariance: f64,
-    /// Mean square of the signal alone: the autocovariance at one, one and a half and two reaches of the filters, beyond
-    /// which the noise of one sample does not reach the other, back to 0 by the even polynomial of the fourth degree through
-    /// them. One of the second degree loses a sixth of a change of speed that takes half a second, this one a sixteenth.
+    /// Mean square of the signal alone.
     pub signal: f64,
     /// Number of samples.
     count: f64,
-    /// Autocovariance of the signal alone, by lag in samples: as recorded where the noise of one sample does not reach the
-    /// other, and that polynomial before.
-    covariances: Vec<f64>,
 }
 
 impl Coherence {
@@ -50,57 +40,63 @@ impl Coherence {
     pub fn of(t: &[f64], value: impl Fn(usize) -> f64) -> Self {
         let values: Vec<f64> = (0..t.len()).map(value).collect();
         let step = mean_step(t);
-        let lag = |seconds: f64| (seconds / step.max(1e-6)).ceil() as usize;
-        let reach = lag(REACH_S).max(REACH);
-        let at = |lag: usize| {
-            let pairs = pieces(t).into_iter().flat_map(|piece| {
-                let values = &values[piece];
-                values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b)
-            });
-            pairs.fold((0.0, 0.0), |(sum, count), product| (sum + product, count + 1.0))
-        };
-        let mean = |lag: usize| {
-            let (sum, count) = at(lag);
-            sum / f64::max(count, 1.0)
-        };
-        let (power, count) = at(0);
-        let beyond = [reach, reach + reach.div_ceil(2), 2 * reach].map(|lag| (lag as f64, mean(lag)));
-        let all = power / f64::max(count, 1.0);
-        let signal = even_polynomial(0.0, &beyond).max(all - quiet(t, &values)).clamp(0.0, all);
-        let [a, b, c] = beyond;
-        let near = |lag: usize| even_polynomial(lag as f64, &[(0.0, signal), a, b, c]);
-        let longest = lag(LONGEST_S).min(values.len());
-        let covariances = (0..longest).map(|lag| if lag < reach { near(lag) } else { mean(lag) }).collect();
-        Self { power, covariance: at(lag(COHERENT)).0, signal, count, covariances }
+        let (power, count) = products(t, &values, 0);
+        let mean = power / f64::max(count, 1.0);
+        let signal = Autocovariance::new(t, &values, 2 * reach(step)).at(0).clamp(0.0, mean);
+        Self { power, covariance: products(t, &values, lag(COHERENT, step)).0, signal, count }
     }
 }
 
-/// Most noise that there can be, from where the motion is quiet: the mean square of the quietest third of all half seconds,
-/// and as much again and a half, since of half seconds of noise alone the quietest are quieter than the mean.
-fn quiet(t: &[f64], values: &[f64]) -> f64 {
-    const LENGTH: f64 = 0.5;
-    const TIMES: f64 = 2.5;
-    let mut squares = Vec::new();
-    for piece in pieces(t) {
-        let mut start = piece.start;
-        while let Some(end) = (start + 1..piece.end).find(|&i| t[i] - t[start] >= LENGTH) {
-            squares.push(mean_square(&values[start..end]));
-            start = end;
-        }
+/// Autocovariance of the signal in a rate, by lag in samples: as recorded where the noise of one sample does not reach the
+/// other, and the even polynomial through one, one and a half and two such reaches before. One of the second degree loses a
+/// sixth of a change of speed that takes half a second, this one of the fourth a sixteenth.
+pub(super) struct Autocovariance(Vec<f64>);
+
+impl Autocovariance {
+    /// Up to a lag.
+    pub fn new(t: &[f64], values: &[f64], longest: usize) -> Self {
+        let reach = reach(mean_step(t));
+        let mean = |lag: usize| {
+            let (sum, count) = products(t, values, lag);
+            sum / f64::max(count, 1.0)
+        };
+        let beyond = [reach, reach + reach.div_ceil(2), 2 * reach].map(|lag| (lag as f64, mean(lag)));
+        let at = |lag: usize| if lag < reach { even_polynomial(lag as f64, &beyond) } else { mean(lag) };
+        Self((0..=longest).map(at).collect())
     }
-    if squares.len() < 3 {
-        return f64::INFINITY;
+
+    /// So many samples apart.
+    pub fn at(&self, lag: usize) -> f64 {
+        self.0[lag]
     }
-    squares.sort_by(f64::total_cmp);
-    let third = &squares[..squares.len() / 3];
-    TIMES * third.iter().sum::<f64>() / third.len() as f64
+}
+
+/// Samples beyond which the noise of one does not reach the other.
+fn reach(step: f64) -> usize {
+    lag(REACH_S, step).max(REACH)
+}
+
+fn lag(seconds: f64, step: f64) -> usize {
+    (seconds / step.max(1e-6)).ceil() as usize
+}
+
+/// Sum and number of the products of values so many samples apart.
+fn products(t: &[f64], values: &[f64], lag: usize) -> (f64, f64) {
+    let pairs = pieces(t).into_iter().flat_map(|piece| {
+        let values = &values[piece];
+        values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b)
+    });
+    pairs.fold((0.0, 0.0), |(sum, count), product| (sum + product, count + 1.0))
 }
 
 /// The even polynomial of the lowest degree through some points (Lagrange, in the squares).
 fn even_polynomial(at: f64, points: &[(f64, f64)]) -> f64 {
     let term = |(i, (x, value)): (usize, &(f64, f64))| {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        value * others.map(|(_, (other, _))| (at * at - other * other) / (x * x - other * other)).product::<f64>()
+        value
+            * others
+                .map(|(_, (other, _))| (at * at - other * other) / (x * x - other * other))
+                .product::<f64>()
     };
     points.iter().enumerate().map(term).sum()
 }
@@ -117,118 +113,42 @@ fn turning(condition: &Condition) -> Vec3 {
     condition.angular_velocity.cross(&condition.ground_velocity)
 }
 
-/// Smooths rates that are noisy by local parabolas, which keep peaks; the window of each rate that was [s].
-pub(super) fn smooth_rates(t: &[f64], conditions: &mut [Condition]) -> [Option<f64>; 6] {
+/// Smooths rates that are noisy by local parabolas, which keep peaks.
+pub(super) fn smooth_rates(t: &[f64], conditions: &mut [Condition]) {
     let pieces = pieces(t);
-    std::array::from_fn(|rate| {
+    for rate in 0..6 {
         let mut values: Vec<f64> = conditions.iter().map(|c| rates(c)[rate]).collect();
         let share = white_variance(&values) / mean_square(&values).max(f64::MIN_POSITIVE);
-        let (_, length) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least)?;
-        pieces.iter().for_each(|piece| smooth(t, &mut values, piece.clone(), length));
-        conditions.iter_mut().zip(values).for_each(|(condition, value)| set(condition, rate, value));
-        Some(length)
-    })
-}
-
-/// How rates go into the regression: by parabolas over so many seconds, means of bins, and passes over these.
-pub(super) struct Filtered<'a> {
-    pub t: &'a [f64],
-    /// Window of each rate that was smoothed [s].
-    pub smoothed: [Option<f64>; 6],
-    pub bins: &'a [Range<usize>],
-    pub runs: &'a [Range<usize>],
-    /// Passes of `[1 2 1] / 4` over the bins.
-    pub passes: usize,
-}
-
-/// The same states with what is expected of the true rates: each scaled by `E[true x recorded] / E[recorded^2]` of what goes
-/// into the regression, which is the share of signal in it, and more where smoothing took peaks off. A law in proportion to
-/// such a rate comes out neither pulled down by the noise nor weighed by trials that hold noise alone (regression
-/// calibration; Carroll, Ruppert, Stefanski, Crainiceanu, Measurement Error in Nonlinear Models, chapter 4). What
-/// remembers has averaged the noise already and takes the rates as they are.
-pub(super) fn calibrated(
-    conditions: &[Condition],
-    coherence: &[Coherence],
-    filtered: &Filtered,
-) -> Vec<Condition> {
-    /// Most that smoothing can have taken off.
-    const MOST: f64 = 1.5;
-    let mut calibrated = conditions.to_vec();
-    for (rate, coherence) in coherence.iter().enumerate().take(6) {
-        let values: Vec<f64> = conditions.iter().map(|c| rates(c)[rate]).collect();
-        let recorded = filtered.mean_square(&values).max(f64::MIN_POSITIVE);
-        let factor = (filtered.common(coherence, filtered.smoothed[rate]) / recorded).clamp(0.0, MOST);
-        calibrated.iter_mut().zip(values).for_each(|(condition, value)| set(condition, rate, value * factor));
-    }
-    calibrated
-}
-
-impl Filtered<'_> {
-    /// Of values that were smoothed already, after all else.
-    fn mean_square(&self, values: &[f64]) -> f64 {
-        let mean = |bin: &Range<usize>| bin.clone().map(|i| values[i]).sum::<f64>() / bin.len() as f64;
-        let mut bins: Vec<f64> = self.bins.iter().map(mean).collect();
-        self.runs.iter().for_each(|run| passes(&mut bins[run.clone()], self.passes));
-        mean_square(&bins)
-    }
-
-    /// Mean product of what the signal and what the record become: of all that is done, smoothing is done to the record alone.
-    fn common(&self, coherence: &Coherence, smoothed: Option<f64>) -> f64 {
-        let samples = self.t.len() as f64 / self.bins.len().max(1) as f64;
-        let (samples, step) = (samples.round().max(1.0) as usize, mean_step(self.t));
-        let reach = samples * (2 * self.passes + 1);
-        let window = smoothed.map_or(1, |length| window(length, step));
-        let signal = |lag: usize| coherence.covariances.get(lag).copied().unwrap_or(0.0);
-        let both_ways = reach + window / 2;
-        let mut covariances: Vec<f64> =
-            (0..=2 * both_ways).map(|i| signal(i.abs_diff(both_ways))).collect();
-        if let Ok(filter) = SavitzkyGolay::new(window, 2)
-            && let Ok(smoothed) = filter.smooth(&covariances)
-        {
-            covariances = smoothed;
+        if let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) {
+            pieces.iter().for_each(|piece| smooth(t, &mut values, piece.clone(), length));
+            conditions.iter_mut().zip(values).for_each(|(condition, value)| set_rate(condition, rate, value));
         }
-        // of the means of two bins, so many bins apart
-        let of_bins = |apart: usize| -> f64 {
-            let pair = |(i, j): (usize, usize)| covariances[both_ways + apart * samples + i - j];
-            let pairs = (0..samples).flat_map(|i| (0..samples).map(move |j| (i, j)));
-            pairs.map(pair).sum::<f64>() / (samples * samples) as f64
-        };
-        // passes over both are twice the passes over one; a pass is a binomial distribution over bins
-        let mut weights = vec![0.0; 4 * self.passes + 1];
-        weights[2 * self.passes] = 1.0;
-        for _ in 0..2 * self.passes {
-            let before = weights.clone();
-            let at = |i: Option<usize>| i.and_then(|i| before.get(i)).copied().unwrap_or(0.0);
-            weights.iter_mut().enumerate().for_each(|(i, weight)| {
-                *weight = 0.25 * (at(i.checked_sub(1)) + 2.0 * before[i] + at(Some(i + 1)));
-            });
-        }
-        let weighed = weights.iter().enumerate();
-        weighed.map(|(i, weight)| weight * of_bins(i.abs_diff(2 * self.passes))).sum()
     }
 }
 
-fn mean_step(t: &[f64]) -> f64 {
+pub(super) fn mean_step(t: &[f64]) -> f64 {
     (t[t.len() - 1] - t[0]) / (t.len().max(2) - 1) as f64
 }
 
 /// Odd number of samples that take so many seconds.
-fn window(length: f64, step: f64) -> usize {
+pub(super) fn window(length: f64, step: f64) -> usize {
     (length / step.max(1e-6)) as usize | 1
 }
 
-fn set(condition: &mut Condition, rate: usize, value: f64) {
+/// Sets a rate of [`rates`].
+pub(super) fn set_rate(condition: &mut Condition, rate: usize, value: f64) {
     match rate {
         0..3 => condition.acceleration[rate] = value + turning(condition)[rate],
         _ => condition.angular_acceleration[rate - 3] = value,
     }
 }
 
-fn mean_square(values: &[f64]) -> f64 {
+pub(super) fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64
 }
 
-fn smooth(t: &[f64], values: &mut [f64], piece: std::ops::Range<usize>, length: f64) {
+/// Smooths a piece by local parabolas over so many seconds.
+pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: std::ops::Range<usize>, length: f64) {
     let odd = (piece.len() - 1) / 2 * 2 + 1;
     let window = window(length, mean_step(&t[piece.clone()])).min(odd);
     let smoothed = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::judge::{Judge, Judged, Member, Refusal};
+use super::judge::{Judge, Judged, Member, Refusal, lives_on_a_rate};
 use super::robust::noise_of;
 use crate::effects::Effect;
 
@@ -19,11 +19,12 @@ impl Judge<'_> {
             let explained = (without - fitted.loss).max(0.0);
             for &effect in library.iter().filter(|effect| !self.taken(set, **effect)) {
                 let rivals = self.passing(&others, effect).into_iter().filter_map(|judged| {
-                    if !self.is_rival(&judged.member, &out, &others) {
+                    let member = self.without_ballast(judged.member, &others);
+                    if !self.is_rival(&member, &out, &others) {
                         return None;
                     }
                     let mut rival = others.clone();
-                    rival.push(judged.member);
+                    rival.push(member);
                     let (difference, open) = self.difference(&rival, set, explained)?;
                     (difference <= open && !self.is_refuted(&rival, set)).then_some((difference, rival))
                 });
@@ -61,6 +62,26 @@ impl Judge<'_> {
         };
         let plain = if effect == Effect::SensorGain { plain() } else { None };
         best.into_iter().chain(plain).collect()
+    }
+
+    /// A law of inertia without the columns that add next to nothing: rates of axes that hardly move hold noise, some of which
+    /// always agrees with the gap, and would count as a number against it.
+    fn without_ballast(&self, mut member: Member, others: &[Member]) -> Member {
+        const LITTLE: f64 = 0.02;
+        if !lives_on_a_rate(self.effect(&member)) {
+            return member;
+        }
+        let mut columns = self.columns(others);
+        let first = columns.len();
+        columns.extend(member.columns.iter().map(|(column, _)| *column));
+        let Some((beta, _)) = self.design.solve(&columns) else { return member };
+        let energies: Vec<f64> = (first..columns.len())
+            .map(|i| beta[i].powi(2) * self.design.x.column(columns[i]).norm_squared())
+            .collect();
+        let least = LITTLE * energies.iter().sum::<f64>();
+        let mut energies = energies.iter();
+        member.columns.retain(|_| energies.next().is_none_or(|energy| *energy >= least));
+        member
     }
 
     /// True where an effect may stand in another's place: with one number more at most, and none that nobody has ever measured.

@@ -1,6 +1,7 @@
 //! The workflow from trials to report.
 
 use super::base_drag::BaseDrag;
+use super::calibrate::calibrate;
 use super::candidates::{Setting, is_computed, is_inferred, shapes, unavailable};
 use super::compose::compose;
 use super::design::Design;
@@ -72,8 +73,10 @@ pub fn run(
         .iter()
         .flat_map(|&effect| shapes(effect, &all, &setting).into_iter().map(move |shape| (effect, shape)))
         .collect();
+    // how much is noise is asked of trials that move
+    calibrate(&mut all, 0);
     let passes = smoothing(&all, &naming);
-    all.iter_mut().for_each(|series| series.calibrate(passes));
+    calibrate(&mut all, passes);
     let noise = row_noise(&all, &naming, &setting.components, &floors, passes);
     let mut design = Design::new(&all, naming, &setting, &forms, noise, config);
     if design.rows.blocks < 2 * config.folds {

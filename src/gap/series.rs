@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::measurement::{measured, sum_on};
-use super::rates::{Coherence, Filtered, calibrated, rates, smooth_rates, wetting_rate};
+use super::measurement::{is_inferred_here, measured, sum_on};
+use super::rates::{Coherence, rates, smooth_rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
@@ -39,12 +39,12 @@ pub(super) struct Series {
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one.
     pub other: Vec<[f64; 6]>,
-    /// Acceleration as the trial has it, before any smoothing [m/s2].
-    pub recorded_acceleration: Vec<Vec3>,
+    /// Rates of the velocities before any smoothing.
+    pub recorded_rates: Vec<[f64; 6]>,
+    /// Acceleration before any smoothing [m/s2], where the wrench was inferred with it.
+    pub inferred_with: Option<Vec<Vec3>>,
     /// Rates of velocity and angular velocity, wetting rate and angular velocities: how far each hangs together.
     pub coherence: [Coherence; 10],
-    /// Window over which each rate was smoothed [s].
-    smoothed: [Option<f64>; 6],
     /// Samples of each bin.
     pub bins: Vec<Range<usize>>,
     /// Bins of each run without a hole.
@@ -68,13 +68,6 @@ impl Series {
             channel_width: self.channel_width,
             wheel_speeds: self.wheels[sample],
         }
-    }
-
-    /// Calibrates the rates for a regression that smooths its rows by so many passes.
-    pub fn calibrate(&mut self, passes: usize) {
-        let Self { t, smoothed, bins, runs, .. } = &*self;
-        let filtered = Filtered { t, smoothed: *smoothed, bins, runs, passes };
-        self.calibrated = calibrated(&self.conditions, &self.coherence, &filtered);
     }
 
     /// Mean of a value over each bin.
@@ -156,13 +149,14 @@ fn of_trial(
         conditions.push(condition);
     }
     // before anything is smoothed, or noise would hang together as well
-    let mut coherence: [Coherence; 10] = Default::default();
+    let mut coherence = [Coherence::default(); 10];
     for axis in 0..3 {
         coherence[axis] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis]);
         coherence[axis + 3] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis + 3]);
         coherence[axis + 7] = Coherence::of(&trial.t, |i| conditions[i].angular_velocity[axis]);
     }
-    let smoothed = smooth_rates(&trial.t, &mut conditions);
+    let recorded_rates = conditions.iter().map(rates).collect();
+    smooth_rates(&trial.t, &mut conditions);
     let wetting_rate = wetting_rate(&trial.t, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
     let of_columns = |columns: &BTreeMap<String, Vec<f64>>| -> Vec<[f64; 6]> {
@@ -185,7 +179,7 @@ fn of_trial(
         other: of_columns(&trial.other_forces),
         channel_width: trials.manifest.channel_width_of(&trial.name),
         wetting_rate,
-        recorded_acceleration: trial.acceleration.clone(),
+        inferred_with: is_inferred_here(trials, trial).then(|| trial.acceleration.clone()),
         coherence,
         wheels: (0..count)
             .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
@@ -194,7 +188,7 @@ fn of_trial(
         roll_pitch: trial.roll.iter().zip(&trial.pitch).map(|(r, p)| [*r, *p]).collect(),
         t: trial.t.clone(),
         calibrated: conditions.clone(),
-        smoothed,
+        recorded_rates,
         conditions,
         immersions,
         known,

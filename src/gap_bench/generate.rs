@@ -396,8 +396,7 @@ pub fn predicted(trial: &Trial, sample: usize, simulator: &Simulator) -> Wrench6
         component_of(name).into_iter().for_each(|component| known[component] += values[sample]);
     }
     if trial.simulated[0].is_some() {
-        let simulated =
-            |c: usize| trial.simulated[c].as_ref().map_or(0.0, |values| values[sample]);
+        let simulated = |c: usize| trial.simulated[c].as_ref().map_or(0.0, |values| values[sample]);
         return known + Wrench6::from_fn(|c, _| simulated(c));
     }
     let state = State {

@@ -184,7 +184,13 @@ mod tests {
     fn track(count: usize) -> Track {
         let step = 1.0 / 111.0;
         let state = |i| State { t: i as f64 * step, depth: 0.2, ..State::default() };
-        Track { name: "generated".into(), session_time: 0.0, channel_width: CHANNEL, step, states: (0..count).map(state).collect() }
+        Track {
+            name: "generated".into(),
+            session_time: 0.0,
+            channel_width: CHANNEL,
+            step,
+            states: (0..count).map(state).collect(),
+        }
     }
 
     fn moments(values: &[f64]) -> (f64, f64) {

@@ -263,7 +263,11 @@ fn motion(maneuver: Maneuver, index: usize, duration: f64, random: &mut Random) 
             let start = |axis: usize| (0.5 + 2.1 * axis as f64) * part;
             let hung = [0, 1, 2].map(|axis| {
                 let weight = if axis == 2 { -1.0 } else { side } * (1 + index) as f64 * WEIGHT;
-                Profile::default().step(start(axis), 0.3 * part, weight).step(start(axis) + 1.5 * part, 0.3 * part, -weight)
+                Profile::default().step(start(axis), 0.3 * part, weight).step(
+                    start(axis) + 1.5 * part,
+                    0.3 * part,
+                    -weight,
+                )
             });
             Motion { hung, depth: DRY, ..Motion::default() }
         }

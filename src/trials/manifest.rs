@@ -136,7 +136,8 @@ impl Manifest {
         self.sensor_noise.keys().try_for_each(|name| component("sensor_noise", name))?;
         self.trial_offset.keys().try_for_each(|name| component("trial_offset", name))?;
         let Measured { other_forces, known_loads, method, .. } = &self.measured;
-        for (key, columns) in [("measured.other_forces", other_forces), ("measured.known_loads", known_loads)] {
+        for (key, columns) in [("measured.other_forces", other_forces), ("measured.known_loads", known_loads)]
+        {
             if let Some(name) = columns.iter().find(|name| component_of(name).is_none()) {
                 return Err(Fault::NoComponentInName { key, name: name.clone() });
             }
@@ -172,7 +173,9 @@ impl Manifest {
                 return Err(Fault::Number { key, value, expected: "positive" });
             }
         }
-        if let Some((name, &value)) = self.channel_widths.iter().find(|(_, width)| !(**width > 0.0)) {
+        if let Some((name, &value)) =
+            self.channel_widths.iter().find(|(_, width)| width.is_nan() || **width <= 0.0)
+        {
             let key = format!("channel_widths.{name}");
             return Err(Fault::Number { key, value, expected: "positive, or inf for open water" });
         }

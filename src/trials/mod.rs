@@ -190,7 +190,9 @@ pub enum Fault {
         name: String,
     },
     /// A column of known forces whose name does not say on what it acts.
-    #[error("{key} names \"{name}\", which ends in none of _fx, _fy, _fz, _mx, _my, _mz: name it after the component it acts on")]
+    #[error(
+        "{key} names \"{name}\", which ends in none of _fx, _fy, _fz, _mx, _my, _mz: name it after the component it acts on"
+    )]
     NoComponentInName {
         /// The key of the manifest.
         key: &'static str,
@@ -198,7 +200,9 @@ pub enum Fault {
         name: String,
     },
     /// Known loads of a cell where there is none.
-    #[error("measured.known_loads is what a load cell bears; with inverse_dynamics name the columns in other_forces")]
+    #[error(
+        "measured.known_loads is what a load cell bears; with inverse_dynamics name the columns in other_forces"
+    )]
     KnownLoadsInferred,
     /// A column that is promised and that no trial has.
     #[error("{key} names \"{name}\", which is a column of no trial")]

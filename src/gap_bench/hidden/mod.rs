@@ -292,7 +292,13 @@ mod tests_support {
         let hull = Hull::generated_box();
         let simulator = Simulator { hull: &hull, prediction: Prediction::Analytic, vehicle: "generated-box" };
         let setting = Setting { simulator, session: 100.0 };
-        let track = Track { name: "generated".into(), session_time: 0.0, channel_width: crate::gap_bench::track::CHANNEL, step: 0.01, states };
+        let track = Track {
+            name: "generated".into(),
+            session_time: 0.0,
+            channel_width: crate::gap_bench::track::CHANNEL,
+            step: 0.01,
+            states,
+        };
         hidden.change(&setting, &track, wrench)
     }
 }
