@@ -166,8 +166,9 @@ impl Judge<'_> {
     /// True where single trials rule a rival out, however little of all that is explained lies in them: what it misses there
     /// is more than noise and more than an error of the formulas there, such as the gain that a hung weight should have shown.
     fn is_refuted(&self, rival: &[Member], set: &[Member]) -> bool {
-        /// Share of what is explained of a trial, and of what is left of it, that formulas and errors of the motion leave open.
-        const OPEN: f64 = 0.1;
+        /// Share of what is explained of a trial that formulas leave open, and of what is left of it that errors of the motion do,
+        /// which stand in the gap and in the prediction.
+        const OPEN: [f64; 2] = [0.1, 0.05];
         const DEVIATIONS: f64 = 3.0;
         let (Some(a), Some(b)) = (self.predictions(rival), self.predictions(set)) else { return false };
         let design = self.design;
@@ -181,7 +182,7 @@ impl Judge<'_> {
             let [without, with, ours, theirs] =
                 rows.clone().map(of).fold([0.0; 4], |sum, row| std::array::from_fn(|i| sum[i] + row[i]));
             let difference = without - with;
-            let open = OPEN * (f64::max(ours, theirs) + with);
+            let open = OPEN[0] * f64::max(ours, theirs) + OPEN[1] * with;
             if difference.abs() > open {
                 missed += difference - difference.clamp(-open, open);
             } else {
