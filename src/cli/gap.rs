@@ -37,7 +37,25 @@ use super::{Vehicles, emit, usage_error};
 OUT holds report.json and index.html, with --apply effects.toml too: the physical effects with their standard errors and the
 ranges in which they were seen. Faults of sensors and drive are never in it. --apply writes it into the bundle as the next
 version, in the place of effects from before, and keeps the version before it; only a verdict of `named` is applied. The gap of
-another simulator (sim_ columns) is not the bundle's, so effects.toml is all that is written of it.")]
+another simulator (sim_ columns) is not the bundle's, so effects.toml is all that is written of it.
+
+Trials: a folder of CSV files, one a trial, in SI units and body axes (forward, left, up), and trials.toml.
+  t vx vy vz wx wy wz depth                needed: time, velocity over ground, angular velocity, water over the ground
+  roll pitch yaw  ax ay az  alx aly alz    attitude, accelerations without gravity (else differentiated)
+  cx cy cz  rho  wheel_fl fr rl rr         known current, density, wheel speeds
+  fx fy fz mx my mz                        measured wrench about the center of mass, any of it
+  sim_fx .. sim_mz                         another simulator's, in the place of the bundle's
+
+  vehicle = \"warthog\"                    the only key that is needed
+  fluid_density = 1000.0                   mass = 280.0, where the wrench is inferred
+  channel_width = 6.0                      [channel_widths] run07 = inf   by trial; inf is open water
+  [measured]
+  method = \"load_cell\"                   inverse_dynamics, cfd
+  columns = [\"fx\"]                       repeats = [[\"run01\", \"run07\"]]   dry_twins = { run03 = \"dry03\" }
+  other_forces = [\"drive_fx\"]            columns of known forces, for inverse_dynamics
+  known_loads = [\"hung_fz\"]              columns of loads that the cell bears besides the water's, such as known weights
+  [sensor_noise]  [trial_offset]           standard deviation of a sample and of the zero from run to run: fx = 4.0
+  [body]                                   with sim_ columns: length, width, draft, mass, displaced_volume, center_of_mass")]
 pub struct Gap {
     #[command(subcommand)]
     step: Option<Step>,
