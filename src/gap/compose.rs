@@ -41,18 +41,29 @@ fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
 pub(super) fn compose(
     trials: &Trials,
     judge: &Judge,
-    found: Found,
+    mut found: Found,
     held: Vec<usize>,
     library: &[Effect],
 ) -> Report {
     let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
     let fitted = fit(design, &found.members, all, setting, config);
     // nothing that does not fit is applied or shown as if it did
-    let holds = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
-    let named = match &fitted {
-        Some(fitted) if holds => named(design, &found.members, fitted),
+    let fits = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
+    let mut named = match &fitted {
+        Some(fitted) if fits => named(design, &found.members, fitted),
         _ => Vec::new(),
     };
+    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
+    let closures_of = |named: &[Named]| closures(named, all, &held, setting, &held_floors, config);
+    let mut held_out = closures_of(&named);
+    let disproof = held_out.get("all").and_then(|all| all.disproof(config.coverage));
+    let disproof = disproof.filter(|_| found.verdict == Verdict::Named);
+    if disproof.is_some() {
+        found.verdict = Verdict::NoCandidateFits;
+        named.clear();
+        held_out = closures_of(&named);
+    }
+    let holds = fits && disproof.is_none();
     let effects = match &fitted {
         Some(fitted) if holds => named_effects(judge, &found, &named, fitted),
         _ => Vec::new(),
@@ -74,10 +85,9 @@ pub(super) fn compose(
         let effects = |set: &Vec<Member>| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
         separating(&sets.map(effects).collect::<Vec<_>>())
     });
-    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
-    let unexplained = unexplained(judge, &found);
+    let unexplained = unexplained(judge, &found, disproof);
     let gap = GapReport {
-        held_out: closures(&named, all, &held, setting, &held_floors, config),
+        held_out,
         size: detect::sizes(all, judge.floors, &setting.components, config),
         shares: shares(judge, &found),
         floors: setting.components.iter().map(|&c| (WRENCH[c], judge.floors[c])).collect(),
@@ -232,7 +242,7 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
     ])
 }
 
-fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
+fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<String> {
     let left = &found.left;
     let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
     let share = left.gain / whole;
@@ -257,6 +267,14 @@ fn unexplained(judge: &Judge, found: &Found) -> Option<String> {
             locate::in_words(&gated.limits),
             gated.effect.name().replace('_', " "),
             100.0 * gated.share.min(1.0)
+        );
+    }
+    if let Some(share) = disproof {
+        text += &format!(
+            "; {} hold on the trials in which they were found, and explain {:.0} % of the squared gap of those kept back, where {:.0} % are asked for",
+            names(judge, &found.members).join(" and ").replace('_', " "),
+            100.0 * share,
+            100.0 * judge.config.coverage
         );
     }
     Some(text)

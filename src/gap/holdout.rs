@@ -32,6 +32,18 @@ pub struct Closure {
     pub interval: Option<[f64; 2]>,
 }
 
+impl Closure {
+    /// Share of the squared gap above the floor that is explained, where that is less than `least` and what is left is loud:
+    /// what was named does not hold on trials that nobody looked at.
+    pub(super) fn disproof(&self, least: f64) -> Option<f64> {
+        /// Over the floor.
+        const LOUD: f64 = 2.0;
+        let [before, after, floor] = [self.before, self.after, self.noise_floor].map(|size| size * size);
+        let share = (before - after) / (before - floor).max(f64::MIN_POSITIVE);
+        (self.after > LOUD * self.noise_floor && share < least).then_some(share)
+    }
+}
+
 /// A region that the named effects make worse.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Worse {
@@ -192,4 +204,20 @@ pub(super) fn worse(
         }
     }
     worse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_disproved_where_little_is_explained_and_what_is_left_is_loud() {
+        let of = |before: f64, after: f64| {
+            Closure { before, after, noise_floor: 1.0, closure: None, interval: None }.disproof(0.6)
+        };
+        // (85^2 - 57^2) / (85^2 - 1)
+        assert!(of(85.0, 57.0).is_some_and(|share| (share - 0.5504).abs() < 1e-4));
+        assert_eq!(of(85.0, 40.0), None, "most of it is explained");
+        assert_eq!(of(2.1, 1.9), None, "what is left is hardly larger than the noise");
+    }
 }
