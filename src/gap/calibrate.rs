@@ -9,8 +9,6 @@
 //! Of several forms, the record, the record smoothed over a quarter and half a second, and the bursts of the record, the one
 //! that keeps most of the signal is taken: of calibrated predictors it is the closest to the truth.
 
-use std::ops::Range;
-
 use super::design::smooth as passes;
 use super::rates::{Autocovariance, mean_square, mean_step, set_rate, smooth, window};
 use super::series::Series;
@@ -211,16 +209,4 @@ fn lasting(series: &Series, recorded: &[f64], length: Option<f64>, times: usize)
     weights[middle] = 1.0;
     passes(&mut weights, 2 * times);
     weights.iter().enumerate().map(|(i, weight)| weight * of_bins(i.abs_diff(middle).min(2 * times))).sum()
-}
-
-/// Sample ranges of the stretches of a trial without a hole.
-impl Series {
-    fn pieces(&self) -> impl Iterator<Item = Range<usize>> {
-        self.runs.iter().map(|run| self.bins[run.start].start..self.bins[run.end - 1].end)
-    }
-
-    /// Mean length of a bin [s].
-    fn bin_step(&self) -> f64 {
-        mean_step(&self.t) * self.t.len() as f64 / self.bins.len().max(1) as f64
-    }
 }

@@ -42,7 +42,7 @@ impl Coherence {
         let step = mean_step(t);
         let (power, count) = products(t, &values, 0);
         let mean = power / f64::max(count, 1.0);
-        let signal = Autocovariance::new(t, &values, 2 * reach(step)).at(0).clamp(0.0, mean);
+        let signal = Autocovariance::new(t, &values, 0).at(0).clamp(0.0, mean);
         Self { power, covariance: products(t, &values, lag(COHERENT, step)).0, signal, count }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::measurement::{is_inferred_here, measured, sum_on};
-use super::rates::{Coherence, rates, smooth_rates, wetting_rate};
+use super::rates::{Coherence, mean_step, rates, smooth_rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
@@ -68,6 +68,16 @@ impl Series {
             channel_width: self.channel_width,
             wheel_speeds: self.wheels[sample],
         }
+    }
+
+    /// Samples of each stretch without a hole.
+    pub fn pieces(&self) -> impl Iterator<Item = Range<usize>> {
+        self.runs.iter().map(|run| self.bins[run.start].start..self.bins[run.end - 1].end)
+    }
+
+    /// Mean length of a bin [s].
+    pub fn bin_step(&self) -> f64 {
+        mean_step(&self.t) * self.t.len() as f64 / self.bins.len().max(1) as f64
     }
 
     /// Mean of a value over each bin.
