@@ -56,8 +56,10 @@ pub(super) fn compose(
     let held_floors = floors_of(all, &held, judge.floors, &setting.components);
     let closures_of = |named: &[Named]| closures(named, all, &held, setting, &held_floors, config);
     let mut held_out = closures_of(&named);
-    let disproof = held_out.get("all").and_then(|all| all.disproof(config.coverage));
-    let disproof = disproof.filter(|_| found.verdict == Verdict::Named);
+    let is_fault = found.members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
+    let disproof = held_out.get("all").and_then(|all| all.disproof(config.coverage, is_fault));
+    // of several explanations one may hold, and the trials that tell them apart are asked for; a fault is exact or is none
+    let disproof = disproof.filter(|_| found.verdict == Verdict::Named || fits && is_fault);
     if disproof.is_some() {
         found.verdict = Verdict::NoCandidateFits;
         named.clear();
@@ -271,10 +273,9 @@ fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<St
     }
     if let Some(share) = disproof {
         text += &format!(
-            "; {} hold on the trials in which they were found, and explain {:.0} % of the squared gap of those kept back, where {:.0} % are asked for",
+            "; {} hold on the trials in which they were found, and explain {:.0} % of the squared gap of those kept back",
             names(judge, &found.members).join(" and ").replace('_', " "),
-            100.0 * share,
-            100.0 * judge.config.coverage
+            100.0 * share
         );
     }
     Some(text)

@@ -33,14 +33,18 @@ pub struct Closure {
 }
 
 impl Closure {
-    /// Share of the squared gap above the floor that is explained, where that is less than `least` and what is left is loud:
-    /// what was named does not hold on trials that nobody looked at.
-    pub(super) fn disproof(&self, least: f64) -> Option<f64> {
-        /// Over the floor.
+    /// Share of the squared gap above noise and the model's own error that is explained of all components, where what was named
+    /// does not hold on trials that nobody looked at: less than `least` is explained and what is left is loud; or it names a
+    /// fault of a sensor, which is exact, and closes too little even at the upper end of the interval.
+    pub(super) fn disproof(&self, least: f64, is_fault: bool) -> Option<f64> {
+        /// In noise and the model's own error, as all components together are.
         const LOUD: f64 = 2.0;
-        let [before, after, floor] = [self.before, self.after, self.noise_floor].map(|size| size * size);
-        let share = (before - after) / (before - floor).max(f64::MIN_POSITIVE);
-        (self.after > LOUD * self.noise_floor && share < least).then_some(share)
+        /// Closure that a fault must reach.
+        const EXACT: f64 = 0.7;
+        let [before, after] = [self.before, self.after].map(|size| size * size);
+        let share = (before - after) / (before - 1.0).max(f64::MIN_POSITIVE);
+        let inexact = is_fault && self.interval.is_some_and(|[_, high]| high < EXACT);
+        (inexact || self.after > LOUD && share < least).then_some(share)
     }
 }
 
@@ -213,11 +217,17 @@ mod tests {
     #[test]
     fn a_name_is_disproved_where_little_is_explained_and_what_is_left_is_loud() {
         let of = |before: f64, after: f64| {
-            Closure { before, after, noise_floor: 1.0, closure: None, interval: None }.disproof(0.6)
+            Closure { before, after, noise_floor: 1.0, closure: None, interval: None }.disproof(0.6, false)
         };
         // (85^2 - 57^2) / (85^2 - 1)
         assert!(of(85.0, 57.0).is_some_and(|share| (share - 0.5504).abs() < 1e-4));
         assert_eq!(of(85.0, 40.0), None, "most of it is explained");
         assert_eq!(of(2.1, 1.9), None, "what is left is hardly larger than the noise");
+        let fault = |high: f64| {
+            let interval = Some([0.4, high]);
+            Closure { before: 1.2, after: 1.1, noise_floor: 1.0, closure: Some(0.5), interval }
+                .disproof(0.6, true)
+        };
+        assert!(fault(0.64).is_some() && fault(0.82).is_none(), "a zero that is off explains all of it");
     }
 }

@@ -29,7 +29,7 @@ const LOUD: [f64; 2] = [3.5, 1.2];
 
 /// Least share of the structure that must be explained where a fault of the sensor is named. Laws of the water hold in
 /// outline; a zero, a gain or a turned axis is exact, and where one leaves more it stands in for another thing.
-const EXACT: f64 = 0.8;
+const EXACT: f64 = 0.9;
 
 /// Share of the gap above the floor that an effect may leave to a region of its own and still be named for everywhere.
 const LIMITED: f64 = 0.1;
