@@ -8,12 +8,14 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use nalgebra::DVector;
 
 use super::design::{Design, Fitted};
 use super::general::General;
 use super::noise::Floor;
+use super::rates::mean_square;
 use super::robust::{Error, contribution, errors, group, of_column, shadow};
 use super::series::Series;
 use super::shared::{exceeds_noise, outlasts_noise};
@@ -522,24 +524,27 @@ pub(super) fn lives_on_a_rate(effect: Effect) -> bool {
 }
 
 /// Standard deviation of a coefficient between trials beyond what noise explains, by moments (DerSimonian and Laird,
-/// Controlled Clinical Trials 1986); 0 where its excess is as likely chance.
+/// Controlled Clinical Trials 1986); 0 where its excess is as likely chance. A trial that is explained badly as a whole says
+/// little of one coefficient: its noise is its own residual where that is larger than all trials' together.
 fn scatter(design: &Design, columns: &[usize], beta: &DVector<f64>, index: usize) -> f64 {
     let residual = design.residual(columns, beta);
     let x = design.x.column(columns[index]);
-    let noise = residual.norm_squared() / residual.len().max(1) as f64;
-    let trials: Vec<(f64, f64)> = design
-        .rows
-        .of_trial
-        .iter()
-        .map(|rows| rows.clone().fold((0.0, 0.0), |(xx, xr), r| (xx + x[r] * x[r], xr + x[r] * residual[r])))
-        .filter(|(xx, _)| *xx > 0.0)
-        .collect();
-    let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), (xx, _)| (s + xx, q + xx * xx));
+    let noise = mean_square(residual.as_slice()).max(f64::MIN_POSITIVE);
+    // inverse of the variance of the trial's own deviation, and that over its standard deviation
+    let of_trial = |rows: &Range<usize>| {
+        let residual = &residual.as_slice()[rows.clone()];
+        let variance = noise.max(mean_square(residual));
+        let of = |(xx, xr): (f64, f64), (x, r): (&f64, &f64)| (xx + x * x, xr + x * r);
+        let (xx, xr) = x.as_slice()[rows.clone()].iter().zip(residual).fold((0.0, 0.0), of);
+        (xx > 0.0).then(|| (xx / variance, xr / (xx * variance).sqrt()))
+    };
+    let trials: Vec<(f64, f64)> = design.rows.of_trial.iter().filter_map(of_trial).collect();
+    let (sum, squares) =
+        trials.iter().fold((0.0, 0.0), |(s, q), (weight, _)| (s + weight, q + weight * weight));
     let freedom = trials.len().max(2) as f64 - 1.0;
-    let excess =
-        trials.iter().map(|(xx, xr)| xr * xr / xx).sum::<f64>() / noise.max(f64::MIN_POSITIVE) - freedom;
+    let excess = trials.iter().map(|(_, deviate)| deviate * deviate).sum::<f64>() - freedom;
     if excess < 5.0 * (2.0 * freedom).sqrt() {
         return 0.0;
     }
-    (excess * noise / (sum - squares / sum).max(f64::MIN_POSITIVE)).sqrt()
+    (excess / (sum - squares / sum).max(f64::MIN_POSITIVE)).sqrt()
 }

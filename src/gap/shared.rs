@@ -5,6 +5,8 @@
 //! Fuller, Measurement Error Models, section 1.1). What an effect explains hangs together in time for longer than such
 //! noise, or is more than the product of the two noises can be (Cauchy and Schwarz).
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 
 use super::design::Design;
@@ -37,24 +39,23 @@ pub(super) fn exceeds_noise(
     residual: &DVector<f64>,
     source: &DVector<f64>,
 ) -> bool {
-    let bound = |component: usize| {
-        let energy = |rows: &DVector<f64>| -> f64 {
-            let of_trial = |trial: &std::ops::Range<usize>| {
-                let values = strided(&rows.as_slice()[trial.clone()], component, design.rows.width);
-                white_variance(&values) * values.len() as f64
-            };
-            design.rows.of_trial.iter().map(of_trial).sum()
-        };
-        (energy(sum) * energy(source)).sqrt()
+    let noise = |rows: &DVector<f64>, trial: &Range<usize>, component: usize| {
+        let values = strided(&rows.as_slice()[trial.clone()], component, design.rows.width);
+        white_variance(&values) * values.len() as f64
     };
-    let most: f64 = (0..design.rows.width).map(bound).sum();
+    // of each trial by itself: what is noisy in one has nothing in common with another
+    let bound = |trial: &Range<usize>| -> f64 {
+        let of = |component| (noise(sum, trial, component) * noise(source, trial, component)).sqrt();
+        (0..design.rows.width).map(of).sum()
+    };
+    let most: f64 = design.rows.of_trial.iter().map(bound).sum();
     (1.0 - LASTS) * common(design, sum, residual, 0) > most
 }
 
 /// Sum of the products of two rows of a component that are so many bins apart, either way.
 fn common(design: &Design, a: &DVector<f64>, b: &DVector<f64>, lag: usize) -> f64 {
     let rows = &design.rows;
-    let of = |trial: &std::ops::Range<usize>| -> f64 {
+    let of = |trial: &Range<usize>| -> f64 {
         let apart = (lag * rows.width).min(trial.len());
         let pairs = (trial.start..trial.end - apart).map(|row| (row, row + apart));
         pairs.map(|(first, second)| 0.5 * (a[first] * b[second] + a[second] * b[first])).sum()
