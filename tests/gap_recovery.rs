@@ -39,8 +39,12 @@ fn with(names: &[&str], strength: f64, seed: u64) -> (Trials, Vec<f64>) {
 }
 
 fn run(trials: &Trials) -> Report {
+    run_with(trials, &Config::default())
+}
+
+fn run_with(trials: &Trials, config: &Config) -> Report {
     let body = gap::body_of(trials).expect("a body");
-    gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs")
+    gap::run(trials, &body, &mut |_| Predicted::default(), config).expect("runs")
 }
 
 fn names(report: &Report) -> Vec<&'static str> {
@@ -161,6 +165,57 @@ fn a_wrong_mass_is_found_by_pushes_of_half_a_second() {
     assert_eq!(names(&report), ["mass_error"], "{} {:?}", report.summary, report.rejected);
     let found = report.effects[0].parameters["relative_error"].value;
     assert!((found / (-0.1 / 1.1) - 1.0).abs() < 0.05, "{found}");
+}
+
+/// Trials whose wrench along x is inferred, each less its dry twin: the same pushes without water, at other speeds. The true
+/// mass over the stated one, the true drive force over the stated one, and a coefficient of rolling.
+fn with_dry_twins(mass: f64, drive: f64, rolling: f64) -> Trials {
+    const G: f64 = 9.81;
+    let motion = |seed: u64, wet: bool| {
+        let mut motions = pushes(TRIALS, SAMPLES, seed);
+        motions.iter_mut().flatten().for_each(|s| s.depth = if wet { s.depth } else { -0.1 });
+        motions
+    };
+    let told = |motions: &[Vec<State>], wet: bool, seed: u64| {
+        let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
+        let noise = Noise { acceleration: 0.02, ..Noise::white(NOISE) };
+        let mut told = trials(motions, &nothing, &noise, seed);
+        for (trial, motion) in told.trials.iter_mut().zip(motions) {
+            let pull = |s: &State| {
+                let [fx, _, fz, ..] = if wet { planted::simulate(s) } else { [0.0; 6] };
+                let load = (planted::MASS * G - fz).max(0.0);
+                planted::MASS * s.a.x - fx + rolling * load * s.v.x / s.v.x.hypot(0.05)
+            };
+            trial.other_forces.insert("drive_fx".into(), motion.iter().map(|s| pull(s) / drive).collect());
+            trial.measured = Default::default();
+        }
+        told
+    };
+    let mut all = told(&motion(31, true), true, 31);
+    let mut dry = told(&motion(32, false), false, 32).trials;
+    dry.iter_mut().for_each(|trial| trial.name = trial.name.replace("run", "dry"));
+    let twin = |trial: &wade::trials::Trial| (trial.name.clone(), trial.name.replace("run", "dry"));
+    all.manifest.measured.dry_twins = all.trials.iter().map(twin).collect();
+    all.manifest.measured.method = Some(Method::InverseDynamics);
+    all.manifest.mass = Some(planted::MASS / mass);
+    all.trials.extend(dry);
+    all
+}
+
+#[test]
+fn errors_of_mass_and_drive_and_rolling_are_found_in_wrenches_less_those_of_dry_twins() {
+    for (name, parameter, truth, trials) in [
+        ("mass_error", "relative_error", -0.1, with_dry_twins(0.9, 1.0, 0.0)),
+        ("drive_gain", "relative_error", 0.1, with_dry_twins(1.0, 1.1, 0.0)),
+        ("rolling_resistance", "coefficient", 0.05, with_dry_twins(1.0, 1.0, 0.05)),
+    ] {
+        // a drive is inertia and drag: a gain of it is an error of both
+        let library = vec![Effect::MassError, Effect::DriveGain, Effect::RollingResistance];
+        let report = run_with(&trials, &Config { library, ..Config::default() });
+        assert_eq!(names(&report), [name], "{} {:?}", report.summary, report.rejected);
+        let found = report.effects[0].parameters[parameter].value;
+        assert!((found / truth - 1.0).abs() < 0.06, "{name}: {found}, planted {truth}");
+    }
 }
 
 #[test]
@@ -385,8 +440,7 @@ fn the_order_of_the_trials_and_the_side_of_the_vehicle_do_not_matter() {
     shuffled.trials.reverse();
     assert_eq!(run(&shuffled), report);
     let backwards = Config { library: Effect::ALL.into_iter().rev().collect(), ..Config::default() };
-    let body = gap::body_of(&trials).expect("a body");
-    let turned = gap::run(&trials, &body, &mut |_| Predicted::default(), &backwards).expect("runs");
+    let turned = run_with(&trials, &backwards);
     assert_eq!((turned.verdict, turned.effects), (report.verdict, report.effects.clone()));
     let mirrored = run(&mirrored(trials));
     assert_eq!((mirrored.verdict, names(&mirrored)), (report.verdict, names(&report)));
@@ -432,6 +486,14 @@ fn bad_input_is_named() {
     let mut other = good.clone();
     other.manifest.vehicle = "boat".into();
     assert!(matches!(run(&other), GapError::Vehicle { .. }));
+    let mut short = with_dry_twins(1.0, 1.0, 0.0);
+    let twin = short.trials.iter_mut().find(|trial| trial.name == "dry03").expect("a twin");
+    twin.t.truncate(700);
+    let error = run(&short);
+    assert!(
+        matches!(&error, GapError::ShortTwin { trial, twin, .. } if trial == "run03" && twin == "dry03"),
+        "{error}"
+    );
     let mut bodiless = good;
     bodiless.manifest.body = None;
     assert!(matches!(gap::body_of(&bodiless), Err(GapError::NoBody { .. })));

@@ -1,6 +1,7 @@
 //! Every effect of the library as columns: the wrench of each coefficient at 1, sample by sample.
 
 use super::base_drag::BaseDrag;
+use super::measurement::rolling_direction;
 use super::series::Series;
 use crate::effects::{self, Body, Effect, MAX_COEFFICIENTS, Memory, Shape};
 use crate::frame::{GRAVITY, Vec3};
@@ -9,8 +10,6 @@ use crate::trials::{Manifest, Method};
 /// Half the distance over which the prediction is differentiated for a delay [s]: further than noise that stands in both
 /// the gap and the prediction reaches, which would pass for a delay.
 const DELAY_ARM: f64 = 0.15;
-/// Speed below which rolling resistance fades out [m/s].
-const ROLLING_SPEED: f64 = 0.05;
 
 /// Shapes of one-dimensional flow in a channel, by the Froude number where it ends.
 const IN_CHANNEL: [Shape; 2] = [[0.7, 0.0, 0.0], [1.0, 0.0, 0.0]];
@@ -179,8 +178,6 @@ fn chain(
     columns: &mut [Column],
 ) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
-    // along an axis that is hardly accelerated there is noise alone, which would pull an error of the mass to 0
-    let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(series.coherence[axis].is_a_motion())));
     for (sample, p) in series.seen.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();
@@ -214,18 +211,17 @@ fn chain(
             }
             Effect::RollingResistance => {
                 let load = (setting.mass * GRAVITY * up.z - p[2]).max(0.0);
-                let v = state.ground_velocity.x;
-                columns[0][sample][0] = -load * v / v.hypot(ROLLING_SPEED);
+                let dry = setting.mass * series.dry_rolling[sample];
+                columns[0][sample][0] = dry - load * rolling_direction(state.ground_velocity.x);
             }
             Effect::DriveGain => columns[0][sample] = series.other[sample],
             Effect::MassError => {
                 // a wrench that comes inferred was so with an acceleration that nobody knows: with what is expected of it
-                let acceleration = match &series.inferred_with {
-                    Some(acceleration) => acceleration[sample].component_mul(&accelerated),
-                    None => series.calibrated[sample].acceleration,
+                let inertia = match &series.inertia {
+                    Some(inertia) => inertia[sample],
+                    None => series.calibrated[sample].acceleration + up * GRAVITY,
                 };
-                let inertia = (acceleration + up * GRAVITY) * -setting.mass;
-                (0..3).for_each(|axis| columns[0][sample][axis] = inertia[axis]);
+                (0..3).for_each(|axis| columns[0][sample][axis] = -setting.mass * inertia[axis]);
             }
             _ => {}
         }

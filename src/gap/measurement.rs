@@ -3,38 +3,84 @@
 //! Inverse dynamics (`method = "inverse_dynamics"`): `F = m (a + g up) - sum of other forces`. A column of a known other
 //! force is named after the component it acts on (`drive_fx`). Components without such a column are not inferred, since
 //! what the ground carries is unknown there. A dry twin, the same command without water, is taken off at the same time
-//! since the start, with the difference of the inertia.
+//! since the start, and so is its part in all that the wrench was inferred from: an error of the mass or of the drive
+//! stands in both.
 
 use std::collections::BTreeMap;
 
 use super::GapError;
-use crate::frame::GRAVITY;
+use super::rates::mean_step;
+use crate::frame::{GRAVITY, Vec3};
 use crate::signal::interpolate;
 use crate::trials::{Method, Trial, Trials, component_of};
 
-/// The measured wrench of each sample; `None` for a component that was not measured [N, N m].
-pub(super) fn measured(trials: &Trials, trial: &Trial, mass: f64) -> Result<[Option<Vec<f64>>; 6], GapError> {
+/// Speed below which rolling resistance fades out [m/s].
+const ROLLING_SPEED: f64 = 0.05;
+
+/// What was measured of a trial, a value a sample; where the wrench was inferred, all of it less that of the dry twin.
+pub(super) struct Measurement {
+    /// `None` for a component that was not measured [N, N m].
+    pub wrench: [Option<Vec<f64>>; 6],
+    /// What the wrench was inferred from; `None` where it was measured, or comes inferred.
+    pub motion: Option<Motion>,
+    /// Known other force on each component, where there is one [N, N m].
+    pub other: Vec<[f64; 6]>,
+}
+
+/// What times the mass is force.
+pub(super) struct Motion {
+    /// [m/s2]
+    pub acceleration: Vec<Vec3>,
+    pub up: Vec<Vec3>,
+    /// The dry twin's weight times the direction in which it rolls, over its mass; 0 without one [m/s2].
+    pub dry_rolling: Vec<f64>,
+}
+
+pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<Measurement, GapError> {
+    let own = of_columns(&trial.other_forces, trial.len());
     if !is_inferred_here(trials, trial) {
-        return Ok(trial.measured.clone());
+        return Ok(Measurement { wrench: trial.measured.clone(), motion: None, other: own });
     }
-    let mass = trials.manifest.mass.unwrap_or(mass);
-    let mut wrench = inferred(trial, mass);
+    let mut other = own;
+    let mut motion = Motion {
+        acceleration: trial.acceleration.clone(),
+        up: (0..trial.len()).map(|sample| trial.up(sample).into_inner()).collect(),
+        dry_rolling: vec![0.0; trial.len()],
+    };
     if let Some(name) = trials.manifest.measured.dry_twins.get(&trial.name) {
         let missing = || GapError::NoTwin { trial: trial.name.clone(), twin: name.clone() };
         let twin = trials.trials.iter().find(|other| other.name == *name).ok_or_else(missing)?;
-        take_off(&mut wrench, trial, twin, &inferred(twin, mass));
+        take_off(&mut motion, &mut other, trial, twin)?;
     }
-    Ok(wrench)
+    let mass = trials.manifest.mass.unwrap_or(mass);
+    let force = |axis: usize| {
+        sum_on(axis, &trial.other_forces)?;
+        let inertia = motion.acceleration.iter().zip(&motion.up).map(|(a, up)| a[axis] + GRAVITY * up[axis]);
+        Some(inertia.zip(&other).map(|(inertia, other)| mass * inertia - other[axis]).collect())
+    };
+    let wrench = [force(0), force(1), force(2), None, None, None];
+    Ok(Measurement { wrench, motion: Some(motion), other })
+}
+
+/// Which way wheels roll: the sign of the speed ahead [m/s], 0 at rest.
+pub(super) fn rolling_direction(speed: f64) -> f64 {
+    speed / speed.hypot(ROLLING_SPEED)
 }
 
 /// True where the wrench is inferred from the trial's own motion; false where it was measured, or comes inferred.
-pub(super) fn is_inferred_here(trials: &Trials, trial: &Trial) -> bool {
+fn is_inferred_here(trials: &Trials, trial: &Trial) -> bool {
     trials.manifest.measured.method == Some(Method::InverseDynamics)
         && trial.measured.iter().all(Option::is_none)
 }
 
+/// Known forces on each component; 0 where no column acts on it.
+pub(super) fn of_columns(columns: &BTreeMap<String, Vec<f64>>, count: usize) -> Vec<[f64; 6]> {
+    let sums: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| sum_on(c, columns));
+    (0..count).map(|i| std::array::from_fn(|c| sums[c].as_ref().map_or(0.0, |sum| sum[i]))).collect()
+}
+
 /// Sum of the columns of known forces that act on a component; `None` where there is none.
-pub(super) fn sum_on(component: usize, columns: &BTreeMap<String, Vec<f64>>) -> Option<Vec<f64>> {
+fn sum_on(component: usize, columns: &BTreeMap<String, Vec<f64>>) -> Option<Vec<f64>> {
     let mut columns = columns.iter().filter(|(name, _)| component_of(name) == Some(component));
     let mut sum = columns.next()?.1.clone();
     for (_, column) in columns {
@@ -43,23 +89,37 @@ pub(super) fn sum_on(component: usize, columns: &BTreeMap<String, Vec<f64>>) -> 
     Some(sum)
 }
 
-fn inferred(trial: &Trial, mass: f64) -> [Option<Vec<f64>>; 6] {
-    let force = |axis: usize| {
-        let known = sum_on(axis, &trial.other_forces)?;
-        let value = |(sample, other): (usize, f64)| {
-            mass * (trial.acceleration[sample][axis] + GRAVITY * trial.up(sample)[axis]) - other
-        };
-        Some(known.into_iter().enumerate().map(value).collect())
-    };
-    [force(0), force(1), force(2), None, None, None]
-}
-
-fn take_off(wrench: &mut [Option<Vec<f64>>; 6], trial: &Trial, twin: &Trial, dry: &[Option<Vec<f64>>; 6]) {
-    let since_start: Vec<f64> = trial.t.iter().map(|t| t - trial.t[0] + twin.t[0]).collect();
-    for (wet, dry) in wrench.iter_mut().zip(dry) {
-        if let (Some(wet), Some(dry)) = (wet, dry) {
-            let dry = interpolate(&twin.t, dry, &since_start);
-            wet.iter_mut().zip(dry).for_each(|(wet, dry)| *wet -= dry);
-        }
+fn take_off(
+    motion: &mut Motion,
+    other: &mut [[f64; 6]],
+    trial: &Trial,
+    twin: &Trial,
+) -> Result<(), GapError> {
+    let length = |trial: &Trial| trial.t[trial.len() - 1] - trial.t[0];
+    // the last sample may stand for one more, and for no longer
+    if length(twin) + mean_step(&twin.t) < length(trial) {
+        return Err(GapError::ShortTwin {
+            trial: trial.name.clone(),
+            twin: twin.name.clone(),
+            seconds: length(trial) - length(twin),
+        });
     }
+    let since_start: Vec<f64> = trial.t.iter().map(|t| t - trial.t[0] + twin.t[0]).collect();
+    let at = |value: &dyn Fn(usize) -> f64| {
+        let values: Vec<f64> = (0..twin.len()).map(value).collect();
+        interpolate(&twin.t, &values, &since_start)
+    };
+    for axis in 0..3 {
+        let acceleration = at(&|i| twin.acceleration[i][axis]);
+        motion.acceleration.iter_mut().zip(acceleration).for_each(|(wet, dry)| wet[axis] -= dry);
+        let up = at(&|i| twin.up(i)[axis]);
+        motion.up.iter_mut().zip(up).for_each(|(wet, dry)| wet[axis] -= dry);
+    }
+    motion.dry_rolling = at(&|i| GRAVITY * twin.up(i).z * rolling_direction(twin.velocity[i].x));
+    let dry = of_columns(&twin.other_forces, twin.len());
+    for component in 0..6 {
+        let dry = at(&|i| dry[i][component]);
+        other.iter_mut().zip(dry).for_each(|(wet, dry)| wet[component] -= dry);
+    }
+    Ok(())
 }

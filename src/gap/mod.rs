@@ -159,6 +159,18 @@ pub enum GapError {
         /// Name of the twin.
         twin: String,
     },
+    /// A twin that ends before its trial.
+    #[error(
+        "{twin}.csv, the dry twin of {trial}.csv, is {seconds:.2} s shorter: cut the one, or record the other anew"
+    )]
+    ShortTwin {
+        /// Name of the trial.
+        trial: String,
+        /// Name of the twin.
+        twin: String,
+        /// By how much [s].
+        seconds: f64,
+    },
     /// A prediction that is no number.
     #[error("{trial}.csv, row {row}: the predicted wrench is not finite")]
     NotFinite {

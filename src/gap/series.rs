@@ -1,14 +1,13 @@
 //! Trials as the workflow sees them: state, prediction and gap of every sample, and bins of samples.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::measurement::{is_inferred_here, measured, sum_on};
+use super::measurement::{Measurement, Motion, measurement, of_columns};
 use super::rates::{Coherence, mean_step, rates, smooth_rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
-use crate::frame::Vec3;
+use crate::frame::{GRAVITY, Vec3};
 use crate::signal::pieces;
 use crate::trials::{Trial, Trials, WRENCH};
 use crate::wrench::Wrench;
@@ -37,12 +36,14 @@ pub(super) struct Series {
     pub uncertainty: Vec<[f64; 6]>,
     /// Measured minus predicted and known; 0 for components that are not compared.
     pub gap: Vec<[f64; 6]>,
-    /// Known other force on each component, where there is one.
+    /// Known other force on each component, where there is one, less that of the dry twin.
     pub other: Vec<[f64; 6]>,
     /// Rates of the velocities before any smoothing.
     pub recorded_rates: Vec<[f64; 6]>,
-    /// Acceleration before any smoothing [m/s2], where the wrench was inferred with it.
-    pub inferred_with: Option<Vec<Vec3>>,
+    /// `a + g up` before any smoothing [m/s2], where the wrench was inferred with it.
+    pub inertia: Option<Vec<Vec3>>,
+    /// What the dry twin's rolling resistance takes off, over its mass and the coefficient [m/s2]; 0 without a twin.
+    pub dry_rolling: Vec<f64>,
     /// Rates of velocity and angular velocity, wetting rate and angular velocities: how far each hangs together.
     pub coherence: [Coherence; 10],
     /// Samples of each bin.
@@ -126,7 +127,7 @@ fn of_trial(
     predict: &mut dyn FnMut(&Condition) -> Predicted,
     config: &Config,
 ) -> Result<(Series, [bool; 6]), GapError> {
-    let measured = measured(trials, trial, body.mass)?;
+    let Measurement { wrench: measured, motion, other } = measurement(trials, trial, body.mass)?;
     let simulated = trial.simulated.iter().any(Option::is_some);
     let mut present: [bool; 6] = std::array::from_fn(|c| measured[c].is_some());
     if simulated {
@@ -169,11 +170,7 @@ fn of_trial(
     smooth_rates(&trial.t, &mut conditions);
     let wetting_rate = wetting_rate(&trial.t, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
-    let of_columns = |columns: &BTreeMap<String, Vec<f64>>| -> Vec<[f64; 6]> {
-        let sums: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| sum_on(c, columns));
-        (0..count).map(|i| std::array::from_fn(|c| sums[c].as_ref().map_or(0.0, |sum| sum[i]))).collect()
-    };
-    let known = of_columns(&trial.known_loads);
+    let known = of_columns(&trial.known_loads, count);
     let seen: Vec<[f64; 6]> =
         predicted.iter().zip(&known).map(|(p, k)| std::array::from_fn(|c| p[c] + k[c])).collect();
     let gap = (0..count).map(|i| {
@@ -186,10 +183,11 @@ fn of_trial(
     let series = Series {
         name: trial.name.clone(),
         gap: gap.collect(),
-        other: of_columns(&trial.other_forces),
+        other,
         channel_width: trials.manifest.channel_width_of(&trial.name),
         wetting_rate,
-        inferred_with: is_inferred_here(trials, trial).then(|| trial.acceleration.clone()),
+        inertia: motion.as_ref().map(|motion| inertia(&trial.t, motion)),
+        dry_rolling: motion.map_or_else(|| vec![0.0; count], |motion| motion.dry_rolling),
         coherence,
         wheels: (0..count)
             .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
@@ -209,6 +207,15 @@ fn of_trial(
         runs,
     };
     Ok((series, present))
+}
+
+/// `a + g up` of each sample. Along an axis that is hardly accelerated there is noise alone, which would pull an error of the
+/// mass to 0.
+fn inertia(t: &[f64], motion: &Motion) -> Vec<Vec3> {
+    let moves = |axis: usize| Coherence::of(t, |i| motion.acceleration[i][axis]).is_a_motion();
+    let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(moves(axis))));
+    let of = |(acceleration, up): (&Vec3, &Vec3)| acceleration.component_mul(&accelerated) + up * GRAVITY;
+    motion.acceleration.iter().zip(&motion.up).map(of).collect()
 }
 
 /// Bins of about `length` within each run without a hole; at least one sample each.
