@@ -125,14 +125,23 @@ pub(super) fn fit(
         let own = if i == j { (formula(used[i].0) * values[i]).powi(2) } else { 0.0 };
         own + leaks.iter().map(|leak| leak[i] * leak[j]).sum::<f64>() / (scale[i] * scale[j])
     };
-    let covariance =
-        DMatrix::from_fn(count, count, |i, j| covariance(&draws, i, j) / (scale[i] * scale[j]) + open(i, j));
+    // draws scatter by n - 1 of n of the variance, n the clusters that excite a column; and where the noise of all trials
+    // together says more, of those few it is no less
+    let freedom = |i: usize| f64::max(if few { errors[i].blocks } else { errors[i].trials } - 1.0, 1.0);
+    let widening: Vec<f64> = (0..count)
+        .map(|i| {
+            let drawn = covariance_of(&draws, i).sqrt().max(f64::MIN_POSITIVE);
+            ((freedom(i) + 1.0) / freedom(i)).sqrt().max(errors[i].std / drawn)
+        })
+        .collect();
+    let covariance = DMatrix::from_fn(count, count, |i, j| {
+        covariance(&draws, i, j) * widening[i] * widening[j] / (scale[i] * scale[j]) + open(i, j)
+    });
     let interval = |i: usize| {
         let mut sorted: Vec<f64> = draws.iter().map(|d| d[i] / scale[i]).collect();
         let drawn = [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)];
-        // draws scatter by n - 1 of n of the variance, and as a normal variable, not as Student's
-        let freedom = errors[i].freedom.max(1.0);
-        let expansion = student_from_normal(Z90, freedom) / Z90 * ((freedom + 1.0) / freedom).sqrt();
+        // as a normal variable, not as Student's
+        let expansion = student_from_normal(Z90, freedom(i)) / Z90 * widening[i];
         drawn.map(|end| {
             let reach = (end - values[i]) * expansion;
             values[i] + reach.signum() * reach.hypot(Z90 * open(i, i).sqrt())

@@ -27,6 +27,8 @@ pub(super) struct Error {
     pub freedom: f64,
     /// Effective number of trials that excite the column.
     pub trials: f64,
+    /// The same of blocks.
+    pub blocks: f64,
 }
 
 impl Error {
@@ -147,16 +149,21 @@ impl<'a> Noise<'a> {
         let rows = &design.rows;
         let energy: Vec<f64> =
             rows.of_trial.iter().map(|r| column[r.clone()].iter().map(|v| v * v).sum()).collect();
-        let trials = effective(&energy);
+        let (mut by_block, mut of_block) = (vec![0.0; rows.blocks], vec![0.0; rows.blocks]);
         let part = |row: usize| weights[row] * self.residual[row];
+        for (row, place) in rows.rows.iter().enumerate() {
+            by_block[place.block] += part(row);
+            of_block[place.block] += column[row] * column[row];
+        }
+        let (trials, blocks) = (effective(&energy), effective(&of_block));
         if trials >= ENOUGH_TRIALS {
             let by_trial: Vec<f64> = rows.of_trial.iter().map(|r| r.clone().map(part).sum()).collect();
-            return Error { std: sandwich(&by_trial).sqrt(), freedom: trials - 1.0, trials };
+            return Error { std: sandwich(&by_trial).sqrt(), freedom: trials - 1.0, trials, blocks };
         }
-        let mut by_block = vec![0.0; rows.blocks];
-        rows.rows.iter().enumerate().for_each(|(row, place)| by_block[place.block] += part(row));
-        let variance = self.pooled(design, weights).max(sandwich(&by_block));
-        Error { std: variance.sqrt(), freedom: rows.blocks as f64 - 1.0, trials }
+        let (pooled, scattered) = (self.pooled(design, weights), sandwich(&by_block));
+        // the noise of all trials together is well known, the scatter of the few blocks that excite the column is not
+        let freedom = if pooled > scattered { rows.blocks as f64 } else { blocks } - 1.0;
+        Error { std: pooled.max(scattered).sqrt(), freedom, trials, blocks }
     }
 
     /// Variance of a weighted sum of noise with the pooled autocovariance.
