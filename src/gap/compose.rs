@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use super::candidates::Setting;
 use super::design::Design;
 use super::detect::{self, Excitation};
+use super::effects_file::remarks;
 use super::experiment::separating;
 use super::fit::{Fit, Parameter, fit};
 use super::gated::Gated;
@@ -76,7 +77,7 @@ pub(super) fn compose(
         _ => locate::locate(all, &design.trials, gap_excess, found.gated.map(|gated| gated.limits), config),
     };
     let excitation =
-        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &config.library, config);
+        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &named, config);
     let not_testable = excitation.iter().filter_map(not_testable).collect();
     let alternatives: Vec<Vec<&'static str>> = match holds {
         true => found.alternatives.iter().map(|set| names(judge, set)).collect(),
@@ -87,6 +88,7 @@ pub(super) fn compose(
         let effects = |set: &Vec<Member>| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
         separating(&sets.map(effects).collect::<Vec<_>>())
     });
+    let remarks = trials.remarks().iter().map(ToString::to_string).chain(remarks(&effects)).collect();
     let unexplained = unexplained(judge, &found, disproof);
     let gap = GapReport {
         held_out,
@@ -114,7 +116,7 @@ pub(super) fn compose(
         validity: validity(all),
         trials: all.len(),
         samples: all.iter().map(|s| s.t.len()).sum(),
-        remarks: trials.remarks().iter().map(ToString::to_string).collect(),
+        remarks,
         sources: Sources { trials: hash(trials), ..Sources::default() },
         traces: traces(&named, all, &held, setting, judge.floors),
     };

@@ -10,7 +10,7 @@ use super::design::Design;
 use super::robust::errors;
 use super::series::Series;
 use super::statistics::{median, quantile, white_variance};
-use super::{Config, noise::Floor};
+use super::{Config, Named, noise::Floor};
 use crate::effects::Effect;
 use crate::random::Random;
 use crate::trials::{Manifest, WRENCH};
@@ -94,18 +94,23 @@ pub struct Detectable {
     pub unit: &'static str,
 }
 
-/// The excitation of every effect; `residual` is what the named effects leave of the rows.
+/// The excitation of every effect; `residual` is what the named effects leave of the rows. What was named was excited.
 pub(super) fn excitations(
     design: &Design,
     all: &[Series],
     setting: &Setting,
     manifest: &Manifest,
     residual: &DVector<f64>,
-    library: &[Effect],
+    named: &[Named],
     config: &Config,
 ) -> Vec<Excitation> {
     let bar = super::statistics::deviate_of(config.significance) + POWER;
-    library.iter().map(|&effect| of_effect(effect, design, all, setting, manifest, residual, bar)).collect()
+    let of = |&effect: &Effect| {
+        let mut found = of_effect(effect, design, all, setting, manifest, residual, bar);
+        found.not_testable.take_if(|_| named.iter().any(|named| named.effect == effect));
+        found
+    };
+    config.library.iter().map(of).collect()
 }
 
 fn of_effect(
@@ -217,9 +222,10 @@ fn is_coherent(effect: Effect, all: &[Series], components: &[usize]) -> bool {
         rates.into_iter().zip(with).filter(|(_, with)| seen(with)).any(|(rate, _)| share(rate) > COHERENT)
     };
     match effect {
-        // pitch comes with surge, roll with sway
+        // pitch comes with surge, roll with sway; inertia has that of turning as well
         Effect::AddedMass | Effect::MassError | Effect::WaveMemory => {
             felt([0, 1, 2], [[0, 4], [1, 3], [2, 2]])
+                || effect == Effect::AddedMass && felt([3, 4, 5], [[3, 3], [4, 4], [5, 5]])
         }
         Effect::WaterEntrySlamming => share(6) > COHERENT,
         Effect::Rotation => felt([7, 8, 9], [[3, 3], [2, 4], [1, 5]]),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::report::{NamedEffect, Report, Verdict};
-use crate::effects::{ActiveEffect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
+use crate::effects::{ActiveEffect, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
 use crate::trials::{Manifest, Trials};
 
 /// Why nothing of a report may be added to a model.
@@ -35,7 +35,8 @@ pub enum NotApplicable {
 
 /// The physical effects of a report: coefficients, units, standard errors, covariance, the ranges in which they were seen,
 /// and the hashes of what they rest on. Faults of sensors and drive are never in it. What was seen in one condition only is
-/// in it where that is asked for. The hash of the weights is left to whoever puts it into a bundle.
+/// in it where that is asked for. A value that its errors alone carried beyond what is physically possible is the nearest one
+/// that is possible, as the report's remarks say. The hash of the weights is left to whoever puts it into a bundle.
 pub fn effects_file(
     report: &Report,
     trials: &Trials,
@@ -85,6 +86,25 @@ fn validity(report: &Report) -> Validity {
     }
 }
 
+/// The value within the bounds of a coefficient: a gate lets it lie two standard errors beyond them.
+fn possible(effect: Effect, name: &str, value: f64) -> f64 {
+    let bounds = effect.coefficients().iter().find(|spec| spec.name == name).map(|spec| spec.bounds);
+    bounds.map_or(value, |[low, high]| value.clamp(low, high))
+}
+
+/// What is written of named effects otherwise than it was fitted.
+pub(super) fn remarks(effects: &[NamedEffect]) -> Vec<String> {
+    let physical = effects.iter().filter(|effect| effect.kind == Kind::Physics);
+    let all =
+        physical.flat_map(|effect| effect.parameters.iter().map(move |(name, p)| (effect, name, p.value)));
+    let beyond = all.filter_map(|(effect, name, value)| {
+        let written = possible(effect.effect, name, value);
+        let of = effect.name.replace('_', " ");
+        (written != value).then(|| format!("{name} of {of} is {value:.3} within its error of {written}, what is possible: {written} is applied"))
+    });
+    beyond.collect()
+}
+
 /// The narrowest of the channels whose widths are stated by trial [m].
 fn narrowest(manifest: &Manifest) -> Option<f64> {
     manifest.channel_widths.values().copied().filter(|width| width.is_finite()).reduce(f64::min)
@@ -92,8 +112,8 @@ fn narrowest(manifest: &Manifest) -> Option<f64> {
 
 fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
     let parameters = effect.parameters.iter().map(|(name, parameter)| {
-        let unit = parameter.unit.to_owned();
-        ((*name).to_owned(), ParameterValue { value: parameter.value, std: parameter.std, unit })
+        let (value, unit) = (possible(effect.effect, name, parameter.value), parameter.unit.to_owned());
+        ((*name).to_owned(), ParameterValue { value, std: parameter.std, unit })
     });
     ActiveEffect {
         name: effect.effect,
@@ -106,5 +126,17 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         coefficients: effect.coefficients.iter().map(|name| (*name).to_owned()).collect(),
         covariance: effect.covariance.clone(),
         parameters: parameters.collect::<BTreeMap<_, _>>(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_beyond_the_bounds_by_its_error_is_written_at_them() {
+        let of = |value: f64| possible(Effect::AddedMass, "surge", value);
+        assert_eq!((of(-0.01), of(0.7), of(6.5)), (0.0, 0.7, 6.0));
+        assert_eq!(possible(Effect::HullFlooding, "opening_ratio", 0.01), 0.01, "a shape has no bounds");
     }
 }

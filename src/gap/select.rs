@@ -5,11 +5,30 @@ use super::judge::{Judge, Judged, Member, lives_on_a_rate};
 use crate::effects::Effect;
 
 impl Judge<'_> {
-    /// A set without the members that no longer pass beside the others.
+    /// A set after its shapes were fitted: each member as its own candidate passes beside the others now, without those that
+    /// no longer do.
     pub fn confirmed(&self, set: &[Member]) -> Vec<Member> {
         let mut set = set.to_vec();
-        while self.delete_one(&mut set) {}
+        let mut index = 0;
+        while index < set.len() {
+            let own = set.remove(index);
+            match self.passes_still(&set, own.candidate) {
+                Some(member) => {
+                    set.insert(index, member);
+                    index += 1;
+                }
+                // the others were judged beside one that is not there
+                None => index = 0,
+            }
+        }
         set
+    }
+
+    fn passes_still(&self, others: &[Member], candidate: usize) -> Option<Member> {
+        let base = self.columns(others);
+        let before = self.design.solve(&base)?.1;
+        let judged = self.beyond_chance(others, self.judge_form(others, &base, before, candidate)?)?;
+        judged.refused.is_none().then_some(judged.member)
     }
 
     /// The search: adds the best effect that passes, or the best two that pass only beside each other, then swaps and
