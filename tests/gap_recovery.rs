@@ -362,6 +362,19 @@ fn where_nothing_is_missing_nothing_is_named() {
 }
 
 #[test]
+fn noise_that_grows_with_the_speed_is_no_structure_where_the_rows_are_smoothed() {
+    let motions = motions(TRIALS, SAMPLES, 4);
+    let mut random = Random::new(4);
+    let mut shaken = |s: &State| NOISE.map(|noise| 1.5 * noise * s.v.x.abs() * gaussian(&mut random));
+    let grows: Vec<Vec<[f64; 6]>> =
+        motions.iter().map(|motion| motion.iter().map(&mut shaken).collect()).collect();
+    // accelerations noisy enough that all is smoothed over many bins
+    let noise = Noise { acceleration: 3.0, ..Noise::white(NOISE) };
+    let report = run(&trials(&motions, &grows, &noise, 4));
+    assert_eq!(report.verdict, Verdict::NothingMissing, "{} {:?}", report.summary, report.gap.unexplained);
+}
+
+#[test]
 fn a_pair_that_these_trials_cannot_tell_apart_is_ambiguous_and_the_trial_that_would_is_named() {
     // the simulator's fx is drag and nothing else, so a wrong gain of fx is a wrong coefficient; a gain of all channels and
     // a density scale the same loads
@@ -430,6 +443,22 @@ fn what_is_not_excited_is_said() {
         assert!(silent.contains(&name), "{name} {silent:?}");
     }
     assert!(!silent.contains(&"drag_coefficient_error"), "{silent:?}");
+}
+
+#[test]
+fn the_mass_of_water_that_turns_with_the_hull_can_be_told_by_turning_alone() {
+    let mut motions = motions(12, 600, 5);
+    for (index, motion) in motions.iter_mut().enumerate() {
+        for s in motion.iter_mut() {
+            let phase = (1.0 + 0.1 * index as f64) * s.t;
+            (s.v, s.a, s.depth, s.depth_rate) = (Vec3::zeros(), Vec3::zeros(), 0.2, 0.0);
+            (s.w.z, s.al.z) = (0.6 * phase.sin(), 0.6 * (1.0 + 0.1 * index as f64) * phase.cos());
+        }
+    }
+    let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
+    let report = run(&trials(&motions, &nothing, &Noise::white(NOISE), 5));
+    let silent: Vec<&str> = report.not_testable.iter().map(|missing| missing.name).collect();
+    assert!(!silent.contains(&"added_mass") && silent.contains(&"wave_memory"), "{silent:?}");
 }
 
 #[test]

@@ -77,10 +77,10 @@ pub(super) fn without_zeros(design: &Design, target: &DVector<f64>) -> DVector<f
     })
 }
 
-/// How the energy of the rows that no trend explains grows with the state: the deviate of the strongest quantity, its
-/// name, and the root of the energy in its upper third, in noises of a bin. White noise of any size is taken off block by
-/// block, so that noise that grows with speed is no structure.
-pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> (f64, &'static str, f64) {
+/// How the energy of rows that no trend explains grows with the state: the deviate of the strongest quantity, and the root of
+/// the energy in its upper third, in noises of a bin. White noise of any size is taken off block by block, so that noise that
+/// grows with speed is no structure; the rows must not be smoothed, or it is white no more.
+pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> (f64, f64) {
     let blocks = design.rows.blocks;
     let mut series: Vec<[Vec<f64>; 6]> = vec![Default::default(); blocks];
     // the zero of a trial is no force that comes and goes
@@ -98,20 +98,18 @@ pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> 
         })
         .collect();
     let features: Vec<Vec<Features>> = all.iter().map(of_bins).collect();
-    let mut best = (0.0, "", 0.0);
-    for (index, (name, _)) in FEATURES.iter().enumerate() {
+    let of_feature = |index: usize| {
         let values: Vec<f64> = (0..blocks)
             .map(|block| {
                 let bins = &features[design.rows.block_trial[block]][design.rows.block_bins[block].clone()];
                 bins.iter().map(|f| f[index]).sum::<f64>() / bins.len().max(1) as f64
             })
             .collect();
-        let (deviate, size) = trend(&values, &excess, &design.rows.block_trial);
-        if deviate > best.0 {
-            best = (deviate, *name, size);
-        }
-    }
-    best
+        trend(&values, &excess, &design.rows.block_trial)
+    };
+    (0..FEATURES.len())
+        .map(of_feature)
+        .fold((0.0, 0.0), |best, found| if found.0 > best.0 { found } else { best })
 }
 
 /// Deviate of the slope of ranks, clustered by trial, and the root mean excess of the third on the larger side.
@@ -130,13 +128,39 @@ fn trend(values: &[f64], excess: &[f64], trial: &[usize]) -> (f64, f64) {
     (sum.abs() / spread.max(f64::MIN_POSITIVE), mean.max(0.0).sqrt())
 }
 
-/// Ranks from -1/2 to 1/2.
+/// Ranks from -1/2 to 1/2; values that are the same share theirs, or their order would depend on the names of the files.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
-    for (rank, index) in order.into_iter().enumerate() {
-        ranks[index] = (rank as f64 + 0.5) / values.len() as f64 - 0.5;
+    let mut before = 0;
+    for same in order.chunk_by(|&a, &b| values[a] == values[b]) {
+        let rank = (before as f64 + 0.5 * same.len() as f64) / values.len() as f64 - 0.5;
+        same.iter().for_each(|&index| ranks[index] = rank);
+        before += same.len();
     }
     ranks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trend_over_values_that_are_the_same_is_that_of_the_trials_in_any_order() {
+        // blocks at two depths, their energies, and their trials
+        let blocks =
+            [(0.1, 1.0, 0), (0.2, 5.0, 1), (0.1, 2.0, 2), (0.2, 4.0, 3), (0.1, 3.0, 4), (0.2, 6.0, 5)];
+        let of = |order: [usize; 6]| {
+            let pick = order.map(|i| blocks[i]);
+            trend(&pick.map(|b| b.0), &pick.map(|b| b.1), &pick.map(|b| b.2))
+        };
+        let (deviate, size) = of([0, 1, 2, 3, 4, 5]);
+        for order in [[5, 4, 3, 2, 1, 0], [2, 0, 5, 1, 4, 3]] {
+            let other = of(order);
+            assert!((other.0 - deviate).abs() < 1e-12 && (other.1 - size).abs() < 1e-12, "{other:?}");
+        }
+        let ranks = ranks(&[7.0, 7.0, 9.0]);
+        assert!(ranks[0] == ranks[1] && (ranks[0] + 1.0 / 6.0).abs() < 1e-12, "{ranks:?}");
+    }
 }

@@ -112,11 +112,10 @@ impl Found {
 
     /// Predictable from the state, or lasting in a trial, and large enough to matter.
     fn is_structured(&self, judge: &Judge, structure: &Structure) -> bool {
-        let (design, all, config) = (judge.design, judge.all, judge.config);
+        let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
         let rows = design.y.len().max(1) as f64;
         // gain per row is in bins' noise; relevance is in samples' noise
-        let relative = judge
-            .setting
+        let relative = setting
             .components
             .iter()
             .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].model) / design.noise.bin[c])
@@ -124,12 +123,12 @@ impl Found {
         let least = config.relevance * relative;
         let size = (structure.gain / rows).sqrt();
         // a force that comes and goes with no phase of its own shows in its energy alone
-        let (deviate, _, energy) = energy(all, design, &design.y);
+        let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
+        let (deviate, energy) = energy(all, design, &unsmoothed);
         let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
         let kept = lasting(design, &design.y);
         let moving = lasting(design, &without_zeros(design, &design.y));
         // a load that was computed has no noise that hangs together and could pass for a gap
-        let setting = judge.setting;
         let above = || sizes(all, judge.floors, &setting.components, config).values().any(|s| s.above_floor);
         setting.computed && above()
             || structure.deviate > STRUCTURE && size > least
