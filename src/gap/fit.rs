@@ -142,10 +142,7 @@ pub(super) fn fit(
         let drawn = [quantile(&mut sorted.clone(), 0.05), quantile(&mut sorted, 0.95)];
         // as a normal variable, not as Student's
         let expansion = student_from_normal(Z90, freedom(i)) / Z90 * widening[i];
-        drawn.map(|end| {
-            let reach = (end - values[i]) * expansion;
-            values[i] + reach.signum() * reach.hypot(Z90 * open(i, i).sqrt())
-        })
+        ends(drawn, values[i], expansion, Z90 * open(i, i).sqrt())
     };
     let intervals = (0..count).map(interval).collect();
     let mut shape_std = vec![[0.0; 3]; set.len()];
@@ -163,6 +160,13 @@ pub(super) fn fit(
         })
         .collect();
     Some(Fit { values, covariance, intervals, provisional, shape_std })
+}
+
+/// The ends of an interval about a value: those drawn, moved out by a factor, and what is open beyond; where both were drawn
+/// on one side, the other reaches as far as is open.
+fn ends([low, high]: [f64; 2], value: f64, expansion: f64, open: f64) -> [f64; 2] {
+    let reach = |beyond: f64| (beyond.max(0.0) * expansion).hypot(open);
+    [value - reach(value - low), value + reach(high - value)]
 }
 
 /// Each load as it would be missing where its law holds less well the deeper, or the faster: the load times the depth, and
@@ -282,4 +286,16 @@ fn bootstrap(groups: &[Group], config: &Config) -> Vec<DVector<f64>> {
         weights
     };
     (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_holds_its_value_however_skew_the_draws() {
+        assert_eq!(ends([1.0, 4.0], 2.0, 2.0, 0.0), [0.0, 6.0]);
+        // all drawn above: what the formula leaves open is open below as well
+        assert_eq!(ends([2.5, 4.0], 2.0, 1.0, 1.5), [0.5, 4.5]);
+    }
 }
