@@ -12,36 +12,38 @@ use crate::frame::GRAVITY;
 /// Last and smallest factor of the search.
 const SHORTEST_STEP: f64 = 1.015;
 
-/// Sets the shapes that are estimates of the effect's own coefficients: a current, a delay.
+/// Sets the shapes that are estimates of the effect's own coefficients: a current.
 pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
     for candidate in 0..design.candidates.len() {
         if design.candidates[candidate].effect == Effect::Current {
-            iterate(design, all, setting, candidate, &[]);
+            let member = Member { candidate, columns: design.candidates[candidate].columns.clone() };
+            iterate(design, all, setting, &member, &[]);
         }
     }
 }
 
-/// Fixed point of a shape that is the effect's own estimate, beside other columns.
+/// Fixed point of a shape that is the member's own estimate, beside other columns; a coefficient that is not in use has none.
 ///
 /// Where the load grows with the square of the estimate, `F = k w0 w` says `w = F / (k w0)`, which jumps to and fro about the
 /// root for ever; halfway there is Heron's rule, which closes in on it. The first step is a whole one: from nothing there
 /// is no square.
-fn iterate(design: &mut Design, all: &[Series], setting: &Setting, candidate: usize, others: &[usize]) {
+fn iterate(design: &mut Design, all: &[Series], setting: &Setting, member: &Member, others: &[usize]) {
     const TIMES: usize = 5;
+    let columns: Vec<usize> =
+        member.columns.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
+    let effect = design.candidates[member.candidate].effect;
     for time in 0..TIMES {
-        let own = design.candidates[candidate].columns.clone();
-        let columns: Vec<usize> =
-            own.iter().map(|(column, _)| *column).chain(others.iter().copied()).collect();
         let Some((beta, _)) = design.solve(&columns) else { return };
-        let effect = design.candidates[candidate].effect;
-        let mut shape = design.candidates[candidate].shape;
-        for (index, &(column, coefficient)) in own.iter().enumerate() {
+        let before = design.candidates[member.candidate].shape;
+        let mut shape = before;
+        shape[..effect.coefficients().len()].fill(0.0);
+        for (index, &(column, coefficient)) in member.columns.iter().enumerate() {
             let [low, high] = effect.coefficients()[coefficient].bounds;
             let found = (beta[index] / design.scale[column]).clamp(low, high);
-            let whole = time == 0 && shape[coefficient] == 0.0;
-            shape[coefficient] = if whole { found } else { 0.5 * (shape[coefficient] + found) };
+            let whole = time == 0 && before[coefficient] == 0.0;
+            shape[coefficient] = if whole { found } else { 0.5 * (before[coefficient] + found) };
         }
-        design.reshape(all, setting, candidate, shape);
+        design.reshape(all, setting, member.candidate, shape);
     }
 }
 
@@ -55,16 +57,16 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
                 .filter(|(other, _)| *other != index)
                 .flat_map(|(_, member)| member.columns.iter().map(|(column, _)| *column))
                 .collect();
-            let candidate = members[index].candidate;
-            match design.candidates[candidate].effect {
-                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, candidate, &others),
+            let member = &members[index];
+            match design.candidates[member.candidate].effect {
+                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, member, &others),
                 Effect::HullFlooding
                 | Effect::WaterEntrySlamming
                 | Effect::Squat
                 | Effect::ChannelBlockage => {
-                    search(design, all, setting, &members[index], &others, &[0]);
+                    search(design, all, setting, member, &others, &[0]);
                 }
-                Effect::WaveMemory => search(design, all, setting, &members[index], &others, &[0, 1]),
+                Effect::WaveMemory => search(design, all, setting, member, &others, &[0, 1]),
                 _ => {}
             }
         }
