@@ -2,7 +2,10 @@
 
 use crate::frame::Vec3;
 use crate::random::Random;
-use crate::trials::{Trial, Trials};
+use crate::trials::{Trial, Trials, component_of};
+
+/// Components that change their sign: fy, mx, mz.
+const TURNED: [usize; 3] = [1, 3, 5];
 
 /// The trials in another order.
 pub fn shuffled(trials: &Trials, random: &mut Random) -> Trials {
@@ -35,9 +38,41 @@ fn mirror(trial: &mut Trial) {
     trial.wheel_speeds.swap(0, 1);
     trial.wheel_speeds.swap(2, 3);
     for wrench in [&mut trial.measured, &mut trial.simulated] {
-        // fy, mx, mz
-        for component in [1, 3, 5] {
+        for component in TURNED {
             wrench[component].iter_mut().flatten().for_each(|value| *value = -*value);
         }
+    }
+    for (name, column) in trial.other_forces.iter_mut().chain(&mut trial.known_loads) {
+        if component_of(name).is_some_and(|component| TURNED.contains(&component)) {
+            column.iter_mut().for_each(|value| *value = -*value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::gap_bench::case::{Family, cases};
+    use crate::gap_bench::generate::generate;
+    use crate::gap_bench::{Hull, Prediction, Schedule, Simulator};
+    use crate::vehicle::shipped;
+
+    #[test]
+    fn known_forces_are_mirrored_as_the_wrench_is() {
+        let schedule = Schedule::slice(&shipped::warthog().unwrap().vehicle().unwrap(), 1);
+        let hull = Hull::generated_box();
+        let simulator = Simulator { hull: &hull, prediction: Prediction::Analytic, vehicle: "generated-box" };
+        let mut trials = generate(&cases(&[Family::Null], 1, 1)[0], &schedule, simulator).trials;
+        let trial = &mut trials.trials[0];
+        trial.other_forces.insert("drive_fx".into(), vec![2.0; trial.len()]);
+        trial.other_forces.insert("drive_fy".into(), vec![3.0; trial.len()]);
+        trial.known_loads.insert("hung_my".into(), vec![4.0; trial.len()]);
+        trial.known_loads.insert("hung_mz".into(), vec![5.0; trial.len()]);
+        let mirrored = &mirrored(&trials).trials[0];
+        let of =
+            |column: &str| mirrored.other_forces.get(column).or(mirrored.known_loads.get(column)).unwrap()[0];
+        assert_eq!(["drive_fx", "drive_fy", "hung_my", "hung_mz"].map(of), [2.0, -3.0, 4.0, -5.0]);
     }
 }
