@@ -122,6 +122,14 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
 }
 
 #[test]
+fn a_length_of_the_body_that_is_none_is_named() {
+    let manifest = "vehicle = \"box\"\n[body]\nlength = 1.5\nwidth = -1.4\ndraft = 0.2\nmass = 280.0\n\
+        displaced_volume = 0.07\ncenter_of_mass = [0.0, 0.0, 0.0]\n";
+    let error = read(manifest, &[("a.csv", "t,vx,vy,vz,wx,wy,wz,depth\n")]).expect_err("refused").to_string();
+    assert!(error.contains("body.width"), "{error}");
+}
+
+#[test]
 fn missing_optional_columns_have_their_defaults_and_acceleration_is_that_of_the_vehicle() {
     // a steady turn: the velocity in the body frame is constant, and yet the vehicle accelerates to the left
     let trial = trial(&[("wz", &|_| 0.5)]);

@@ -157,8 +157,14 @@ impl Manifest {
         let stated = |key: &str, value: Option<f64>| value.map(|value| (key.to_owned(), value));
         let of_body = self.body.iter().flat_map(|body| {
             let Body { length, width, draft, mass, displaced_volume, center_of_mass: _ } = *body;
-            [length, width, draft, mass, displaced_volume]
-                .map(|value| ("a number of [body]".to_owned(), value))
+            [
+                ("length", length),
+                ("width", width),
+                ("draft", draft),
+                ("mass", mass),
+                ("displaced_volume", displaced_volume),
+            ]
+            .map(|(key, value)| (format!("body.{key}"), value))
         });
         let lengths =
             self.nominal_depth.iter().map(|(name, value)| (format!("nominal_depth.{name}"), *value));
