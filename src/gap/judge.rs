@@ -16,7 +16,7 @@ use super::design::{Design, Fitted};
 use super::general::General;
 use super::noise::Floor;
 use super::rates::mean_square;
-use super::robust::{Error, contribution, errors, group, of_column, shadow};
+use super::robust::{Error, contribution, errors, group, of_column, shadow, total};
 use super::series::Series;
 use super::shared::{exceeds_noise, outlasts_noise};
 use super::statistics::deviate_of;
@@ -33,7 +33,7 @@ const MOST_FOLDS: f64 = 0.75;
 /// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
 /// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
 const MOST_SCATTER: f64 = 0.75;
-/// A shifted column that still points the same way is no placebo.
+/// A shifted sum that still points the same way is no placebo.
 const SAME_DIRECTION: f64 = 0.9;
 
 /// An effect of a set: its candidate, and the columns that are in use with their coefficients.
@@ -155,7 +155,7 @@ impl<'a> Judge<'a> {
         let before = self.design.solve(&base)?.1;
         let mut first = None;
         for &(_, candidate) in ranked.iter().take(2) {
-            let judged = self.judge_form(set, &base, before, candidate)?;
+            let Some(judged) = self.judge_form(set, &base, before, candidate) else { continue };
             if judged.refused.is_none() {
                 return Some(judged);
             }
@@ -382,23 +382,22 @@ impl<'a> Judge<'a> {
         let residual = design.residual(&base, &beta);
         let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
         let all: Vec<usize> = base.iter().chain(&own).copied().collect();
-        let real = before - design.solve(&all)?.1;
+        let (fitted, after) = design.solve(&all)?;
+        let sum = total(design, &own, &fitted.as_slice()[base.len()..]);
         let mut random = Random::new(self.config.seed ^ 0x9e37);
         let mut strongest: f64 = 0.0;
         for _ in 0..self.config.placebos {
             let order = self.shifted(&mut random);
-            let columns: Vec<DVector<f64>> = own
-                .iter()
-                .map(|&c| DVector::from_iterator(order.len(), order.iter().map(|&r| design.x[(r, c)])))
-                .collect();
-            let alike = columns.iter().zip(&own).any(|(shifted, &c)| {
-                let original = design.x.column(c);
-                shifted.dot(&original) / (shifted.norm() * original.norm()).max(1e-12) > SAME_DIRECTION
-            });
+            let of = |column: &DVector<f64>| DVector::from_fn(order.len(), |row, _| column[order[row]]);
+            let shifted = of(&sum);
+            let alike = shifted.dot(&sum) / (shifted.norm() * sum.norm()).max(1e-12) > SAME_DIRECTION;
             if !alike {
+                let columns: Vec<DVector<f64>> =
+                    own.iter().map(|&c| of(&design.x.column(c).into_owned())).collect();
                 strongest = strongest.max(design.gain(&columns, &base, &residual));
             }
         }
+        let real = before - after;
         Some((real, strongest))
     }
 
