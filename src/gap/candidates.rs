@@ -113,7 +113,7 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
     }
 }
 
-/// From a trial on (first number 0), or from a time in every trial on (1).
+/// From a trial on in the order of recording (first number 0), or from a time in every trial on (1).
 fn steps(all: &[Series]) -> Vec<Shape> {
     let count = all.len();
     let stride = (count as f64 / 16.0).max(1.0);
@@ -129,7 +129,8 @@ fn steps(all: &[Series]) -> Vec<Shape> {
     steps
 }
 
-/// The columns of an effect in one trial: one a coefficient. `rank` is the trial's place in the order of recording.
+/// The columns of an effect in one trial: one a coefficient. `rank` is the trial's place in the order of recording: by
+/// stamps of one clock, or else by names.
 pub(super) fn columns(
     effect: Effect,
     shape: &Shape,

@@ -80,10 +80,10 @@ impl Config {
             ("coverage", self.coverage),
         ];
         let counts = [
-            ("folds", self.folds, 2),
-            ("least_trials", self.least_trials, 3),
-            ("most_effects", self.most_effects, 1),
-            ("bootstrap", self.bootstrap, 20),
+            ("folds", self.folds, 2, "2 or more"),
+            ("least_trials", self.least_trials, 3, "3 or more"),
+            ("most_effects", self.most_effects, 1, "1 or more"),
+            ("bootstrap", self.bootstrap, 20, "20 or more"),
         ];
         if let Some((key, value)) =
             positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
@@ -93,8 +93,8 @@ impl Config {
         if let Some((key, value)) = shares.into_iter().find(|(_, value)| !(0.0..1.0).contains(value)) {
             return Err(GapError::Config { key, value, expected: "from 0 to below 1" });
         }
-        match counts.into_iter().find(|(_, value, least)| value < least) {
-            Some((key, value, _)) => Err(GapError::Config { key, value: value as f64, expected: "larger" }),
+        match counts.into_iter().find(|(_, value, least, _)| value < least) {
+            Some((key, value, _, expected)) => Err(GapError::Config { key, value: value as f64, expected }),
             None => Ok(()),
         }
     }

@@ -225,16 +225,16 @@ pub(super) struct Fitted {
 
 impl Design {
     /// Fills the columns of every candidate; columns without any excitation are left out.
-    #[allow(clippy::too_many_arguments, reason = "called in two places, each with its own of all of them")]
+    #[allow(clippy::too_many_arguments, reason = "called in one place, which has all of them")]
     pub fn new(
         all: &[Series],
         trials: Vec<usize>,
+        rows: Rows,
         setting: &Setting,
         library: &[(Effect, Shape)],
         noise: RowNoise,
         config: &Config,
     ) -> Self {
-        let rows = Rows::new(all, &trials, &setting.components, config.block_s);
         let gap = |trial: usize| all[trial].gap.clone();
         let y = DVector::from_vec(to_rows(all, &rows, &trials, &setting.components, &noise, gap));
         let block_fold = folds(all, &rows, config);
@@ -444,7 +444,7 @@ impl Design {
         self.total.yy
     }
 
-    /// Least squares on all rows: scaled coefficients and the sum of squares left. `None` where columns say the same.
+    /// Least squares on all rows: scaled coefficients and the sum of squares left.
     pub fn solve(&self, columns: &[usize]) -> Option<(DVector<f64>, f64)> {
         solve(&self.total, None, columns)
     }
@@ -474,9 +474,8 @@ impl Design {
 
     /// Inverse of the normal matrix of some columns.
     pub fn inverse(&self, columns: &[usize]) -> Option<DMatrix<f64>> {
-        let count = columns.len();
-        let xx = DMatrix::from_fn(count, count, |i, j| self.total.xx[(columns[i], columns[j])]);
-        xx.cholesky().map(|factor| factor.inverse())
+        let xx = |i: usize, j: usize| self.total.xx[(columns[i], columns[j])];
+        ridged(columns.len(), xx).cholesky().map(|factor| factor.inverse())
     }
 
     /// Squared sine of the angle between a column and the space of others: 0 where it says nothing new.
@@ -506,14 +505,18 @@ fn solve(total: &Fold, without: Option<&Fold>, columns: &[usize]) -> Option<(DVe
     if count == 0 {
         return Some((DVector::zeros(0), yy));
     }
-    // a column that a fold alone excites has no length without it
-    let ridge = 1e-7 * (0..count).map(|i| xx(i, i)).fold(0.0, f64::max);
-    let matrix = DMatrix::from_fn(count, count, |i, j| xx(i, j) + if i == j { ridge } else { 0.0 });
     let right = DVector::from_fn(count, |i, _| xy(i));
-    let beta = matrix.cholesky()?.solve(&right);
+    let beta = ridged(count, xx).cholesky()?.solve(&right);
     let loss = yy - 2.0 * beta.dot(&right)
         + (0..count).map(|i| (0..count).map(|j| beta[i] * beta[j] * xx(i, j)).sum::<f64>()).sum::<f64>();
     Some((beta, loss))
+}
+
+/// A normal matrix with a ridge: a column that a fold alone excites has no length without it, and of two that are the same
+/// rounding must not decide whether there is a solution.
+fn ridged(count: usize, xx: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+    let ridge = 1e-7 * (0..count).map(|i| xx(i, i)).fold(0.0, f64::max);
+    DMatrix::from_fn(count, count, |i, j| xx(i, j) + if i == j { ridge } else { 0.0 })
 }
 
 fn fold_loss(fold: &Fold, columns: &[usize], beta: &DVector<f64>) -> f64 {
@@ -532,6 +535,14 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
+
+    #[test]
+    fn columns_that_are_the_same_have_an_inverse_whatever_rounding_does() {
+        for size in [1.0, 0.3, 1e4 / 3.0] {
+            assert!(ridged(2, |_, _| size).cholesky().is_some());
+            assert!(ridged(3, |i, j| size * (1.0 + i as f64) * (1.0 + j as f64)).cholesky().is_some());
+        }
+    }
 
     #[test]
     fn whitens_by_the_inverse_root_of_the_covariance_and_alone_the_zero_is_the_mean() {

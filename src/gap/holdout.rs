@@ -14,6 +14,8 @@ use super::{Config, Named};
 use crate::random::Random;
 use crate::trials::WRENCH;
 
+/// Fewest trials over which a bootstrap says how far a closure may be off.
+const ENOUGH: usize = 3;
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
@@ -28,7 +30,7 @@ pub struct Closure {
     pub noise_floor: f64,
     /// `(before - after) / (before - noise_floor)`; none where before is not above the floor.
     pub closure: Option<f64>,
-    /// 90 % interval of the closure, by a bootstrap over the trials kept back.
+    /// 90 % interval of the closure, by a bootstrap over the trials kept back; none of fewer than three.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -128,7 +130,7 @@ pub(super) fn closures(
         let (before, after) = sizes(&sums);
         let mut found: Vec<f64> = draws.iter().filter_map(|draw| share(sizes(draw))).collect();
         let interval = share((before, after))
-            .filter(|_| found.len() * 2 > draws.len())
+            .filter(|_| sums.len() >= ENOUGH && found.len() * 2 > draws.len())
             .map(|_| [quantile(&mut found.clone(), 0.05), quantile(&mut found, 0.95)]);
         Closure { before, after, noise_floor: floor, closure: share((before, after)), interval }
     };

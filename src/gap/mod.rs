@@ -131,6 +131,16 @@ pub enum GapError {
         /// The component.
         component: &'static str,
     },
+    /// Predictions of two makers.
+    #[error(
+        "{trial}.csv and {other}.csv differ in whether they have sim_ columns: one simulator must predict all trials"
+    )]
+    Predictions {
+        /// Name of the trial.
+        trial: String,
+        /// Name of the one that differs.
+        other: String,
+    },
     /// Too few to keep some back.
     #[error("{trials} trials are too few: the method keeps some back and needs at least {least}")]
     TooFewTrials {

@@ -165,7 +165,7 @@ pub(super) fn row_noise(
             let runs = series.runs.iter().filter(|run| run.len() >= 4);
             variances.extend(runs.map(|run| white_variance(&values[run.clone()])));
         }
-        let samples = all.iter().flat_map(|s| s.bins.iter().map(|bin| bin.len() as f64));
+        let samples = trials.iter().flat_map(|&trial| all[trial].bins.iter().map(|bin| bin.len() as f64));
         let per_bin = median(&mut samples.collect::<Vec<_>>()).max(1.0);
         let white = floors[component].sample / per_bin.sqrt();
         let bin = median(&mut variances).sqrt().max(white);

@@ -4,13 +4,13 @@ use super::base_drag::BaseDrag;
 use super::calibrate::calibrate;
 use super::candidates::{Setting, is_computed, is_inferred, shapes, unavailable};
 use super::compose::compose;
-use super::design::Design;
+use super::design::{Design, Rows};
 use super::general::General;
 use super::judge::Judge;
 use super::noise::{floors, row_noise, smoothing};
 use super::nonlinear::{refine, settle, through_sensors};
 use super::report::Report;
-use super::series::{Series, series};
+use super::series::{one_clock, series};
 use super::split::hold_out;
 use super::statistics::median;
 use super::verdict::{Found, floor_loss};
@@ -43,12 +43,17 @@ pub fn run(
     config: &Config,
 ) -> Result<Report, GapError> {
     config.check()?;
+    // neither the order in which effects are asked for nor that one is asked for twice must matter
+    let mut library = config.library.clone();
+    library.sort();
+    library.dedup();
+    let config = &Config { library, ..config.clone() };
     if trials.manifest.vehicle != body.name {
         let (trials, asked) = (trials.manifest.vehicle.clone(), body.name.clone());
         return Err(GapError::Vehicle { trials, asked });
     }
     let (mut all, components) = series(trials, body, predict, config)?;
-    let (naming, held) = hold_out(&all, config);
+    let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
     let floors = floors(&all, &naming, &trials.manifest, &components);
     let setting = Setting {
         body,
@@ -58,31 +63,26 @@ pub fn run(
         components,
         inferred: is_inferred(&trials.manifest),
         computed: is_computed(&trials.manifest),
-        one_clock: one_clock(&all),
+        one_clock: one_clock(all.iter().map(|series| series.t.as_slice())),
         first_stamp: all.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min),
     };
-    let mut library: Vec<Effect> = config
-        .library
-        .iter()
-        .copied()
-        .filter(|&effect| unavailable(effect, &setting, &trials.manifest, &all).is_none())
-        .collect();
-    // the order in which they were asked for must not matter
-    library.sort();
+    let available = |effect: &Effect| unavailable(*effect, &setting, &trials.manifest, &all).is_none();
+    let library: Vec<Effect> = config.library.iter().copied().filter(available).collect();
     let forms: Vec<(Effect, Shape)> = library
         .iter()
         .flat_map(|&effect| shapes(effect, &all, &setting).into_iter().map(move |shape| (effect, shape)))
         .collect();
+    let rows = Rows::new(&all, &naming, &setting.components, config.block_s);
+    if rows.blocks / 2 < config.folds {
+        let (blocks, block_s, folds) = (rows.blocks, config.block_s, config.folds);
+        return Err(GapError::TooShort { blocks, block_s, folds });
+    }
     // how much is noise is asked of trials that move
     calibrate(&mut all, 0);
     let passes = smoothing(&all, &naming);
     calibrate(&mut all, passes);
     let noise = row_noise(&all, &naming, &setting.components, &floors, passes);
-    let mut design = Design::new(&all, naming, &setting, &forms, noise, config);
-    if design.rows.blocks < 2 * config.folds {
-        let (blocks, block_s, folds) = (design.rows.blocks, config.block_s, config.folds);
-        return Err(GapError::TooShort { blocks, block_s, folds });
-    }
+    let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
     settle(&mut design, &all, &setting);
     let general = General::new(&all, &design, &setting.components);
     let gap_structure = general.structure(&design, &setting.components, &design.y);
@@ -114,11 +114,4 @@ fn rolling_radius(trials: &Trials) -> Option<f64> {
         radii.extend(rolling.filter(|(v, omega)| v.abs() > SLOWEST && v * omega > 0.0).map(|(v, w)| v / w));
     }
     (radii.len() >= LEAST).then(|| median(&mut radii))
-}
-
-/// True where the stamps of all trials are of one clock: they do not overlap.
-fn one_clock(all: &[Series]) -> bool {
-    let mut spans: Vec<(f64, f64)> = all.iter().map(|s| (s.t[0], s.t[s.t.len() - 1])).collect();
-    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
-    spans.windows(2).all(|pair| pair[1].0 > pair[0].1)
 }

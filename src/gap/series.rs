@@ -88,7 +88,7 @@ impl Series {
     }
 }
 
-/// Series by name, the components that are compared, and the trials that are only twins.
+/// Series in the order of recording without the trials that are only twins, and the components that are compared.
 pub(super) fn series(
     trials: &Trials,
     body: &Body,
@@ -98,9 +98,13 @@ pub(super) fn series(
     let twins: Vec<&String> = trials.manifest.measured.dry_twins.values().collect();
     let mut used: Vec<&Trial> = trials.trials.iter().filter(|trial| !twins.contains(&&trial.name)).collect();
     // the order in which the files came must not matter
-    used.sort_by(|a, b| a.name.cmp(&b.name));
+    in_order_of_recording(&mut used);
     let mut all = Vec::new();
     let mut common: Option<[bool; 6]> = None;
+    let simulated = |trial: &Trial| trial.simulated.iter().any(Option::is_some);
+    if let Some(trial) = used.iter().find(|trial| simulated(trial) != simulated(used[0])) {
+        return Err(GapError::Predictions { trial: trial.name.clone(), other: used[0].name.clone() });
+    }
     for trial in used {
         let (series, present) = of_trial(trials, trial, body, predict, config)?;
         if !present.contains(&true) {
@@ -118,6 +122,35 @@ pub(super) fn series(
     }
     let present = common.unwrap_or_default();
     Ok((all, (0..6).filter(|&c| present[c]).collect()))
+}
+
+/// By stamps where those of all trials are of one clock, else by name, in which numbers count as such: run9 comes before
+/// run10.
+fn in_order_of_recording(trials: &mut [&Trial]) {
+    trials.sort_by(|a, b| by_number(&a.name).cmp(&by_number(&b.name)).then(a.name.cmp(&b.name)));
+    if one_clock(trials.iter().map(|trial| trial.t.as_slice())) {
+        trials.sort_by(|a, b| a.t[0].total_cmp(&b.t[0]));
+    }
+}
+
+/// True where stamps are of one clock: those of one trial do not overlap with those of another.
+pub(super) fn one_clock<'a>(stamps: impl Iterator<Item = &'a [f64]>) -> bool {
+    let mut spans: Vec<(f64, f64)> = stamps.map(|t| (t[0], t[t.len() - 1])).collect();
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    spans.windows(2).all(|pair| pair[1].0 > pair[0].1)
+}
+
+/// Texts and numbers of a name in turn, a number with its digits: of two, that with fewer is the smaller.
+fn by_number<'a>(name: &'a str) -> Vec<(usize, &'a [u8])> {
+    let parts = name.as_bytes().chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit());
+    let of = |part: &'a [u8]| {
+        if !part[0].is_ascii_digit() {
+            return (0, part);
+        }
+        let number = &part[part.iter().take_while(|byte| **byte == b'0').count()..];
+        (number.len(), number)
+    };
+    parts.map(of).collect()
 }
 
 fn of_trial(
@@ -233,4 +266,16 @@ fn bins(t: &[f64], length: f64) -> (Vec<Range<usize>>, Vec<Range<usize>>) {
         runs.push(first..bins.len());
     }
     (bins, runs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_in_names_count_as_numbers() {
+        let mut names = ["run10-b", "run9", "run010-a", "run2", "run1", "dry", "run10"];
+        names.sort_by_key(|name| by_number(name));
+        assert_eq!(names, ["dry", "run1", "run2", "run9", "run10", "run010-a", "run10-b"]);
+    }
 }

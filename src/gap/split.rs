@@ -44,20 +44,36 @@ fn by_excitation(signatures: &[[f64; 6]]) -> Vec<(usize, usize)> {
     order
 }
 
-/// Trials for naming and those kept back. A kind of excitation that fewer than three trials have stays with naming.
-pub(super) fn hold_out(all: &[Series], config: &Config) -> (Vec<usize>, Vec<usize>) {
+/// Trials for naming and those kept back. A kind of excitation that fewer than three trials have stays with naming. Trials that
+/// repeat each other are kept back together, or what was named would be tested on what it was named by; a group that is more
+/// than what is to be kept back stays with naming.
+pub(super) fn hold_out(all: &[Series], repeats: &[Vec<String>], config: &Config) -> (Vec<usize>, Vec<usize>) {
     let signatures: Vec<[f64; 6]> = all.iter().map(|s| signature(&of_bins(s))).collect();
     let order = by_excitation(&signatures);
     let wanted = ((all.len() as f64 * config.held_out).round() as usize).clamp(1, all.len() - 2);
+    let together = |trial: usize| -> Vec<usize> {
+        let name = |trial: usize| &all[trial].name;
+        let groups: Vec<&Vec<String>> = repeats.iter().filter(|group| group.contains(name(trial))).collect();
+        let is_one =
+            |&other: &usize| other == trial || groups.iter().any(|group| group.contains(name(other)));
+        (0..all.len()).filter(is_one).collect()
+    };
     let sizes: Vec<usize> = (0..6).map(|class| order.iter().filter(|(c, _)| *c == class).count()).collect();
-    let free: Vec<usize> = order.iter().filter(|(class, _)| sizes[*class] >= 3).map(|(_, i)| *i).collect();
+    let fits = |trial: usize| together(trial).len() <= wanted;
+    let free: Vec<usize> =
+        order.iter().filter(|(class, i)| sizes[*class] >= 3 && fits(*i)).map(|(_, i)| *i).collect();
     let free = if free.len() > wanted { free } else { order.iter().map(|(_, i)| *i).collect() };
     let stride = free.len() as f64 / wanted as f64;
     let start = Random::new(config.seed ^ 0x4e1d).unit();
-    let mut held: Vec<usize> =
-        (0..wanted).map(|k| free[((k as f64 + start) * stride) as usize % free.len()]).collect();
+    let mut held: Vec<usize> = Vec::new();
+    for k in 0..wanted {
+        let pick = free[((k as f64 + start) * stride) as usize % free.len()];
+        let group = if fits(pick) { together(pick) } else { vec![pick] };
+        if !held.contains(&pick) && held.len() + group.len() <= wanted {
+            held.extend(group);
+        }
+    }
     held.sort_unstable();
-    held.dedup();
     let naming = (0..all.len()).filter(|index| !held.contains(index)).collect();
     (naming, held)
 }
