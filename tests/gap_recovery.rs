@@ -134,6 +134,10 @@ fn a_load_in_shallow_water_alone_is_described_there_and_not_applied() {
     };
     let borders: Vec<f64> = report.regions.iter().filter_map(border).collect();
     assert!(borders.iter().any(|border| (0.1..0.2).contains(border)), "{:?}", report.regions);
+    // the fit to the region is no test of it, and counts its cuts; 7 of the trials are shallow
+    let fitted = report.regions.iter().find(|region| region.p_value.is_none()).expect("the one of the text");
+    assert!(fitted.trials <= 7 && report.regions_tried > 1000, "{fitted:?} {}", report.regions_tried);
+    assert!(report.regions.iter().all(|region| region.trials <= 7), "{:?}", report.regions);
 }
 
 #[test]
@@ -401,6 +405,85 @@ fn entry_loads_are_held_possible_beside_drag_of_the_same_heave() {
 }
 
 #[test]
+fn trials_are_in_the_order_of_their_numbers_or_of_one_clock() {
+    let step = |name: &dyn Fn(usize) -> String, start: &dyn Fn(usize) -> f64| {
+        let motions = motions(TRIALS, SAMPLES, 17);
+        let late = |index: usize| [0.0, 0.0, if index < 9 { 0.0 } else { 2.0 * NOISE[2] }, 0.0, 0.0, 0.0];
+        let added: Vec<Vec<[f64; 6]>> =
+            motions.iter().enumerate().map(|(i, m)| vec![late(i); m.len()]).collect();
+        let mut trials = trials(&motions, &added, &Noise::white(NOISE), 17);
+        for (index, trial) in trials.trials.iter_mut().enumerate() {
+            trial.name = name(index);
+            trial.t.iter_mut().for_each(|t| *t += start(index));
+        }
+        let report = run(&trials);
+        assert_eq!(names(&report), ["sensor_bias_step"], "{} {:?}", report.summary, report.rejected);
+    };
+    step(&|index| format!("run{}", index + 1), &|_| 0.0);
+    // names that say nothing, and a clock that does
+    step(&|index| format!("{}-run", (7 * index) % TRIALS), &|index| 10.0 * index as f64);
+}
+
+#[test]
+fn a_placebo_of_several_columns_counts_though_one_of_them_hardly_changes() {
+    // at one depth a trial the vertical force stays, and its gain is a constant
+    let (trials, _) = pushed(|motion| {
+        motion
+            .iter()
+            .map(planted::simulate)
+            .map(|sim| [0.3 * sim[0], 0.0, 0.004 * sim[2], 0.0, 0.0, 0.0])
+            .collect()
+    });
+    let library = vec![Effect::SensorGain];
+    let report = run_with(&trials, &Config { library, ..Config::default() });
+    assert_eq!(names(&report), ["sensor_gain"], "{} {:?}", report.summary, report.rejected);
+    let gain = &report.effects[0];
+    assert!(
+        gain.parameters.contains_key("fx") && gain.parameters.contains_key("fz"),
+        "{:?}",
+        gain.parameters
+    );
+    let [real, placebo] = gain.placebo;
+    assert!(placebo > 0.0 && placebo < real, "{:?}", gain.placebo);
+}
+
+#[test]
+fn trials_that_repeat_each_other_are_kept_back_together_and_two_have_no_interval() {
+    let (mut trials, _) = with(&["squat"], 3.0, 18);
+    let pair = |index: usize| vec![format!("run{index:02}"), format!("run{:02}", index + 10)];
+    trials.manifest.measured.repeats = (0..10).map(pair).collect();
+    let report = run(&trials);
+    let held = &report.gap.held_out_trials;
+    let number = |name: &String| name[3..].parse::<usize>().expect("a number");
+    let other = |name: &String| format!("run{:02}", (number(name) + 10) % 20);
+    assert!(held.len() >= 3 && held.iter().all(|name| held.contains(&other(name))), "{held:?}");
+    assert!(report.gap.held_out["all"].interval.is_some());
+    trials.manifest.measured.repeats.clear();
+    trials.trials.truncate(8);
+    let report = run(&trials);
+    assert_eq!(report.gap.held_out_trials.len(), 2);
+    let all = &report.gap.held_out["all"];
+    assert!(all.closure.is_some() && all.interval.is_none(), "{all:?}");
+}
+
+#[test]
+fn the_hash_tells_columns_and_their_names_apart() {
+    let (mut trials, _) = with(&["squat"], 3.0, 19);
+    trials.trials.truncate(6);
+    let hash = |trials: &Trials| run(trials).sources.trials;
+    let plain = hash(&trials);
+    assert_eq!(plain, hash(&trials));
+    let mut wheels = trials.clone();
+    wheels.trials[2].wheel_speeds[1] = Some(vec![3.0; SAMPLES]);
+    let mut turned = trials.clone();
+    turned.trials[2].angular_acceleration[7].z += 0.1;
+    let mut elsewhere = wheels.clone();
+    elsewhere.trials[2].wheel_speeds.swap(1, 2);
+    let hashes = [plain, hash(&wheels), hash(&turned), hash(&elsewhere)];
+    assert!((0..4).all(|i| (0..i).all(|j| hashes[i] != hashes[j])), "{hashes:?}");
+}
+
+#[test]
 fn a_force_of_no_effect_has_no_name() {
     for name in ["outside_sine", "outside_vibration"] {
         let report = run(&with(&[name], 3.0, 14).0);
@@ -468,9 +551,9 @@ fn the_order_of_the_trials_and_the_side_of_the_vehicle_do_not_matter() {
     let mut shuffled = trials.clone();
     shuffled.trials.reverse();
     assert_eq!(run(&shuffled), report);
-    let backwards = Config { library: Effect::ALL.into_iter().rev().collect(), ..Config::default() };
-    let turned = run_with(&trials, &backwards);
-    assert_eq!((turned.verdict, turned.effects), (report.verdict, report.effects.clone()));
+    let twice = Effect::ALL.into_iter().rev().chain([Effect::AddedMass]);
+    let backwards = Config { library: twice.collect(), ..Config::default() };
+    assert_eq!(run_with(&trials, &backwards), report);
     let mirrored = run(&mirrored(trials));
     assert_eq!((mirrored.verdict, names(&mirrored)), (report.verdict, names(&report)));
     for (a, b) in mirrored.effects.iter().zip(&report.effects) {
@@ -515,6 +598,15 @@ fn bad_input_is_named() {
     let mut other = good.clone();
     other.manifest.vehicle = "boat".into();
     assert!(matches!(run(&other), GapError::Vehicle { .. }));
+    let mut mixed = good.clone();
+    mixed.trials[4].simulated = Default::default();
+    assert_eq!(run(&mixed), GapError::Predictions { trial: "run04".into(), other: "run00".into() });
+    let settings = |config: Config| {
+        gap::run(&good, &body, &mut |_| Predicted::default(), &config).expect_err("refused").to_string()
+    };
+    let many = settings(Config { folds: usize::MAX, ..Config::default() });
+    assert!(many.contains("too few for"), "{many}");
+    assert_eq!(settings(Config { folds: 1, ..Config::default() }), "folds = 1 must be 2 or more");
     let mut short = with_dry_twins(1.0, 1.0, 0.0);
     let twin = short.trials.iter_mut().find(|trial| trial.name == "dry03").expect("a twin");
     twin.t.truncate(700);
@@ -523,7 +615,7 @@ fn bad_input_is_named() {
         matches!(&error, GapError::ShortTwin { trial, twin, .. } if trial == "run03" && twin == "dry03"),
         "{error}"
     );
-    let mut bodiless = good;
+    let mut bodiless = good.clone();
     bodiless.manifest.body = None;
     assert!(matches!(gap::body_of(&bodiless), Err(GapError::NoBody { .. })));
 }

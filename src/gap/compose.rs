@@ -21,7 +21,7 @@ use super::verdict::{Found, STRUCTURE};
 use super::{Named, locate};
 use crate::condition::Condition;
 use crate::effects::{self, Effect, Kind, Memory, Part};
-use crate::trials::{Trials, WRENCH};
+use crate::trials::{SIMULATED, Trials, WHEELS, WRENCH};
 
 fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
     let mut values = fit.values.iter();
@@ -74,7 +74,7 @@ pub(super) fn compose(
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
     let (regions, regions_tried) = match found.verdict {
         Verdict::NothingMissing => (Vec::new(), 0),
-        _ => locate::locate(all, &design.trials, gap_excess, found.gated.map(|gated| gated.limits), config),
+        _ => locate::locate(all, &design.trials, gap_excess, found.gated, config),
     };
     let excitation =
         detect::excitations(design, all, setting, &trials.manifest, &found.residual, &named, config);
@@ -92,7 +92,7 @@ pub(super) fn compose(
     let unexplained = unexplained(judge, &found, disproof);
     let gap = GapReport {
         held_out,
-        size: detect::sizes(all, judge.floors, &setting.components, config),
+        size: detect::sizes(all.iter(), judge.floors, &setting.components, config),
         shares: shares(judge, &found),
         floors: setting.components.iter().map(|&c| (WRENCH[c], judge.floors[c])).collect(),
         worse_regions: worse(&named, all, &held, setting, judge.floors, &regions),
@@ -116,6 +116,7 @@ pub(super) fn compose(
         validity: validity(all),
         trials: all.len(),
         samples: all.iter().map(|s| s.t.len()).sum(),
+        bin_s: config.bin_s,
         remarks,
         sources: Sources { trials: hash(trials), ..Sources::default() },
         traces: traces(&named, all, &held, setting, judge.floors),
@@ -283,15 +284,15 @@ fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<St
     Some(text)
 }
 
-/// Squared standardised gap of each bin less that of noise.
+/// Squared standardised gap of each bin less that of noise and of the zero of a trial.
 fn excess(all: &[Series], design: &Design, setting: &Setting, trial: usize) -> Vec<f64> {
     let series = &all[trial];
     let mut sum = vec![0.0; series.bins.len()];
     for &component in &setting.components {
         let values = series.binned(|sample| series.gap[sample][component]);
-        for (sum, value) in sum.iter_mut().zip(values) {
-            *sum += (value / design.noise.bin[component]).powi(2) - 1.0;
-        }
+        let bin = design.noise.bin[component];
+        let expected = 1.0 + (design.noise.offset[component] / bin).powi(2);
+        sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += (value / bin).powi(2) - expected);
     }
     sum
 }
@@ -313,22 +314,45 @@ fn validity(all: &[Series]) -> BTreeMap<&'static str, [f64; 2]> {
     quantities.into_iter().map(|(name, of)| (name, range(of))).collect()
 }
 
-/// Hash over all numbers, whatever the order of the trials.
+/// Hash over all numbers, whatever the order of the trials; each column with its name and length, so that no number passes for
+/// one of another.
 fn hash(trials: &Trials) -> String {
     let mut sorted: Vec<_> = trials.trials.iter().collect();
     sorted.sort_by(|a, b| a.name.cmp(&b.name));
     let mut digest = Sha256::new();
-    digest.update(trials.manifest.to_toml());
+    let mut add = |name: &str, count: usize, values: &mut dyn Iterator<Item = f64>| {
+        digest.update(format!("{name} {count}\n"));
+        values.for_each(|value| digest.update(value.to_le_bytes()));
+    };
+    let manifest = trials.manifest.to_toml();
+    add(&manifest, 0, &mut std::iter::empty());
     for trial in sorted {
-        digest.update(&trial.name);
-        let columns = [&trial.t, &trial.depth, &trial.density, &trial.roll, &trial.pitch, &trial.yaw];
-        let measured = trial.measured.iter().chain(&trial.simulated).flatten();
-        let stated = trial.other_forces.values().chain(trial.known_loads.values());
-        for column in columns.into_iter().chain(measured).chain(stated) {
-            column.iter().for_each(|value| digest.update(value.to_le_bytes()));
+        add(&trial.name, trial.len(), &mut std::iter::empty());
+        let columns = [
+            ("t", &trial.t),
+            ("depth", &trial.depth),
+            ("rho", &trial.density),
+            ("roll", &trial.roll),
+            ("pitch", &trial.pitch),
+            ("yaw", &trial.yaw),
+        ];
+        let wheels = WHEELS.into_iter().zip(&trial.wheel_speeds);
+        let wrenches =
+            WRENCH.into_iter().zip(&trial.measured).chain(SIMULATED.into_iter().zip(&trial.simulated));
+        let optional = wheels.chain(wrenches).filter_map(|(name, column)| Some((name, column.as_ref()?)));
+        let stated = trial.other_forces.iter().chain(&trial.known_loads);
+        let stated = stated.map(|(name, column)| (name.as_str(), column));
+        for (name, column) in columns.into_iter().chain(optional).chain(stated) {
+            add(name, column.len(), &mut column.iter().copied());
         }
-        for vectors in [&trial.velocity, &trial.current, &trial.angular_velocity, &trial.acceleration] {
-            vectors.iter().flat_map(|v| v.iter()).for_each(|value| digest.update(value.to_le_bytes()));
+        for (name, vectors) in [
+            ("v", &trial.velocity),
+            ("c", &trial.current),
+            ("w", &trial.angular_velocity),
+            ("a", &trial.acceleration),
+            ("al", &trial.angular_acceleration),
+        ] {
+            add(name, vectors.len(), &mut vectors.iter().flat_map(|v| v.iter().copied()));
         }
     }
     digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()

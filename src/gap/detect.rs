@@ -37,16 +37,16 @@ pub struct GapSize {
     pub above_floor: bool,
 }
 
-/// The gap of each component.
-pub(super) fn sizes(
-    all: &[Series],
+/// The gap of each component in some trials.
+pub(super) fn sizes<'a>(
+    trials: impl Iterator<Item = &'a Series> + Clone,
     floors: &[Floor; 6],
     components: &[usize],
     config: &Config,
 ) -> BTreeMap<&'static str, GapSize> {
     let of = |&component: &usize| {
-        let squares: Vec<(f64, f64)> = all
-            .iter()
+        let squares: Vec<(f64, f64)> = trials
+            .clone()
             .map(|s| (s.gap.iter().map(|gap| gap[component].powi(2)).sum(), s.gap.len() as f64))
             .collect();
         let mut random = Random::new(config.seed ^ 0xde7ec7);

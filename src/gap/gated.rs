@@ -33,6 +33,8 @@ pub(super) struct Gated {
     pub limits: Limits,
     /// Share of the gap above the floor that it explains there.
     pub share: f64,
+    /// Cuts that were tried, of all effects.
+    pub tried: usize,
 }
 
 /// The effect and region that explain most of the gap, where one limit or more is worth it.
@@ -46,18 +48,19 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
         let columns: Vec<usize> = candidate.columns.iter().map(|(column, _)| *column).collect();
         let bins = sums(design, &columns);
         let Some(whole_sum) = total(bins.iter()) else {
-            return Gated { effect: candidate.effect, limits: OPEN, share: 0.0 };
+            return Gated { effect: candidate.effect, limits: OPEN, share: 0.0, tried: 0 };
         };
         let ridge = RIDGE * whole_sum.xx.diagonal().max();
         let mut found = (OPEN, whole_sum.gain(ridge));
+        let mut tried = 0;
         for _ in 0..MOST {
-            let Some(next) = best_limit(&bins, &places, &found.0, ridge) else { break };
+            let Some(next) = best_limit(&bins, &places, &found.0, ridge, &mut tried) else { break };
             if next.1 < found.1 + WORTH * whole {
                 break;
             }
             found = next;
         }
-        Gated { effect: candidate.effect, limits: found.0, share: found.1 / whole }
+        Gated { effect: candidate.effect, limits: found.0, share: found.1 / whole, tried }
     };
     // what remembers, or begins in the middle of the trials, has a border of its own
     let bordered = |effect: Effect| effect.has_memory() || effect == Effect::SensorBiasStep;
@@ -65,9 +68,10 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
         .candidates
         .iter()
         .filter(|candidate| library.contains(&candidate.effect) && !bordered(candidate.effect));
-    let best =
-        candidates.map(one).max_by(|a, b| a.share.total_cmp(&b.share).then(b.effect.cmp(&a.effect)))?;
-    (best.limits != OPEN && best.share > EXPLAINED).then_some(best)
+    let found: Vec<Gated> = candidates.map(one).collect();
+    let tried = found.iter().map(|gated| gated.tried).sum();
+    let best = found.into_iter().max_by(|a, b| a.share.total_cmp(&b.share).then(b.effect.cmp(&a.effect)))?;
+    (best.limits != OPEN && best.share > EXPLAINED).then_some(Gated { tried, ..best })
 }
 
 /// Normal equations of one bin.
@@ -110,7 +114,13 @@ impl Sum {
 }
 
 /// The limit to add to a region with which the effect explains most, and what it explains then.
-fn best_limit(bins: &[Sum], places: &[Features], limits: &Limits, ridge: f64) -> Option<(Limits, f64)> {
+fn best_limit(
+    bins: &[Sum],
+    places: &[Features],
+    limits: &Limits,
+    ridge: f64,
+    tried: &mut usize,
+) -> Option<(Limits, f64)> {
     let mut best: Option<(Limits, f64)> = None;
     for feature in 0..FEATURES_USED {
         let mut order: Vec<usize> = (0..bins.len()).filter(|&bin| inside(limits, &places[bin])).collect();
@@ -132,11 +142,12 @@ fn best_limit(bins: &[Sum], places: &[Features], limits: &Limits, ridge: f64) ->
             let Some(low) = &below else { continue };
             let high = Sum { xx: &whole.xx - &low.xx, xy: &whole.xy - &low.xy };
             let at = 0.5 * (places[bin][feature] + next);
+            *tried += 1;
             for (end, gain) in [(1, low.gain(ridge)), (0, high.gain(ridge))] {
                 if best.as_ref().is_none_or(|(_, most)| gain > *most) {
-                    let mut tried = *limits;
-                    tried[feature][end] = at;
-                    best = Some((tried, gain));
+                    let mut cut = *limits;
+                    cut[feature][end] = at;
+                    best = Some((cut, gain));
                 }
             }
         }

@@ -2,12 +2,16 @@
 //!
 //! Grown on one half of the trials by variance reduction of the squared standardised gap (Breiman and others, CART 1984),
 //! at most three conditions deep; what it claims is estimated on the other half (Athey and Imbens, PNAS 2016), where a split
-//! must hold again, and tested by giving each trial the gaps of another.
+//! must hold again, and tested by giving each trial the gaps of another. A region to which an effect was fitted (`gated`) stands
+//! beside them untested, since all trials took part in that.
+
+use std::collections::BTreeSet;
 
 use serde::Serialize;
 
 use super::Config;
 use super::features::{FEATURES, Features, of_bins};
+use super::gated::Gated;
 use super::series::Series;
 use crate::random::Random;
 
@@ -28,7 +32,8 @@ pub struct Region {
     pub place: String,
     /// The conditions as numbers: quantity, lower and upper limit.
     pub conditions: Vec<Condition>,
-    /// Share of the squared gap above the floor, estimated on trials that did not choose the region.
+    /// Share of the squared gap above the floor, estimated on trials that did not choose the region where there is a
+    /// probability of chance.
     pub share_of_gap: f64,
     /// Share of the samples.
     pub share_of_samples: f64,
@@ -36,8 +41,9 @@ pub struct Region {
     pub trials: usize,
     /// Standardised gap in it over that elsewhere, root mean square.
     pub contrast: f64,
-    /// Probability of such a contrast where the place means nothing.
-    pub p_value: f64,
+    /// Probability of such a contrast where the place means nothing; none where an effect was fitted to the region, on the
+    /// same trials.
+    pub p_value: Option<f64>,
 }
 
 /// One condition of a region.
@@ -71,12 +77,12 @@ pub(super) fn inside(limits: &Limits, features: &Features) -> bool {
 }
 
 /// Regions by share, and how many splits were tried. `excess` gives the standardised squared gap of each bin of a trial,
-/// less what noise alone would show; `known` is a box that a fit has found.
+/// less what noise alone would show; `fitted` is a region that a fit to all trials has found.
 pub(super) fn locate(
     all: &[Series],
     trials: &[usize],
     excess: impl Fn(usize) -> Vec<f64>,
-    known: Option<Limits>,
+    fitted: Option<Gated>,
     config: &Config,
 ) -> (Vec<Region>, usize) {
     let mut points = Vec::new();
@@ -92,7 +98,7 @@ pub(super) fn locate(
     if grow.is_empty() || check.is_empty() {
         return (Vec::new(), 0);
     }
-    let mut tried = 0;
+    let mut tried = fitted.map_or(0, |gated| gated.tried);
     let mut leaves = Vec::new();
     split(&grow, &check, OPEN, DEPTH, &mut leaves, &mut tried);
     let overall = mean(&grow);
@@ -100,11 +106,17 @@ pub(super) fn locate(
         let within: Vec<&Point> = grow.iter().filter(|p| inside(limits, &p.features)).copied().collect();
         mean(&within) > overall
     };
-    let mut boxes = merged(leaves.into_iter().filter(|limits| *limits != OPEN && ahead(limits)).collect());
-    boxes.extend(known);
+    let boxes = merged(leaves.into_iter().filter(|limits| *limits != OPEN && ahead(limits)).collect());
+    let points: Vec<&Point> = points.iter().collect();
     let mut random = Random::new(config.seed ^ 0x9e21);
-    let mut regions: Vec<Region> =
-        boxes.iter().filter_map(|limits| region(limits, &check, trials.len(), &mut random)).collect();
+    let mut tested = |limits: &Limits| {
+        let (region, difference) = region(limits, &check, &points)?;
+        let p_value = permuted(limits, &check, difference, &mut random);
+        (p_value <= SIGNIFICANCE).then_some(Region { p_value: Some(p_value), ..region })
+    };
+    let mut regions: Vec<Region> = boxes.iter().filter_map(&mut tested).collect();
+    regions
+        .extend(fitted.and_then(|gated| region(&gated.limits, &points, &points)).map(|(region, _)| region));
     regions.sort_by(|a, b| b.share_of_gap.total_cmp(&a.share_of_gap).then(a.place.cmp(&b.place)));
     regions.truncate(5);
     (regions, tried)
@@ -207,7 +219,8 @@ fn best_split(points: &[&Point], tried: &mut usize) -> Option<(usize, f64)> {
     best.filter(|(gain, ..)| *gain > 0.0).map(|(_, feature, value)| (feature, value))
 }
 
-fn region(limits: &Limits, check: &[&Point], trials: usize, random: &mut Random) -> Option<Region> {
+/// A region as some points have it with the trials of all that enter it, and how much larger the gap is in it.
+fn region(limits: &Limits, check: &[&Point], all: &[&Point]) -> Option<(Region, f64)> {
     let whole: f64 = check.iter().map(|p| p.excess).sum();
     let (within, without): (Vec<&Point>, Vec<&Point>) =
         check.iter().partition(|p| inside(limits, &p.features));
@@ -219,22 +232,18 @@ fn region(limits: &Limits, check: &[&Point], trials: usize, random: &mut Random)
     if here <= there.max(0.0) || share < 0.05 {
         return None;
     }
-    let p_value = permuted(limits, check, here - there, random);
-    if p_value > SIGNIFICANCE {
-        return None;
-    }
-    let mut entered: Vec<usize> = within.iter().map(|p| p.trial).collect();
-    entered.dedup();
-    let conditions = conditions(limits);
-    Some(Region {
+    let entered: BTreeSet<usize> =
+        all.iter().filter(|p| inside(limits, &p.features)).map(|p| p.trial).collect();
+    let region = Region {
         place: in_words(limits),
-        conditions,
+        conditions: conditions(limits),
         share_of_gap: share,
         share_of_samples: within.len() as f64 / check.len() as f64,
-        trials: (entered.len() * 2).min(trials),
+        trials: entered.len(),
         contrast: (here.max(0.0) / there.max(1e-6 * here)).sqrt(),
-        p_value,
-    })
+        p_value: None,
+    };
+    Some((region, here - there))
 }
 
 /// Share of permutations, in which a trial's gaps are those of another, with as large a difference.

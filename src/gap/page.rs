@@ -107,8 +107,9 @@ fn shares(report: &Report) -> String {
     }
     let mut text = format!(
         "<h2>What the gap is made of</h2><div class=\"bar\">{bar}</div><p class=\"legend\">{legend}</p>\
-         <p class=\"small\">Shares of the squared gap, in averages over a tenth of a second, each component against its \
-         noise.</p>\n"
+         <p class=\"small\">Shares of the squared gap, in averages over {} s, each component against its \
+         noise.</p>\n",
+        number(report.bin_s)
     );
     if let Some(left) = &report.gap.unexplained {
         let _ = writeln!(text, "<p>Left without a name: {}.</p>", escape(left));
@@ -233,9 +234,11 @@ fn held_out(report: &Report) -> String {
 }
 
 fn worst(report: &Report) -> Result<String, PlotError> {
-    let mut text = "<h2>The trials with the largest gap</h2><p class=\"small\">Measured minus predicted, in averages over a \
-                    tenth of a second; gray: two standard deviations of the noise of a point.</p>\n"
-        .to_owned();
+    let mut text = format!(
+        "<h2>The trials with the largest gap</h2><p class=\"small\">Measured minus predicted, in averages over {} s; gray: two \
+         standard deviations of the noise of a point.</p>\n",
+        number(report.bin_s)
+    );
     for trace in &report.traces {
         let held = report.gap.held_out_trials.contains(&trace.trial);
         let part = if held { "took no part in naming" } else { "took part in naming" };
@@ -306,13 +309,13 @@ fn regions(report: &Report) -> String {
             percent(region.share_of_samples),
             region.trials.to_string(),
             number(region.contrast),
-            number(region.p_value),
+            region.p_value.map_or_else(|| "–".into(), number),
         ]
     });
     let heads = ["where", "share of gap", "share of samples", "trials", "times the gap elsewhere", "p"];
     format!(
-        "<h2>Where the gap is</h2>{}<p class=\"small\">Found on one half of the trials, estimated on the other; {} splits were \
-         tried.</p>\n",
+        "<h2>Where the gap is</h2>{}<p class=\"small\">Found on one half of the trials, estimated on the other; without a p \
+         fitted to all of them. {} splits were tried.</p>\n",
         table(&heads, NO_PAPER, rows),
         report.regions_tried
     )

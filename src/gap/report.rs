@@ -162,6 +162,8 @@ pub struct Report {
     pub trials: usize,
     /// Samples used.
     pub samples: usize,
+    /// Length of the bins over which samples were averaged [s].
+    pub bin_s: f64,
     /// What one should know.
     pub remarks: Vec<String>,
     /// Hashes.

@@ -129,7 +129,10 @@ impl Found {
         let kept = lasting(design, &design.y);
         let moving = lasting(design, &without_zeros(design, &design.y));
         // a load that was computed has no noise that hangs together and could pass for a gap
-        let above = || sizes(all, judge.floors, &setting.components, config).values().any(|s| s.above_floor);
+        let naming = design.trials.iter().map(|&trial| &all[trial]);
+        let above = || {
+            sizes(naming.clone(), judge.floors, &setting.components, config).values().any(|s| s.above_floor)
+        };
         setting.computed && above()
             || structure.deviate > STRUCTURE && size > least
             || deviate > bar && energy > 2.0 * least.max(0.5)

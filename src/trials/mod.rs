@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method, component_of};
 pub use table::{Table, csv_text};
-pub use trial::{Gap, Trial, WHEELS, WRENCH};
+pub use trial::{Gap, SIMULATED, Trial, WHEELS, WRENCH};
 pub use write::{Columns, write};
 
 /// Why measured data was refused. The message names the file, and the row and column where there is one.

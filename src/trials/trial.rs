@@ -12,12 +12,13 @@ use crate::condition::{Condition, FRESH_WATER, GroundContact};
 use crate::frame::{Vec3, up_from_roll_pitch};
 use crate::signal::{median_step, pieces};
 
-/// Components of a measured wrench; another simulator's have the prefix `sim_`.
+/// Components of a measured wrench.
 pub const WRENCH: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
 /// Wheel speeds.
 pub const WHEELS: [&str; 4] = ["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"];
 
-const SIMULATED: [&str; 6] = ["sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
+/// Components of another simulator's wrench.
+pub const SIMULATED: [&str; 6] = ["sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
 /// Columns that every trial has.
 pub(super) const REQUIRED: [&str; 8] = ["t", "vx", "vy", "vz", "wx", "wy", "wz", "depth"];
 const OPTIONAL: [&str; 13] =
