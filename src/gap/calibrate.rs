@@ -9,6 +9,9 @@
 //! Of several forms, the record, the record smoothed over a quarter and half a second, and the bursts of the record, the one
 //! that keeps most of the signal is taken: of calibrated predictors it is the closest to the truth.
 
+use std::cell::OnceCell;
+use std::ops::Range;
+
 use super::design::smooth as passes;
 use super::rates::{Autocovariance, mean_square, mean_step, set_rate, smooth, window};
 use super::series::Series;
@@ -39,7 +42,8 @@ pub(super) fn calibrate(all: &mut [Series], times: usize) {
         let ends = !ends_are_noise(all, rate);
         let form = |series: &Series| WINDOWS.map(|window| Form::new(series, rate, window, times, ends));
         let forms: Vec<[Form; 3]> = all.iter().map(form).collect();
-        let noise = [0, 1, 2].map(|form| noise(all, &forms, form, times));
+        let signals = vec![OnceCell::new(); all.len()];
+        let noise = [0, 1, 2].map(|form| noise(all, &forms, &signals, form, times));
         for (series, forms) in all.iter_mut().zip(&forms) {
             let factors = forms.iter().zip(noise).map(|(form, noise)| (form, form.factor(noise)));
             let kept = |(form, factor): &(&Form, f64)| factor * factor * form.square;
@@ -123,7 +127,13 @@ fn ends_are_noise(all: &[Series], rate: usize) -> bool {
 
 /// Mean product of noise alone, which one instrument gives all trials: as it is where they are quiet, or as what does not
 /// last in them says where they never are.
-fn noise(all: &[Series], forms: &[[Form; 3]], form: usize, times: usize) -> f64 {
+fn noise(
+    all: &[Series],
+    forms: &[[Form; 3]],
+    signals: &[OnceCell<Autocovariance>],
+    form: usize,
+    times: usize,
+) -> f64 {
     /// Share of the median trial's product below which a stretch is quiet.
     const QUIET: f64 = 0.25;
     let of_form = || forms.iter().map(|trial| &trial[form]);
@@ -131,11 +141,12 @@ fn noise(all: &[Series], forms: &[[Form; 3]], form: usize, times: usize) -> f64 
     if quiet < QUIET * median(&mut of_form().map(|form| form.product).collect::<Vec<_>>()) {
         return quiet;
     }
-    let passing = all
-        .iter()
-        .zip(forms)
-        .map(|(series, trial)| trial[form].product - lasting(series, &trial[0].values, WINDOWS[form], times));
-    quiet.min(at_most(passing.collect()))
+    let of = |(trial, series): (usize, &Series)| {
+        let recorded = &forms[trial][0].values;
+        let signal = signals[trial].get_or_init(|| signal(series, recorded, times));
+        forms[trial][form].product - lasting(series, signal, WINDOWS[form], times)
+    };
+    quiet.min(at_most(all.iter().enumerate().map(of).collect()))
 }
 
 /// Upper bound of the middle of some values that scatter: their median and two of its standard errors.
@@ -186,13 +197,32 @@ fn bins_of(series: &Series, values: &[f64], times: usize) -> Vec<f64> {
     bins
 }
 
-/// Mean product of what the signal and the signal smoothed over a window become, from the signal's autocovariance.
-fn lasting(series: &Series, recorded: &[f64], length: Option<f64>, times: usize) -> f64 {
-    let step = mean_step(&series.t);
-    let samples = (series.bin_step() / step.max(1e-6)).round().max(1.0) as usize;
-    let window = length.map_or(1, |length| window(length, step));
-    let both_ways = samples * (2 * times + 1) + window / 2;
-    let signal = Autocovariance::new(&series.t, recorded, both_ways);
+/// The signal in a record, as far as any of the forms reaches.
+fn signal(series: &Series, recorded: &[f64], times: usize) -> Autocovariance {
+    let pieces: Vec<Range<usize>> = series.pieces().collect();
+    let longest = WINDOWS.map(|length| both_ways(series, length, times)).into_iter().max();
+    Autocovariance::new(mean_step(&series.t), &pieces, recorded, longest.unwrap_or_default())
+}
+
+/// Samples of a bin.
+fn samples_of(series: &Series) -> usize {
+    (series.bin_step() / mean_step(&series.t).max(1e-6)).round().max(1.0) as usize
+}
+
+/// Samples of a window over which a record is smoothed.
+fn window_of(series: &Series, length: Option<f64>) -> usize {
+    length.map_or(1, |length| window(length, mean_step(&series.t)))
+}
+
+/// Samples that bins after their passes reach to either side, and the window beyond.
+fn both_ways(series: &Series, length: Option<f64>, times: usize) -> usize {
+    samples_of(series) * (2 * times + 1) + window_of(series, length) / 2
+}
+
+/// Mean product of what the signal and the signal smoothed over a window become.
+fn lasting(series: &Series, signal: &Autocovariance, length: Option<f64>, times: usize) -> f64 {
+    let (samples, window) = (samples_of(series), window_of(series, length));
+    let both_ways = both_ways(series, length, times);
     let mut covariances: Vec<f64> = (0..=2 * both_ways).map(|i| signal.at(i.abs_diff(both_ways))).collect();
     if let Ok(smoothed) = SavitzkyGolay::new(window, 2).and_then(|filter| filter.smooth(&covariances)) {
         covariances = smoothed;

@@ -47,13 +47,10 @@ pub(super) fn compose(
     library: &[Effect],
 ) -> Report {
     let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
-    let fitted = fit(design, &found.members, all, setting, config);
     // nothing that does not fit is applied or shown as if it did
     let fits = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
-    let mut named = match &fitted {
-        Some(fitted) if fits => named(design, &found.members, fitted),
-        _ => Vec::new(),
-    };
+    let fitted = if fits { fit(design, &found.members, all, setting, config) } else { None };
+    let mut named = fitted.as_ref().map_or_else(Vec::new, |fitted| named(design, &found.members, fitted));
     let held_floors = floors_of(all, &held, judge.floors, &setting.components);
     let closures_of = |named: &[Named]| closures(named, all, &held, setting, &held_floors, config);
     let mut held_out = closures_of(&named);
@@ -131,7 +128,7 @@ fn names(judge: &Judge, set: &[Member]) -> Vec<&'static str> {
 
 fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) -> Vec<NamedEffect> {
     let design = judge.design;
-    let whole = (design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let whole = judge.missing();
     let mut first = 0;
     let mut effects = Vec::new();
     for (index, (member, one)) in found.members.iter().zip(named).enumerate() {
@@ -210,15 +207,15 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
 }
 
 fn rejected(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Rejected> {
-    let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let whole = judge.missing();
     let share = |gain: f64| (gain / whole).clamp(0.0, 1.0);
     let free = library.iter().filter(|effect| !found.members.iter().any(|m| judge.effect(m) == **effect));
     let mut all: Vec<Rejected> = free
         .filter_map(|&effect| {
             let beside = judge.weighed(&found.members, effect)?;
-            let alone = judge.judge(&[], effect)?;
+            let alone = judge.design.empty_loss() - judge.ranked(&[], effect)?.first()?.0;
             let (why, name) = (beside.refused, effect.name());
-            Some(Rejected { name, why, share_of_gap: share(beside.gain), share_alone: share(alone.gain) })
+            Some(Rejected { name, why, share_of_gap: share(beside.gain), share_alone: share(alone) })
         })
         .collect();
     all.sort_by(|a, b| b.share_alone.total_cmp(&a.share_alone).then(a.name.cmp(b.name)));
@@ -249,7 +246,7 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
 
 fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<String> {
     let left = &found.left;
-    let whole = (judge.design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let whole = judge.missing();
     let share = left.gain / whole;
     let matters = match found.verdict {
         Verdict::NothingMissing => false,

@@ -63,6 +63,11 @@ pub(super) struct Rows {
 }
 
 impl Rows {
+    /// What a list by trial must be as long as: the trials that are kept back have numbers as well.
+    pub fn past_last_trial(&self) -> usize {
+        self.block_trial.iter().max().map_or(0, |last| last + 1)
+    }
+
     /// Rows of the trials listed, cut into blocks of about `block_s`.
     pub fn new(all: &[Series], trials: &[usize], components: &[usize], block_s: f64) -> Self {
         let mut this = Self {
@@ -225,7 +230,6 @@ pub(super) struct Fitted {
 
 impl Design {
     /// Fills the columns of every candidate; columns without any excitation are left out.
-    #[allow(clippy::too_many_arguments, reason = "called in one place, which has all of them")]
     pub fn new(
         all: &[Series],
         trials: Vec<usize>,
@@ -268,6 +272,22 @@ impl Design {
         this
     }
 
+    /// Place of a trial among those of the design.
+    pub fn place(&self, trial: usize) -> usize {
+        self.trials.iter().position(|&t| t == trial).unwrap_or_default()
+    }
+
+    /// Columns of each trial, a value a sample.
+    fn raw_columns(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        effect: Effect,
+        shape: &Shape,
+    ) -> Vec<Vec<Column>> {
+        self.trials.iter().map(|&trial| columns(effect, shape, &all[trial], trial, setting)).collect()
+    }
+
     fn candidate_columns(
         &self,
         all: &[Series],
@@ -275,12 +295,10 @@ impl Design {
         effect: Effect,
         shape: &Shape,
     ) -> Vec<(usize, Vec<f64>, f64)> {
-        let raw: Vec<Vec<Column>> =
-            self.trials.iter().map(|&trial| columns(effect, shape, &all[trial], trial, setting)).collect();
-        let place = |trial: usize| self.trials.iter().position(|&t| t == trial).unwrap_or_default();
+        let raw = self.raw_columns(all, setting, effect, shape);
         let mut found = Vec::new();
         for (coefficient, _) in effect.coefficients().iter().enumerate() {
-            let of = |trial: usize| raw[place(trial)][coefficient].clone();
+            let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
             let mut column = to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
             let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();
             if scale > 1e-9 && scale.is_finite() {
@@ -302,15 +320,27 @@ impl Design {
         DVector::from_vec(to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of))
     }
 
-    /// A column that was not smoothed, in the units of the one that was.
-    pub fn unsmoothed_column(&self, all: &[Series], setting: &Setting, wanted: usize) -> DVector<f64> {
-        let holds = |candidate: &&Candidate| candidate.columns.iter().any(|(column, _)| *column == wanted);
-        let Some(Candidate { effect, shape, columns: own }) = self.candidates.iter().find(holds) else {
-            return DVector::zeros(self.y.len());
-        };
-        let coefficient = own.iter().find(|(column, _)| *column == wanted).map_or(0, |(_, c)| *c);
-        let of = |trial: usize| columns(*effect, shape, &all[trial], trial, setting)[coefficient].clone();
-        self.unsmoothed(all, setting, &of) / self.scale[wanted]
+    /// Columns that were not smoothed, in the units of those that were.
+    pub fn unsmoothed_columns(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        wanted: &[usize],
+    ) -> Vec<DVector<f64>> {
+        let mut found = vec![DVector::zeros(self.y.len()); wanted.len()];
+        for candidate in &self.candidates {
+            let place = |(column, _): &(usize, usize)| wanted.iter().position(|w| w == column);
+            let own: Vec<_> = candidate.columns.iter().filter_map(|own| Some((place(own)?, *own))).collect();
+            if own.is_empty() {
+                continue;
+            }
+            let raw = self.raw_columns(all, setting, candidate.effect, &candidate.shape);
+            for (place, (column, coefficient)) in own {
+                let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
+                found[place] = self.unsmoothed(all, setting, &of) / self.scale[column];
+            }
+        }
+        found
     }
 
     /// Gives a candidate another shape.

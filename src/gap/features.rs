@@ -64,7 +64,7 @@ pub(super) fn time_in_water(series: &Series) -> Vec<f64> {
 
 /// A target that has the rows of the design without the mean of each component in each trial.
 pub(super) fn without_zeros(design: &Design, target: &DVector<f64>) -> DVector<f64> {
-    let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+    let trials = design.rows.past_last_trial();
     let mut zero = vec![[(0.0, 0.0); 6]; trials];
     for (row, place) in design.rows.rows.iter().enumerate() {
         let (sum, count) = &mut zero[place.trial][place.component];

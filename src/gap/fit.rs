@@ -247,8 +247,7 @@ fn clusters(design: &Design, columns: &[usize], moved: &[DVector<f64>]) -> Clust
     }
     let mut trials: Vec<Group> = design.trials.iter().map(|_| empty()).collect();
     for (block, group) in blocks.iter().enumerate() {
-        let place = design.trials.iter().position(|&t| t == design.rows.block_trial[block]);
-        let trial = &mut trials[place.unwrap_or_default()];
+        let trial = &mut trials[design.place(design.rows.block_trial[block])];
         trial.xx += &group.xx;
         trial.xy += &group.xy;
     }

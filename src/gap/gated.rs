@@ -40,7 +40,7 @@ pub(super) struct Gated {
 /// The effect and region that explain most of the gap, where one limit or more is worth it.
 pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
     let design = judge.design;
-    let whole = (design.empty_loss() - judge.floor_loss).max(f64::MIN_POSITIVE);
+    let whole = judge.missing();
     let features: Vec<Vec<Features>> = judge.all.iter().map(of_bins).collect();
     let places: Vec<Features> =
         design.rows.rows.iter().step_by(design.rows.width).map(|row| features[row.trial][row.bin]).collect();

@@ -1,6 +1,6 @@
 //! Whether there is structure in a gap, whatever its name: a regression on many smooth functions of the state.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::candidates::Column;
 use super::design::{Design, to_rows};
@@ -9,10 +9,18 @@ use super::series::Series;
 use super::statistics::quantile;
 
 /// A general model of the gap that knows no effect: many smooth functions of the state, apart for each component. What it
-/// predicts of blocks that it has not seen is structure, whatever its name.
+/// predicts of trials that it has not seen is structure, whatever its name.
 #[derive(Debug, Clone)]
 pub(super) struct General {
     columns: Vec<Smooth>,
+    /// The functions of what a model is told, factored, for each component in the order of a bin's rows.
+    told: Vec<Option<Told>>,
+}
+
+#[derive(Debug, Clone)]
+struct Told {
+    x: DMatrix<f64>,
+    factor: Cholesky<f64, Dyn>,
 }
 
 /// One of the functions over all rows.
@@ -20,7 +28,7 @@ pub(super) struct General {
 struct Smooth {
     name: String,
     values: Vec<f64>,
-    /// True where it is one of what a model is told: velocity, depth, attitude.
+    /// True for a function of what a model is told: velocity, depth, attitude.
     told: bool,
 }
 
@@ -67,12 +75,21 @@ impl General {
                 add(format!("{name} near {middle:.2}"), told, &|s, i, _| height(quantity(s, i)));
             }
         }
-        Self { columns }
+        let width = design.rows.width;
+        let functions: Vec<&Smooth> = columns.iter().filter(|column| column.told).collect();
+        let of = |place: usize| {
+            let rows: Vec<usize> = (place..design.y.len()).step_by(width).collect();
+            let x = scaled(&functions, &rows);
+            let factor = ridged(x.tr_mul(&x), rows.len())?;
+            Some(Told { x, factor })
+        };
+        let told = (0..width).map(of).collect();
+        Self { columns, told }
     }
 
     /// Fits each component of `target`, which has the rows of the design.
     pub fn structure(&self, design: &Design, components: &[usize], target: &DVector<f64>) -> Structure {
-        let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+        let trials = design.rows.past_last_trial();
         let mut whole = Part { loss: 0.0, gains: vec![0.0; trials], shares: vec![0.0; self.columns.len()] };
         for &component in components {
             let rows: Vec<usize> =
@@ -98,36 +115,33 @@ impl General {
     }
 
     /// What smooth functions of what a model is told leave of a target that has the rows of the design.
-    pub fn untold(&self, target: &DVector<f64>, design: &Design) -> DVector<f64> {
-        let told: Vec<&Smooth> = self.columns.iter().filter(|column| column.told).collect();
+    pub fn untold(&self, target: &DVector<f64>) -> DVector<f64> {
         let mut left = target.clone();
-        for place in 0..design.rows.width {
-            let rows: Vec<usize> = (place..target.len()).step_by(design.rows.width).collect();
-            let x = scaled(&told, &rows);
-            let y = DVector::from_fn(rows.len(), |i, _| target[rows[i]]);
-            let Some(beta) = ridge(x.tr_mul(&x), &x.tr_mul(&y), rows.len()) else { continue };
-            let rest = &y - &x * beta;
-            rows.iter().zip(rest.iter()).for_each(|(&row, value)| left[row] = *value);
+        let width = self.told.len();
+        for (place, told) in self.told.iter().enumerate() {
+            let Some(Told { x, factor }) = told else { continue };
+            let y = DVector::from_fn(x.nrows(), |i, _| target[place + i * width]);
+            let rest = &y - x * factor.solve(&x.tr_mul(&y));
+            rest.iter().enumerate().for_each(|(i, value)| left[place + i * width] = *value);
         }
         left
     }
 
     /// The rows of one component.
     fn part(&self, design: &Design, target: &DVector<f64>, rows: &[usize]) -> Part {
-        let trials = design.rows.block_trial.iter().max().map_or(0, |last| last + 1);
+        let trials = design.rows.past_last_trial();
         let folds = design.block_fold.iter().max().map_or(1, |last| last + 1);
         // whole trials are left out: parts of one would teach the zero of the others
-        let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
         let fold_of_trial: Vec<usize> =
-            (0..trials).map(|trial| place(trial) % folds.min(design.trials.len())).collect();
+            (0..trials).map(|trial| design.place(trial) % folds.min(design.trials.len())).collect();
         let fold_of = |row: usize| fold_of_trial[design.rows.rows[row].trial];
         let columns: Vec<&Smooth> = self.columns.iter().collect();
         let x = scaled(&columns, rows);
         let y = DVector::from_fn(rows.len(), |i, _| target[rows[i]]);
         let (xx, xy) = (x.tr_mul(&x), x.tr_mul(&y));
         let count = columns.len();
-        let left = ridge(xx.clone(), &xy, rows.len())
-            .map_or(y.norm_squared(), |beta| (&y - &x * beta).norm_squared());
+        let left = ridged(xx.clone(), rows.len())
+            .map_or(y.norm_squared(), |factor| (&y - &x * factor.solve(&xy)).norm_squared());
         let shares = (0..count).map(|j| xy[j].powi(2) / xx[(j, j)].max(1e-12));
         let mut part = Part { loss: left, gains: vec![0.0; trials], shares: shares.collect() };
         for fold in 0..folds {
@@ -136,8 +150,8 @@ impl General {
             let own_y = DVector::from_fn(inside.len(), |i, _| y[inside[i]]);
             let (others, of_target) = (&xx - own.tr_mul(&own), &xy - own.tr_mul(&own_y));
             // one penalty for all: that of the whole component
-            let Some(beta) = ridge(others, &of_target, rows.len()) else { continue };
-            let left = &own_y - own * beta;
+            let Some(factor) = ridged(others, rows.len()) else { continue };
+            let left = &own_y - own * factor.solve(&of_target);
             for (i, &row) in inside.iter().enumerate() {
                 part.gains[design.rows.rows[rows[row]].trial] += own_y[i].powi(2) - left[i].powi(2);
             }
@@ -173,10 +187,10 @@ fn scaled(columns: &[&Smooth], rows: &[usize]) -> DMatrix<f64> {
     x
 }
 
-/// Least squares by the normal equations with a penalty of [`RIDGE`] a row.
-fn ridge(mut xx: DMatrix<f64>, xy: &DVector<f64>, rows: usize) -> Option<DVector<f64>> {
+/// The factored normal matrix with a penalty of [`RIDGE`] a row.
+fn ridged(mut xx: DMatrix<f64>, rows: usize) -> Option<Cholesky<f64, Dyn>> {
     (0..xx.ncols()).for_each(|i| xx[(i, i)] += RIDGE * rows as f64);
-    xx.cholesky().map(|factor| factor.solve(xy))
+    xx.cholesky()
 }
 
 /// Ridge over the square of a column: functions of the state that hardly differ.

@@ -107,6 +107,11 @@ impl<'a> Judge<'a> {
         Self { design, all, setting, config, floors, general, floor_loss, passed: RefCell::default() }
     }
 
+    /// Loss above the floor, which there is to explain.
+    pub fn missing(&self) -> f64 {
+        (self.design.empty_loss() - self.floor_loss).max(f64::MIN_POSITIVE)
+    }
+
     /// Columns of a set.
     pub fn columns(&self, set: &[Member]) -> Vec<usize> {
         set.iter().flat_map(|member| member.columns.iter().map(|(column, _)| *column)).collect()
@@ -181,8 +186,7 @@ impl<'a> Judge<'a> {
     /// What an effect beside a set must gain.
     fn least_gain(&self, set: &[Member], before: f64) -> f64 {
         let remaining = (before - self.floor_loss).max(0.0);
-        let whole = (self.design.empty_loss() - self.floor_loss).max(0.0);
-        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * whole };
+        let of_whole = if set.is_empty() { 0.0 } else { self.config.share_of_gap * self.missing() };
         f64::max(self.config.share_of_remaining * remaining, of_whole)
     }
 
@@ -266,11 +270,11 @@ impl<'a> Judge<'a> {
         if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
             return Some(Refusal::NotSignificant);
         }
-        if !self.relevant(member, base, fitted) {
-            return Some(Refusal::Irrelevant);
-        }
         if before - fitted.loss < self.least_gain(set, before) {
             return Some(Refusal::SmallShare);
+        }
+        if !self.relevant(member, base, fitted) {
+            return Some(Refusal::Irrelevant);
         }
         (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
     }
@@ -306,7 +310,7 @@ impl<'a> Judge<'a> {
         let Some(sum) = contribution(design, base, &own, &fitted.beta.as_slice()[base.len()..]) else {
             return false;
         };
-        let left = self.general.untold(&sum, design);
+        let left = self.general.untold(&sum);
         if left.norm_squared() < MOST * sum.norm_squared() {
             return false;
         }
@@ -502,13 +506,12 @@ impl<'a> Judge<'a> {
             true => residual.clone(),
             false => design.unsmoothed(trials, setting, &|trial| trials[trial].predicted.clone()),
         };
-        for (index, &column) in all.iter().enumerate() {
-            let column = design.unsmoothed_column(trials, setting, column);
+        for (index, column) in design.unsmoothed_columns(trials, setting, &all).iter().enumerate() {
             match index.checked_sub(base.len()) {
-                Some(own) => sum.axpy(mine[own], &column, 1.0),
+                Some(own) => sum.axpy(mine[own], column, 1.0),
                 None => {
-                    sum.axpy(-on_base[index], &column, 1.0);
-                    residual.axpy(-of_base[index], &column, 1.0);
+                    sum.axpy(-on_base[index], column, 1.0);
+                    residual.axpy(-of_base[index], column, 1.0);
                 }
             }
         }

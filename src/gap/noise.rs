@@ -4,6 +4,7 @@
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
 use super::design::{RowNoise, smooth};
+use super::rates::mean_step;
 use super::series::Series;
 use super::statistics::{median, noise_variance, white_variance};
 use crate::signal::interpolate;
@@ -99,8 +100,7 @@ fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -
 fn scales(t: &[f64]) -> u32 {
     /// What changes faster is no load [s].
     const FAST: f64 = 0.08;
-    let step = (t[t.len() - 1] - t[0]) / (t.len() - 1).max(1) as f64;
-    (FAST / step.max(1e-6)).log2().max(0.0) as u32
+    (FAST / mean_step(t).max(1e-6)).log2().max(0.0) as u32
 }
 
 /// The floors of some trials alone, where they come from the trials themselves: noise may differ from trial to trial.
@@ -146,8 +146,7 @@ fn half_difference(a: &Series, b: &Series, component: usize) -> f64 {
     0.5 * variance / differences.len().max(1) as f64
 }
 
-/// Noise of the rows, for weights: of bins by their own high-frequency part, of trials by what the manifest states or the
-/// scatter of the trials' means shows beyond it.
+/// Noise of the rows, for weights: of bins by their own high-frequency part, of trials by what the manifest states.
 pub(super) fn row_noise(
     all: &[Series],
     trials: &[usize],

@@ -1,9 +1,11 @@
 //! Rates of a motion that was differentiated: how much of them is signal, and smoothing where it is little.
 
+use std::ops::Range;
+
 use super::statistics::white_variance;
 use crate::condition::Condition;
 use crate::frame::Vec3;
-use crate::signal::{SavitzkyGolay, pieces};
+use crate::signal::SavitzkyGolay;
 
 /// Longer than the filters that differentiate a motion reach, shorter than a maneuver [s].
 const COHERENT: f64 = 0.35;
@@ -36,28 +38,29 @@ impl Coherence {
         self.signal * self.count > LEAST_SIGNAL * self.power
     }
 
-    /// Of the samples of a trial.
-    pub fn of(t: &[f64], value: impl Fn(usize) -> f64) -> Self {
+    /// Of the samples of a trial, in pieces without a hole.
+    pub fn of(t: &[f64], pieces: &[Range<usize>], value: impl Fn(usize) -> f64) -> Self {
         let values: Vec<f64> = (0..t.len()).map(value).collect();
         let step = mean_step(t);
-        let (power, count) = products(t, &values, 0);
+        let (power, count) = products(pieces, &values, 0);
         let mean = power / f64::max(count, 1.0);
-        let signal = Autocovariance::new(t, &values, 0).at(0).clamp(0.0, mean);
-        Self { power, covariance: products(t, &values, lag(COHERENT, step)).0, signal, count }
+        let signal = Autocovariance::new(step, pieces, &values, 0).at(0).clamp(0.0, mean);
+        Self { power, covariance: products(pieces, &values, lag(COHERENT, step)).0, signal, count }
     }
 }
 
 /// Autocovariance of the signal in a rate, by lag in samples: as recorded where the noise of one sample does not reach the
 /// other, and the even polynomial through one, one and a half and two such reaches before. One of the second degree loses a
 /// sixth of a change of speed that takes half a second, this one of the fourth a sixteenth.
+#[derive(Debug, Clone)]
 pub(super) struct Autocovariance(Vec<f64>);
 
 impl Autocovariance {
-    /// Up to a lag.
-    pub fn new(t: &[f64], values: &[f64], longest: usize) -> Self {
-        let reach = reach(mean_step(t));
+    /// Of values so many seconds apart, in pieces without a hole, up to a lag.
+    pub fn new(step: f64, pieces: &[Range<usize>], values: &[f64], longest: usize) -> Self {
+        let reach = reach(step);
         let mean = |lag: usize| {
-            let (sum, count) = products(t, values, lag);
+            let (sum, count) = products(pieces, values, lag);
             sum / f64::max(count, 1.0)
         };
         let beyond = [reach, reach + reach.div_ceil(2), 2 * reach].map(|lag| (lag as f64, mean(lag)));
@@ -81,9 +84,9 @@ fn lag(seconds: f64, step: f64) -> usize {
 }
 
 /// Sum and number of the products of values so many samples apart.
-fn products(t: &[f64], values: &[f64], lag: usize) -> (f64, f64) {
-    let pairs = pieces(t).into_iter().flat_map(|piece| {
-        let values = &values[piece];
+fn products(pieces: &[Range<usize>], values: &[f64], lag: usize) -> (f64, f64) {
+    let pairs = pieces.iter().flat_map(|piece| {
+        let values = &values[piece.clone()];
         values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b)
     });
     pairs.fold((0.0, 0.0), |(sum, count), product| (sum + product, count + 1.0))
@@ -114,8 +117,7 @@ fn turning(condition: &Condition) -> Vec3 {
 }
 
 /// Smooths rates that are noisy by local parabolas, which keep peaks.
-pub(super) fn smooth_rates(t: &[f64], conditions: &mut [Condition]) {
-    let pieces = pieces(t);
+pub(super) fn smooth_rates(t: &[f64], pieces: &[Range<usize>], conditions: &mut [Condition]) {
     for rate in 0..6 {
         let mut values: Vec<f64> = conditions.iter().map(|c| rates(c)[rate]).collect();
         let share = white_variance(&values) / mean_square(&values).max(f64::MIN_POSITIVE);
@@ -148,7 +150,7 @@ pub(super) fn mean_square(values: &[f64]) -> f64 {
 }
 
 /// Smooths a piece by local parabolas over so many seconds.
-pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: std::ops::Range<usize>, length: f64) {
+pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: Range<usize>, length: f64) {
     let odd = (piece.len() - 1) / 2 * 2 + 1;
     let window = window(length, mean_step(&t[piece.clone()])).min(odd);
     let smoothed = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
@@ -159,12 +161,12 @@ pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: std::ops::Range<usize
 
 /// Rate of the depth [m/s], smoothed over at most a third of a second: noise must not look like entry, nor smoothing take
 /// its peak off.
-pub(super) fn wetting_rate(t: &[f64], depth: &[f64]) -> Vec<f64> {
+pub(super) fn wetting_rate(t: &[f64], pieces: &[Range<usize>], depth: &[f64]) -> Vec<f64> {
     let mut rate = Vec::with_capacity(t.len());
-    for piece in pieces(t) {
-        let (times, depth) = (&t[piece.clone()], &depth[piece]);
+    for piece in pieces {
+        let (times, depth) = (&t[piece.clone()], &depth[piece.clone()]);
         let count = times.len();
-        let step = (times[count - 1] - times[0]) / (count.max(2) - 1) as f64;
+        let step = mean_step(times);
         let window = rate_window(depth, step).min((count.max(1) - 1) / 2 * 2 + 1);
         // jitter of the stamps moves the rate by less than noise does
         let derivative = SavitzkyGolay::new(window, 2.min(window.saturating_sub(1)))
@@ -190,6 +192,7 @@ fn rate_window(depth: &[f64], step: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::pieces;
 
     #[test]
     fn noise_that_a_filter_made_smooth_is_told_from_a_maneuver() {
@@ -200,7 +203,8 @@ mod tests {
             SavitzkyGolay::new(9, 2).and_then(|f| f.derivative(&white, 1, 0.009)).expect("long enough");
         let noise = filtered.iter().map(|v| v * v).sum::<f64>() / filtered.len() as f64;
         let wave = |i: usize| 2.0 * noise.sqrt() * (3.0 * t[i]).sin();
-        let both = Coherence::of(&t, |i| filtered[i] + wave(i));
+        let pieces = pieces(&t);
+        let both = Coherence::of(&t, &pieces, |i| filtered[i] + wave(i));
         // the wave's mean square is twice that of the noise
         assert!((both.signal / (2.0 * noise) - 1.0).abs() < 0.05, "{both:?} {noise}");
         // changes of speed that take 0.6 s, as smooth as a driver's, every two seconds
@@ -209,9 +213,9 @@ mod tests {
             30.0 * (u * (1.0 - u)).powi(2)
         };
         let power = (0..t.len()).map(|i| change(i).powi(2)).sum::<f64>() / t.len() as f64;
-        let pushes = Coherence::of(&t, change);
+        let pushes = Coherence::of(&t, &pieces, change);
         assert!((pushes.signal / power - 1.0).abs() < 0.1, "{pushes:?} {power}");
-        let alone = Coherence::of(&t, |i| filtered[i]);
+        let alone = Coherence::of(&t, &pieces, |i| filtered[i]);
         assert!(alone.covariance / alone.power < 0.05 && alone.signal < 0.05 * noise, "{alone:?} {noise}");
     }
 }

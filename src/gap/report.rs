@@ -76,7 +76,7 @@ pub struct Rejected {
     pub why: Option<Refusal>,
     /// Share of the gap above the floor that it would take off beside the named effects.
     pub share_of_gap: f64,
-    /// The same alone.
+    /// What its best form takes off alone, with all of its columns.
     pub share_alone: f64,
 }
 

@@ -7,7 +7,8 @@ use super::robust::noise_of;
 use crate::effects::Effect;
 
 impl Judge<'_> {
-    /// Sets in which one effect is exchanged that explain as much within two standard errors, with no more numbers.
+    /// Sets in which one effect is exchanged that explain as much within two standard errors, with one number
+    /// more at most.
     pub fn alternatives(&self, set: &[Member], library: &[Effect]) -> Vec<Vec<Member>> {
         let columns = self.columns(set);
         let Some(fitted) = self.design.fit(&columns) else { return Vec::new() };
@@ -144,10 +145,10 @@ impl Judge<'_> {
         const FORMULA: (f64, [f64; 2]) = (0.1, [0.01, 0.05]);
         let (a, b) = (self.predictions(rival)?, self.predictions(set)?);
         let design = self.design;
-        let place = |trial: usize| design.trials.iter().position(|&t| t == trial).unwrap_or_default();
         let mut trials = vec![0.0; design.trials.len()];
         for (row, part) in design.rows.rows.iter().enumerate() {
-            trials[place(part.trial)] += (design.y[row] - a[row]).powi(2) - (design.y[row] - b[row]).powi(2);
+            trials[design.place(part.trial)] +=
+                (design.y[row] - a[row]).powi(2) - (design.y[row] - b[row]).powi(2);
         }
         let count = trials.len() as f64;
         let (sum, squares) = trials.iter().fold((0.0, 0.0), |(s, q), d| (s + d.abs(), q + d * d));

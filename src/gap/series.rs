@@ -192,17 +192,19 @@ fn of_trial(
         immersions.push(immersion);
         conditions.push(condition);
     }
+    let pieces = pieces(&trial.t);
     // before anything is smoothed, or noise would hang together as well
     let mut coherence = [Coherence::default(); 10];
     for axis in 0..3 {
-        coherence[axis] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis]);
-        coherence[axis + 3] = Coherence::of(&trial.t, |i| rates(&conditions[i])[axis + 3]);
-        coherence[axis + 7] = Coherence::of(&trial.t, |i| conditions[i].angular_velocity[axis]);
+        let of = |value: &dyn Fn(usize) -> f64| Coherence::of(&trial.t, &pieces, value);
+        coherence[axis] = of(&|i| rates(&conditions[i])[axis]);
+        coherence[axis + 3] = of(&|i| rates(&conditions[i])[axis + 3]);
+        coherence[axis + 7] = of(&|i| conditions[i].angular_velocity[axis]);
     }
     let recorded_rates = conditions.iter().map(rates).collect();
-    smooth_rates(&trial.t, &mut conditions);
-    let wetting_rate = wetting_rate(&trial.t, &trial.depth);
-    coherence[6] = Coherence::of(&trial.t, |i| wetting_rate[i]);
+    smooth_rates(&trial.t, &pieces, &mut conditions);
+    let wetting_rate = wetting_rate(&trial.t, &pieces, &trial.depth);
+    coherence[6] = Coherence::of(&trial.t, &pieces, |i| wetting_rate[i]);
     let known = of_columns(&trial.known_loads, count);
     let seen: Vec<[f64; 6]> =
         predicted.iter().zip(&known).map(|(p, k)| std::array::from_fn(|c| p[c] + k[c])).collect();
@@ -212,14 +214,14 @@ fn of_trial(
             _ => 0.0,
         })
     });
-    let (bins, runs) = bins(&trial.t, config.bin_s);
+    let (bins, runs) = bins(&trial.t, &pieces, config.bin_s);
     let series = Series {
         name: trial.name.clone(),
         gap: gap.collect(),
         other,
         channel_width: trials.manifest.channel_width_of(&trial.name),
         wetting_rate,
-        inertia: motion.as_ref().map(|motion| inertia(&trial.t, motion)),
+        inertia: motion.as_ref().map(|motion| inertia(&trial.t, &pieces, motion)),
         dry_rolling: motion.map_or_else(|| vec![0.0; count], |motion| motion.dry_rolling),
         coherence,
         wheels: (0..count)
@@ -244,17 +246,17 @@ fn of_trial(
 
 /// `a + g up` of each sample. Along an axis that is hardly accelerated there is noise alone, which would pull an error of the
 /// mass to 0.
-fn inertia(t: &[f64], motion: &Motion) -> Vec<Vec3> {
-    let moves = |axis: usize| Coherence::of(t, |i| motion.acceleration[i][axis]).is_a_motion();
+fn inertia(t: &[f64], pieces: &[Range<usize>], motion: &Motion) -> Vec<Vec3> {
+    let moves = |axis: usize| Coherence::of(t, pieces, |i| motion.acceleration[i][axis]).is_a_motion();
     let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(moves(axis))));
     let of = |(acceleration, up): (&Vec3, &Vec3)| acceleration.component_mul(&accelerated) + up * GRAVITY;
     motion.acceleration.iter().zip(&motion.up).map(of).collect()
 }
 
 /// Bins of about `length` within each run without a hole; at least one sample each.
-fn bins(t: &[f64], length: f64) -> (Vec<Range<usize>>, Vec<Range<usize>>) {
+fn bins(t: &[f64], pieces: &[Range<usize>], length: f64) -> (Vec<Range<usize>>, Vec<Range<usize>>) {
     let (mut bins, mut runs) = (Vec::new(), Vec::new());
-    for piece in pieces(t) {
+    for piece in pieces {
         let first = bins.len();
         let mut start = piece.start;
         while start < piece.end {

@@ -64,81 +64,71 @@ impl Found {
             design.solve(&columns).unwrap_or_else(|| (DVector::zeros(columns.len()), design.empty_loss()));
         let residual = design.residual(&columns, &beta);
         let left = general.structure(design, &judge.setting.components, &residual);
-        let whole = design.empty_loss() - judge.floor_loss;
-        let coverage = if whole > 0.0 { (design.empty_loss() - loss) / whole } else { 1.0 };
+        let coverage = (design.empty_loss() - loss) / judge.missing();
         let faults = members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
         let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
         let unresolved = members.iter().any(|member| {
             let candidate = &design.candidates[member.candidate];
             is_too_short(candidate.effect, &candidate.shape, judge.setting)
         });
-        let alternatives = judge.alternatives(members, library);
+        let missing = !members.is_empty() || is_structured(judge, gap_structure);
         // what one effect explains in a region, a sum of others can imitate everywhere; never the other way round, since a limit
         // takes from an effect
-        let gated = gated(judge, library).filter(|gated| gated.share > coverage + WORTH);
+        let gated = missing.then(|| gated(judge, library)).flatten();
+        let gated = gated.filter(|gated| gated.share > coverage + WORTH);
         let imitated = gated.is_some_and(|gated| {
             let same = matches!(members, [one] if judge.effect(one) == gated.effect);
             !same || gated.share > coverage + LIMITED
         });
-        let mut found = Self {
-            verdict: Verdict::Named,
-            members: members.to_vec(),
-            alternatives,
-            residual,
-            gated,
-            left,
-            loss,
+        let fits = !members.is_empty()
+            && coverage >= needed
+            && !unresolved
+            && !imitated
+            && !leaves_much(design, &residual);
+        let alternatives = if fits { judge.alternatives(members, library) } else { Vec::new() };
+        let verdict = match (missing, fits) {
+            (false, _) => Verdict::NothingMissing,
+            (_, false) => Verdict::NoCandidateFits,
+            _ if alternatives.is_empty() => Verdict::Named,
+            _ => Verdict::Ambiguous,
         };
-        found.verdict = if members.is_empty() {
-            match found.is_structured(judge, gap_structure) {
-                true => Verdict::NoCandidateFits,
-                false => Verdict::NothingMissing,
-            }
-        } else if coverage < needed || found.leaves_much(design) || unresolved || imitated {
-            Verdict::NoCandidateFits
-        } else if found.alternatives.is_empty() {
-            Verdict::Named
-        } else {
-            Verdict::Ambiguous
-        };
-        found
+        Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, loss }
     }
+}
 
-    /// True where much of what lasts of the gap is still there after the named effects.
-    fn leaves_much(&self, design: &Design) -> bool {
-        let (before, after) = (lasting(design, &design.y), lasting(design, &self.residual));
-        f64::min(before.deviate, after.deviate) > LASTS && after.energy > MUCH * before.energy
-    }
+/// True where much of what lasts of the gap is still there after the named effects.
+fn leaves_much(design: &Design, residual: &DVector<f64>) -> bool {
+    let (before, after) = (lasting(design, &design.y), lasting(design, residual));
+    f64::min(before.deviate, after.deviate) > LASTS && after.energy > MUCH * before.energy
+}
 
-    /// Predictable from the state, or lasting in a trial, and large enough to matter.
-    fn is_structured(&self, judge: &Judge, structure: &Structure) -> bool {
-        let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
-        let rows = design.y.len().max(1) as f64;
-        // gain per row is in bins' noise; relevance is in samples' noise
-        let relative = setting
-            .components
-            .iter()
-            .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].model) / design.noise.bin[c])
-            .fold(f64::INFINITY, f64::min);
-        let least = config.relevance * relative;
-        let size = (structure.gain / rows).sqrt();
-        // a force that comes and goes with no phase of its own shows in its energy alone
-        let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
-        let (deviate, energy) = energy(all, design, &unsmoothed);
-        let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
-        let kept = lasting(design, &design.y);
-        let moving = lasting(design, &without_zeros(design, &design.y));
-        // a load that was computed has no noise that hangs together and could pass for a gap
-        let naming = design.trials.iter().map(|&trial| &all[trial]);
-        let above = || {
-            sizes(naming.clone(), judge.floors, &setting.components, config).values().any(|s| s.above_floor)
-        };
-        setting.computed && above()
-            || structure.deviate > STRUCTURE && size > least
-            || deviate > bar && energy > 2.0 * least.max(0.5)
-            || kept.deviate > LASTS && kept.size > least
-            || moving.deviate > LOUD[0] && moving.size > LOUD[1].max(least)
-    }
+/// Predictable from the state, or lasting in a trial, and large enough to matter.
+fn is_structured(judge: &Judge, structure: &Structure) -> bool {
+    let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
+    let rows = design.y.len().max(1) as f64;
+    // gain per row is in bins' noise; relevance is in samples' noise
+    let relative = setting
+        .components
+        .iter()
+        .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].model) / design.noise.bin[c])
+        .fold(f64::INFINITY, f64::min);
+    let least = config.relevance * relative;
+    let size = (structure.gain / rows).sqrt();
+    // a force that comes and goes with no phase of its own shows in its energy alone
+    let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
+    let (deviate, energy) = energy(all, design, &unsmoothed);
+    let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
+    let kept = lasting(design, &design.y);
+    let moving = lasting(design, &without_zeros(design, &design.y));
+    // a load that was computed has no noise that hangs together and could pass for a gap
+    let naming = design.trials.iter().map(|&trial| &all[trial]);
+    let above =
+        || sizes(naming.clone(), judge.floors, &setting.components, config).values().any(|s| s.above_floor);
+    setting.computed && above()
+        || structure.deviate > STRUCTURE && size > least
+        || deviate > bar && energy > 2.0 * least.max(0.5)
+        || kept.deviate > LASTS && kept.size > least
+        || moving.deviate > LOUD[0] && moving.size > LOUD[1].max(least)
 }
 
 /// Loss that nothing explains: the whole library at once, or the general model, whichever leaves less.
