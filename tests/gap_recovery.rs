@@ -324,6 +324,39 @@ fn a_computed_wrench_has_no_fault_of_a_sensor_and_what_lies_above_the_model_s_er
 }
 
 #[test]
+fn an_effect_whose_fitted_shape_makes_it_impossible_is_not_named() {
+    // more water than the hull displaces: through the openings that are looked at first less of it would do
+    let motions = motions(TRIALS, SAMPLES, 28);
+    let flooded =
+        |motion: &Vec<State>| plant("hull_flooding", motion).into_iter().map(|w| w.map(|x| 1.35 * x));
+    let added: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| flooded(motion).collect()).collect();
+    let library = vec![Effect::HullFlooding];
+    let trials = trials(&motions, &added, &Noise::white(NOISE), 28);
+    let report = run_with(&trials, &Config { library, ..Config::default() });
+    assert_eq!(report.verdict, Verdict::NoCandidateFits, "{} {:?}", report.summary, report.effects);
+}
+
+#[test]
+fn an_interval_that_rests_on_the_blows_of_three_entries_is_as_wide_as_three_can_tell() {
+    let mut motions = motions(TRIALS, SAMPLES, 29);
+    for motion in &mut motions[6..] {
+        motion.iter_mut().for_each(|s| (s.depth, s.depth_rate, s.v.z) = (0.2, 0.0, 0.0));
+    }
+    let added: Vec<Vec<[f64; 6]>> = motions
+        .iter()
+        .map(|motion| plant("water_entry_slamming", motion).into_iter().map(|w| w.map(|x| 0.8 * x)).collect())
+        .collect();
+    let library = vec![Effect::WaterEntrySlamming];
+    let trials = trials(&motions, &added, &Noise::white(NOISE.map(|noise| 2.0 * noise)), 29);
+    let report = run_with(&trials, &Config { library, ..Config::default() });
+    assert_eq!(names(&report), ["water_entry_slamming"], "{} {:?}", report.summary, report.rejected);
+    let blow = &report.effects[0].parameters["vertical"];
+    // 90 % of a normal distribution are 3.3 standard deviations wide, of Student's with 4 degrees of freedom 4.3
+    let width = (blow.interval[1] - blow.interval[0]) / blow.std;
+    assert!(width > 3.8, "{width} {blow:?}");
+}
+
+#[test]
 fn faults_of_sensors_are_named_as_such_and_never_applied() {
     for (name, parameter, value) in [
         ("sensor_bias", "fz", 1.0),

@@ -1,8 +1,8 @@
 //! Parameters of the named effects, with intervals.
 //!
-//! Least squares on the rows of the design. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect, its ends
-//! moved out for the few that there are (the expanded percentile of Hesterberg, The American Statistician 2015), and what the
-//! formula itself leaves open.
+//! Least squares on the rows of the design. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect,
+//! its ends moved out for the few that there are (the expanded percentile of Hesterberg, The American Statistician 2015) and
+//! as far as the robust error reaches, and what the formula itself leaves open.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -125,13 +125,13 @@ pub(super) fn fit(
         let own = if i == j { (formula(used[i].0) * values[i]).powi(2) } else { 0.0 };
         own + leaks.iter().map(|leak| leak[i] * leak[j]).sum::<f64>() / (scale[i] * scale[j])
     };
-    // draws scatter by n - 1 of n of the variance, n the clusters that excite a column; and where the noise of all trials
-    // together says more, of those few it is no less
+    // draws scatter by n - 1 of n + 1 of the variance, n the clusters that excite a column; and where the noise of all
+    // trials together says more, of those few it is no less
     let freedom = |i: usize| f64::max(if few { errors[i].blocks } else { errors[i].trials } - 1.0, 1.0);
     let widening: Vec<f64> = (0..count)
         .map(|i| {
             let drawn = covariance_of(&draws, i).sqrt().max(f64::MIN_POSITIVE);
-            ((freedom(i) + 1.0) / freedom(i)).sqrt().max(errors[i].std / drawn)
+            ((freedom(i) + 2.0) / freedom(i)).sqrt().max(errors[i].std / drawn)
         })
         .collect();
     let covariance = DMatrix::from_fn(count, count, |i, j| {
@@ -274,17 +274,12 @@ fn sum_of(groups: &[Group], weights: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     (xx, xy)
 }
 
-/// Estimates from clusters drawn with replacement.
+/// Estimates from clusters with random weights (the Bayesian bootstrap; Rubin, Annals of Statistics 1981): where few clusters
+/// excite an effect, a draw with replacement may have none of them, and would say anything.
 fn bootstrap(groups: &[Group], config: &Config) -> Vec<DVector<f64>> {
     let mut random = Random::new(config.seed ^ 0xb007);
-    let draw = |random: &mut Random| {
-        let mut weights = vec![0.0; groups.len()];
-        for _ in 0..groups.len() {
-            weights[(random.unit() * groups.len() as f64) as usize] += 1.0;
-        }
-        weights
-    };
-    (0..config.bootstrap).filter_map(|_| weighted(groups, &draw(&mut random))).collect()
+    let mut draw = || groups.iter().map(|_| -(1.0 - random.unit()).ln()).collect::<Vec<f64>>();
+    (0..config.bootstrap).filter_map(|_| weighted(groups, &draw())).collect()
 }
 
 #[cfg(test)]
