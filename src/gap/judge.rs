@@ -270,11 +270,11 @@ impl<'a> Judge<'a> {
         if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
             return Some(Refusal::NotSignificant);
         }
-        if before - fitted.loss < self.least_gain(set, before) {
-            return Some(Refusal::SmallShare);
-        }
         if !self.relevant(member, base, fitted) {
             return Some(Refusal::Irrelevant);
+        }
+        if before - fitted.loss < self.least_gain(set, before) {
+            return Some(Refusal::SmallShare);
         }
         (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
     }
