@@ -189,6 +189,11 @@ pub(super) fn smooth(values: &mut [f64], times: usize) {
     }
 }
 
+/// Share of its variance that white noise keeps: `C(4m, 2m) / 16^m` after `m` passes, about `1 / sqrt(2 pi m)`.
+pub(super) fn white_kept(times: usize) -> f64 {
+    if times == 0 { 1.0 } else { (std::f64::consts::TAU * times as f64).sqrt().recip() }
+}
+
 /// Sums of products over the rows of one fold.
 #[derive(Debug, Clone)]
 struct Fold {

@@ -2,7 +2,8 @@
 
 use nalgebra::DVector;
 
-use super::design::Design;
+use super::design::{Design, white_kept};
+use super::rates::mean_square;
 use super::series::Series;
 use super::statistics::white_variance;
 use crate::frame::GRAVITY;
@@ -79,23 +80,27 @@ pub(super) fn without_zeros(design: &Design, target: &DVector<f64>) -> DVector<f
 
 /// How the energy of rows that no trend explains grows with the state: the deviate of the strongest quantity, and the root of
 /// the energy in its upper third, in noises of a bin. White noise of any size is taken off block by block, so that noise that
-/// grows with speed is no structure; the rows must not be smoothed, or it is white no more.
-pub(super) fn energy(all: &[Series], design: &Design, target: &DVector<f64>) -> (f64, f64) {
+/// grows with speed is no structure: as large as it is in the rows before they were smoothed, as far as smoothing leaves it.
+pub(super) fn energy(
+    all: &[Series],
+    design: &Design,
+    target: &DVector<f64>,
+    unsmoothed: &DVector<f64>,
+) -> (f64, f64) {
     let blocks = design.rows.blocks;
-    let mut series: Vec<[Vec<f64>; 6]> = vec![Default::default(); blocks];
     // the zero of a trial is no force that comes and goes
-    for (place, value) in design.rows.rows.iter().zip(&without_zeros(design, target)) {
-        series[place.block][place.component].push(*value);
+    let (target, unsmoothed) = (without_zeros(design, target), without_zeros(design, unsmoothed));
+    let mut series: Vec<[[Vec<f64>; 2]; 6]> = vec![Default::default(); blocks];
+    for (row, place) in design.rows.rows.iter().enumerate() {
+        let [smooth, rough] = &mut series[place.block][place.component];
+        smooth.push(target[row]);
+        rough.push(unsmoothed[row]);
     }
+    let kept = white_kept(design.noise.smoothing);
+    let of = |[smooth, rough]: &[Vec<f64>; 2]| (mean_square(smooth) - kept * white_variance(rough)).min(1e6);
     let excess: Vec<f64> = series
         .iter()
-        .map(|components| {
-            let of = |values: &Vec<f64>| {
-                let square = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
-                (square - white_variance(values)).min(1e6)
-            };
-            components.iter().filter(|values| values.len() >= 6).map(of).sum()
-        })
+        .map(|components| components.iter().filter(|[values, _]| values.len() >= 6).map(of).sum())
         .collect();
     let features: Vec<Vec<Features>> = all.iter().map(of_bins).collect();
     let of_feature = |index: usize| {

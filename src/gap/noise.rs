@@ -3,7 +3,7 @@
 //! From repeats, where there are any; else from the part of the gap that changes within a tenth of a second; never below the
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
-use super::design::{RowNoise, smooth};
+use super::design::{RowNoise, smooth, white_kept};
 use super::rates::mean_step;
 use super::series::Series;
 use super::statistics::{median, noise_variance, white_variance};
@@ -203,9 +203,7 @@ fn acceleration_noise(all: &[Series], trials: &[usize], passes: usize) -> f64 {
             let raw = white_variance(&values[run.clone()]);
             let mut smoothed = values[run.clone()].to_vec();
             smooth(&mut smoothed, passes);
-            // white noise keeps C(4m, 2m) / 16^m of its variance after m passes
-            let gain = if passes == 0 { 1.0 } else { (std::f64::consts::TAU * passes as f64).sqrt().recip() };
-            noise += raw * gain * run.len() as f64;
+            noise += raw * white_kept(passes) * run.len() as f64;
             total += smoothed.iter().map(|v| v * v).sum::<f64>();
         }
     }

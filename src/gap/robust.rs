@@ -23,7 +23,7 @@ const LAGS: usize = 20;
 pub(super) struct Error {
     /// Standard error.
     pub std: f64,
-    /// Degrees of freedom that the standard error itself has.
+    /// Degrees of freedom that the standard error has where nothing is there.
     pub freedom: f64,
     /// Effective number of trials that excite the column.
     pub trials: f64,
@@ -161,10 +161,9 @@ impl<'a> Noise<'a> {
             let by_trial: Vec<f64> = rows.of_trial.iter().map(|r| r.clone().map(part).sum()).collect();
             return Error { std: sandwich(&by_trial).sqrt(), freedom: trials - 1.0, trials, blocks };
         }
-        let (pooled, scattered) = (self.pooled(design, weights), sandwich(&by_block));
-        // the noise of all trials together is well known, the scatter of the few blocks that excite the column is not
-        let freedom = if pooled > scattered { rows.blocks as f64 } else { blocks } - 1.0;
-        Error { std: pooled.max(scattered).sqrt(), freedom, trials, blocks }
+        // where nothing is there the noise is that of all blocks together, which the scatter of a few can only exceed
+        let variance = self.pooled(design, weights).max(sandwich(&by_block));
+        Error { std: variance.sqrt(), freedom: rows.blocks as f64 - 1.0, trials, blocks }
     }
 
     /// Variance of a weighted sum of noise with the pooled autocovariance.
