@@ -116,6 +116,30 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
     let collected = wade(&["campaign", "collect", &campaign]);
     assert!(stdout(&collected).contains("2 of 2 cases, 1 of them new"), "{}", stdout(&collected));
 
+    // neither another solver's cases nor those of other settings join the data set
+    let sections = std::fs::read(Path::new(&campaign).join("sections.parquet")).expect("a data set");
+    for (path, from, to, says) in [
+        (outcomes.join("husky-paper-0001.json"), solver.label(), "another solver".to_owned(), "computed by"),
+        (
+            Path::new(&campaign).join("campaign.toml"),
+            "windows = ".to_owned(),
+            "windows = 1".to_owned(),
+            "with the settings",
+        ),
+    ] {
+        let text = std::fs::read_to_string(&path).expect("a file");
+        std::fs::write(&path, text.replace(&from, &to)).expect("written");
+        let whole = std::fs::read_to_string(&summaries).expect("summaries");
+        std::fs::write(&summaries, whole.lines().map(older).collect::<String>()).expect("written");
+        let mixed = wade(&["campaign", "collect", &campaign]);
+        let said = stderr(&mixed);
+        assert!(!mixed.status.success() && said.contains(says), "{said}");
+        assert!(said.contains("husky-paper-0001") && said.contains("wade dataset merge"), "{said}");
+        std::fs::write(&summaries, whole).expect("written");
+        std::fs::write(&path, text).expect("written");
+    }
+    assert_eq!(std::fs::read(Path::new(&campaign).join("sections.parquet")).expect("still there"), sections);
+
     let data = dataset::read(&Path::new(&campaign).join("sections.parquet")).expect("a data set");
     assert_eq!(data.meta.provenance, solver.label());
     assert_eq!(data.samples.len(), 2 * 4);

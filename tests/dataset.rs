@@ -319,6 +319,30 @@ fn no_split_by_case_has_a_case_on_both_sides() {
 }
 
 #[test]
+fn cases_of_one_state_stay_together_whatever_their_mesh_and_bed() {
+    let mut data = data(40);
+    let twins = data.samples.clone().into_iter().map(|mut sample| {
+        sample.case = format!("{}-driving", sample.case);
+        sample.condition.ground_velocity = sample.condition.velocity;
+        sample
+    });
+    data.samples.extend(twins);
+    for by in BY_CASE {
+        for split in split(&data, by, 7).unwrap() {
+            let (training, held_out) = split.parts(&data);
+            let states = |side: &Dataset| -> BTreeSet<String> {
+                side.samples.iter().map(|s| s.case.trim_end_matches("-driving").to_owned()).collect()
+            };
+            assert!(states(&training).is_disjoint(&states(&held_out)), "{by:?}: {}", split.name);
+        }
+    }
+    let (training, held_out) =
+        (0..data.samples.len()).partition(|&i| !data.samples[i].case.ends_with("-driving"));
+    let leaking = Split { name: "by bed".into(), training, held_out };
+    assert_eq!(leaking.leaks(&data).len(), 80, "a state that is learnt is no test of what is learnt");
+}
+
+#[test]
 fn parts_held_out_in_turn_cover_every_case_once() {
     let data = data(40);
     for by in &BY_CASE[1..] {

@@ -17,7 +17,7 @@ use wade::dataset::{self, Dataset};
 use wade::evaluate::baseline::Baseline;
 use wade::evaluate::contest::{Contest, Entry, Heat};
 use wade::evaluate::predict::Prediction;
-use wade::evaluate::report::Report;
+use wade::evaluate::report::{About, Report};
 use wade::evaluate::states::{State, states};
 use wade::evaluate::{EvaluateError, held_out};
 use wade::frame::{GRAVITY, Vec3};
@@ -168,7 +168,8 @@ fn the_figures_are_those_of_planted_errors() {
     let entry = Entry { name: "paper".into(), predictions: states.iter().map(predict).collect() };
     let contest: Contest = [("husky".to_owned(), Heat { states, entries: vec![entry] })].into();
     let file = DataFile { name: "analytic".into(), sha256: None, provenance: "analytic".into() };
-    let report = Report::new(&contest, &source.vehicles, (file, vec!["all".into()], false), "test").unwrap();
+    let about = About { data: file, splits: vec!["all".into()], by_sample: false, settings: BTreeMap::new() };
+    let report = Report::new(&contest, &source.vehicles, about, "test").unwrap();
     let husky = &report.vehicles[0];
     assert_eq!((husky.cases, husky.samples), (20, 80));
     // 4 of 80 states are the images of the shallowest case
@@ -189,6 +190,7 @@ fn the_figures_are_those_of_planted_errors() {
     let calibration = husky.calibration.unwrap();
     near(calibration.within_one[1], 0.95);
     near(calibration.within_two[2], 0.95);
+    assert_eq!(calibration.cases, 20);
     assert_eq!(husky.paper.unwrap().mae, [1.25, 3.42, 4.38]);
     let page = report.page().unwrap();
     assert!(page.contains("paper, other data") && page.contains("<svg") && page.contains("12.96"));

@@ -68,7 +68,7 @@ fn lowers_the_loss_and_repeats_bit_for_bit_on_one_thread_and_on_two() {
     let first = run(&short());
     let (start, end) = (first.history[0], first.history[3]);
     assert!(end.training_loss < 0.5 * start.training_loss, "{start:?} to {end:?}");
-    assert!(end.held_out_loss < start.held_out_loss, "{start:?} to {end:?}");
+    assert!(end.validation_loss < start.validation_loss, "{start:?} to {end:?}");
     assert!(same(&first, &run(&Config { threads: 1, ..short() })));
     assert_ne!(first.layers, run(&Config { seed: 2, ..short() }).layers);
 }
@@ -81,7 +81,7 @@ fn reports_each_vehicle_with_its_domain_and_error() {
     for (vehicle, table) in trained.vehicles.iter().zip([Table::HUSKY, Table::WARTHOG]) {
         // 4 cases with four images; of the Warthog, which is not symmetric, 8 with two
         assert_eq!(vehicle.score.samples, 16);
-        assert!(vehicle.held_out_rms.iter().all(|rms| rms.is_finite() && *rms > 0.0));
+        assert!(trained.learnt.rms[&vehicle.name].iter().all(|rms| rms.is_finite() && *rms > 0.0));
         let depth = vehicle.domain.depth_m;
         let range = table.depth_m.max - table.depth_m.min;
         // wider than where the cases lie by two of their mean distances: 16 or 32 cases were learnt from
@@ -98,10 +98,11 @@ fn an_input_that_never_varied_has_no_say() {
 }
 
 #[test]
-fn the_best_weights_are_those_of_the_epoch_with_the_least_held_out_loss() {
+fn the_best_weights_are_those_of_the_epoch_with_the_least_validation_loss() {
     let config = Config { epochs: 12, keep: Keep::Best, learning_rate: 0.02, ..short() };
     let trained = run(&config);
-    let least = trained.history.iter().min_by(|a, b| a.held_out_loss.total_cmp(&b.held_out_loss)).unwrap();
+    let least =
+        trained.history.iter().min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss)).unwrap();
     assert_eq!(trained.kept_epoch, least.number);
     let until_then = run(&Config { epochs: least.number, keep: Keep::Last, ..config });
     assert_eq!(trained.layers, until_then.layers);
@@ -121,9 +122,30 @@ fn images_of_a_case_stay_together_and_statistics_come_from_training_alone() {
     }
     let (other, other_scaling) = Task::new(Variant::Paper, &training, &held_out, &short()).unwrap();
     assert_eq!((&scaling, &task.training), (&other_scaling, &other.training));
-    assert_ne!(task.held_out, other.held_out);
+    assert_ne!(task.validation, other.validation);
     let mean = training.iter().map(|s| s.global[0]).sum::<f64>() / training.len() as f64;
     assert!((f64::from(scaling.global_mean[0]) - mean).abs() < 1e-6);
+}
+
+#[test]
+fn nothing_of_the_held_out_side_reaches_the_weights_or_what_they_state() {
+    let source = source();
+    let split = by_case(&source);
+    let mut spoilt = source.clone();
+    for &number in &split.held_out {
+        let loads = &mut spoilt.data.samples[number].surfaces;
+        loads.iter_mut().for_each(|load| load.force *= 10.0);
+    }
+    // long enough for the pace to matter
+    let config = Config { epochs: 30, patience: 2, ..short() };
+    let train = |source: &Source| {
+        let sides = Sides { split: &split, by: BY };
+        train::train(source, sides, Variant::Paper, &config, None, &|_| ()).unwrap()
+    };
+    let (clean, other) = (train(&source), train(&spoilt));
+    assert!(clean.history.last().unwrap().learning_rate < config.learning_rate, "the pace has changed");
+    assert_eq!((&clean.layers, &clean.learnt.rms), (&other.layers, &other.learnt.rms));
+    assert_ne!(clean.vehicles[0].score, other.vehicles[0].score);
 }
 
 #[test]
@@ -136,7 +158,10 @@ fn a_case_on_both_sides_is_refused_but_of_a_split_by_sample() {
         train::train(&source, Sides { split, by }, Variant::Paper, &config, None, &|_| ())
     };
     let error = train(BY, &leak).unwrap_err().to_string();
-    assert!(error.contains("the split leaks: 1 cases are on both sides, the first is `"), "{error}");
+    assert!(
+        error.contains("the split leaks: the states of 1 held-out cases are learnt from, the first is `"),
+        "{error}"
+    );
     let by = By::Sample { share: 0.2 };
     let by_sample = split(&source.data, by, 1).unwrap().remove(0);
     assert!(!by_sample.leaks(&source.data).is_empty());

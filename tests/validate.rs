@@ -317,6 +317,9 @@ fn trials_without_a_planar_section_say_why() {
     // exactly the limits are not beyond them: 21 samples last 0.2 s
     assert!(matches!(why(&|_| 2.0, &|_| 0.2, 0.2), Err(NotPlanar::Short { samples: 21, .. })));
     assert_eq!(why(&|_| 2.0, &|_| 0.2, 0.21), Ok(0..22));
+    // two samples as far apart as the window is wide, and their mean a rounding farther from both than half of that
+    let apart = why(&|_| 2.0, &|t| if t < 0.005 { 0.03 } else { 0.05 }, 0.01);
+    assert!(matches!(apart, Err(NotPlanar::Short { samples: 0, .. })), "{apart:?}");
     // slowly down a ramp: long within the tolerance of the depth, but sinking
     let climbing = why(&|_| 0.5, &|t| 0.2 + 0.06 * t, 2.0);
     assert!(
@@ -345,6 +348,17 @@ fn too_little_to_judge_is_an_error_or_not_tested() {
         ("fz_rises_at_matched_speed", None),
     ];
     assert_eq!(holds, expected);
+    // two sections a depth have a line through them whatever they are
+    let depths = [0.1, 0.15, 0.2].map(|depth| move |_: f64| depth);
+    let mut runs: Vec<(OfTime<'_>, OfTime<'_>, f64)> = Vec::new();
+    for depth in &depths {
+        runs.push((&|_| 1.0, depth, 1.0));
+        runs.push((&|_| 1.1, depth, 1.0));
+    }
+    runs.push((&|_| 2.0, &depths[2], 1.0));
+    let tests = run(&trials_of(&runs)).expect("a verdict");
+    let f0: Vec<bool> = tests.vertical_force.depths.iter().map(|at| at.f0_n.is_some()).collect();
+    assert_eq!((f0, tests.vertical_force.f0_against_depth), (vec![false, false, true], None));
 }
 
 #[test]

@@ -172,6 +172,22 @@ pub enum CollectError {
         /// The case.
         id: String,
     },
+    /// Cases of two kinds, which are not one data set.
+    #[error(
+        "{path}: was computed {what} {before}, and case `{id}` {what} {now}: begin another campaign for the one or the other, `wade dataset merge` joins their data sets"
+    )]
+    Mixed {
+        /// The data set.
+        path: PathBuf,
+        /// `by` a solver or `with the settings`.
+        what: &'static str,
+        /// Those of the data set.
+        before: String,
+        /// The case that differs.
+        id: String,
+        /// Its own.
+        now: String,
+    },
     /// Nothing is done yet.
     #[error("{path}: no case is done yet: `wade campaign run` computes them")]
     Nothing {
@@ -244,6 +260,7 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
     }
     let path = folder.join(SECTIONS_FILE);
     let mut dataset = if path.exists() { dataset::read(&path)? } else { empty(plan, vehicle, &fresh[0]) };
+    check_alike(&path, plan, &mut dataset, &fresh)?;
     let replaced: BTreeSet<&str> = fresh.iter().map(|outcome| outcome.case.id.as_str()).collect();
     dataset.samples.retain(|sample| !replaced.contains(sample.case.as_str()));
     for outcome in &fresh {
@@ -255,6 +272,33 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
     dataset::write(&path, &dataset)?;
     collected.write(folder)?;
     Ok(fresh.len())
+}
+
+/// Refuses outcomes of another solver than the data set's, and settings that were changed since it was begun.
+fn check_alike(
+    path: &Path,
+    plan: &Plan,
+    dataset: &mut Dataset,
+    fresh: &[Outcome],
+) -> Result<(), CollectError> {
+    let mixed = |what: &'static str, before: &str, id: &str, now: &str| CollectError::Mixed {
+        path: path.to_owned(),
+        what,
+        before: before.to_owned(),
+        id: id.to_owned(),
+        now: now.to_owned(),
+    };
+    if let Some(other) = fresh.iter().find(|outcome| outcome.solver != dataset.meta.provenance) {
+        let (before, id) = (&dataset.meta.provenance, &other.case.id);
+        return Err(mixed("by", before, id, &other.solver));
+    }
+    // settings always have a JSON form
+    let settings = serde_json::to_string(&plan.campaign.settings).unwrap_or_default();
+    let before = dataset.meta.notes.entry("settings".to_owned()).or_insert_with(|| settings.clone());
+    match *before == settings {
+        true => Ok(()),
+        false => Err(mixed("with the settings", before, &fresh[0].case.id, &settings)),
+    }
 }
 
 fn empty(plan: &Plan, vehicle: &Vehicle, first: &Outcome) -> Dataset {

@@ -62,6 +62,8 @@ pub struct Count {
     pub planned: usize,
     /// Computed and collected.
     pub done: usize,
+    /// Of these, with a mean that had settled.
+    pub settled: usize,
 }
 
 /// Vertical force at rest [N].
@@ -146,7 +148,9 @@ impl Report {
         for case in &plan.cases {
             let count = sets.entry(case.set.to_string()).or_default();
             count.planned += 1;
-            count.done += usize::from(collected.cases.contains_key(&case.id));
+            let summary = collected.cases.get(&case.id);
+            count.done += usize::from(summary.is_some());
+            count.settled += usize::from(summary.is_some_and(|summary| summary.settled));
         }
         let least = cases.iter().map(|case| case.cells).min().unwrap_or(0);
         let most = cases.iter().map(|case| case.cells).max().unwrap_or(0);
@@ -163,10 +167,7 @@ impl Report {
                 .filter(|c| c.speed_mps == 0.0)
                 .map(|c| at_rest(vehicle, c))
                 .collect(),
-            head_on: of_set(&cases, Set::Check)
-                .filter(|c| c.speed_mps > 0.0 && c.cell_scale == 1.0)
-                .map(|c| head_on(vehicle, c))
-                .collect(),
+            head_on: straight_ahead(&cases).into_iter().map(|c| head_on(vehicle, c)).collect(),
             meshes: meshes(&cases),
             twins: twins(&collected, vehicle),
             suspicious: suspicious(&cases, vehicle),
@@ -181,7 +182,8 @@ impl Report {
             let _ = writeln!(text, "{arguments}");
         };
         for (set, count) in &self.sets {
-            line(format_args!("  {set:<9} {} of {} cases", count.done, count.planned));
+            let Count { planned, done, settled } = count;
+            line(format_args!("  {set:<9} {done} of {planned} cases, {settled} settled"));
         }
         if self.outdated > 0 {
             line(format_args!(
@@ -285,6 +287,14 @@ fn head_on(vehicle: &Vehicle, case: &CaseSummary) -> HeadOn {
         c: -case.fx_n / case.speed_mps.powi(2),
         paper_c: paper::DEPTHS.iter().find(is_the_papers).map(|depth| depth.c_d_eff),
     }
+}
+
+/// Cases straight ahead on the campaign's mesh, by depth and speed.
+fn straight_ahead<'a>(cases: &'a [&CaseSummary]) -> Vec<&'a CaseSummary> {
+    let both = of_set(cases, Set::Check).chain(of_set(cases, Set::Ahead));
+    let mut ahead: Vec<&CaseSummary> = both.filter(|c| c.speed_mps > 0.0 && c.cell_scale == 1.0).collect();
+    ahead.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m).then(a.speed_mps.total_cmp(&b.speed_mps)));
+    ahead
 }
 
 /// The check case that was computed on several meshes, coarsest first.

@@ -246,8 +246,9 @@ impl Run {
             println!("set aside: {id}: {reason}");
         }
         println!("{} computed, {} set aside", progress.done, failed.len());
-        let earlier =
-            plan.cases.iter().filter(|case| work.failure_path(&case.id).exists()).count() - failed.len();
+        let is_new = |id: &String| failed.iter().any(|(failed, _)| failed == id);
+        let earlier = plan.cases.iter().filter(|case| work.failure_path(&case.id).exists());
+        let earlier = earlier.filter(|case| !is_new(&case.id)).count();
         if earlier > 0 {
             println!("{earlier} set aside earlier were left alone: --again tries them once more");
         }

@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::json;
 use wade::dataset::split;
 use wade::evaluate::contest::{Contest, Contestants, enter};
-use wade::evaluate::report::{Report, VehicleReport};
+use wade::evaluate::report::{About, Report, VehicleReport};
 use wade::evaluate::{held_out, paper};
 use wade::geometry::distance::SignedDistanceGrid;
 use wade::model::Model;
@@ -42,7 +42,7 @@ pub struct Eval {
     /// What is trained anew; the first is the one under evaluation
     #[arg(long, value_enum, value_delimiter = ',', default_value = "paper", requires = "split")]
     variants: Vec<Served>,
-    /// Trains the paper's three ablations with the same settings and split
+    /// Trains the paper's three ablations on the same split, with the settings of the paper's network
     #[arg(long)]
     ablations: bool,
     /// Write a page with tables and plots
@@ -91,8 +91,23 @@ impl Eval {
         let by = rule.by(record.config.held_out_share, record.config.parts);
         let sides = Sides { split: &split, by };
         let mut contest = Contest::new();
-        self.enter(&mut contest, &source, sides, &record.config, (&loaded, &models))?;
-        let about = (loaded.file, vec![split.name.clone()], record.split.by_sample);
+        let of_paper = match record.variant == train::anchored::NAME {
+            true => {
+                let Config { seed, front_rear, held_out_share, parts, .. } = record.config.clone();
+                let suited = Served::Paper.settings(self.data.is_analytic());
+                Config { seed, front_rear, held_out_share, parts, ..suited }
+            }
+            false => record.config.clone(),
+        };
+        self.enter(&mut contest, &source, sides, &of_paper, (&loaded, &models))?;
+        let mut settings = self.ablation_settings(&of_paper);
+        settings.insert(record.variant.clone(), record.config);
+        let about = About {
+            data: loaded.file,
+            splits: vec![split.name.clone()],
+            by_sample: record.split.by_sample,
+            settings,
+        };
         Ok(Report::new(&contest, &source.vehicles, about, PROGRAM)?)
     }
 
@@ -100,6 +115,8 @@ impl Eval {
     fn anew(&self, rule: Rule) -> Result<Report> {
         let first = self.variants.first().copied().unwrap_or(Served::Paper);
         let config = self.data.settings(first)?;
+        let of_paper = self.data.settings(Served::Paper)?;
+        let mut settings = self.ablation_settings(&of_paper);
         let loaded = self.data.load(&config)?;
         let source = loaded.source(&config)?;
         let by = rule.by(config.held_out_share, config.parts);
@@ -112,16 +129,24 @@ impl Eval {
                 let config = self.data.settings(*variant)?;
                 eprintln!("training {variant:?}, held out: {}", split.name);
                 let learnt = variant.train(&loaded, &source, (sides, 1), &config, None)?;
+                settings.insert(learnt.record.variant, learnt.record.config);
                 for (name, (weights, domain)) in learnt.weights {
                     let vehicle = source.vehicles[&name].clone();
                     let model = Model::new(vehicle, 0, domain, weights, Isa::available()[0]);
                     models.entry(name).or_default().push(model);
                 }
             }
-            self.enter(&mut contest, &source, sides, &config, (&loaded, &models))?;
+            self.enter(&mut contest, &source, sides, &of_paper, (&loaded, &models))?;
         }
-        let names = splits.iter().map(|split| split.name.clone()).collect();
-        Ok(Report::new(&contest, &source.vehicles, (loaded.file, names, rule == Rule::Sample), PROGRAM)?)
+        let splits = splits.iter().map(|split| split.name.clone()).collect();
+        let about = About { data: loaded.file, splits, by_sample: rule == Rule::Sample, settings };
+        Ok(Report::new(&contest, &source.vehicles, about, PROGRAM)?)
+    }
+
+    /// Settings of the ablations, by their names.
+    fn ablation_settings(&self, of_paper: &Config) -> BTreeMap<String, Config> {
+        let ablations = Variant::ABLATIONS.iter().filter(|_| self.ablations);
+        ablations.map(|variant| (variant.name().to_owned(), of_paper.clone())).collect()
     }
 
     fn enter(
@@ -129,13 +154,13 @@ impl Eval {
         contest: &mut Contest,
         source: &Source,
         sides: Sides<'_>,
-        config: &Config,
+        of_paper: &Config,
         (loaded, models): (&Loaded, &BTreeMap<String, Vec<Model>>),
     ) -> Result<()> {
         let mut ablations = Vec::new();
         if self.ablations {
             for variant in Variant::ABLATIONS {
-                ablations.push(learn(source, sides, variant, config)?);
+                ablations.push(learn(source, sides, variant, of_paper)?);
             }
         }
         let distances: BTreeMap<String, &SignedDistanceGrid> =
@@ -152,8 +177,9 @@ fn learn(source: &Source, sides: Sides<'_>, variant: Variant, config: &Config) -
 }
 
 fn text(report: &Report) -> String {
-    let mut text = format!("loads: {}\nheld out: {}\n", report.data.label(), report.splits.join("; "));
-    if report.by_sample {
+    let mut text =
+        format!("loads: {}\nheld out: {}\n", report.about.data.label(), report.about.splits.join("; "));
+    if report.about.by_sample {
         text.push_str(
             "sections and images of one case are on both sides: this tests interpolation within known runs\n",
         );
@@ -193,7 +219,7 @@ fn vehicle_text(vehicle: &VehicleReport) -> String {
     if let Some(calibration) = &vehicle.calibration {
         let [one, two] =
             [calibration.within_one, calibration.within_two].map(|s| three(s.map(|x| 100.0 * x)));
-        text.push_str(&format!("  {:30}{one}{two}\n", "within 1 and 2 deviations [%]"));
+        text.push_str(&format!("  {:30}{one}{two}\n", "means within 1 and 2 deviations [%]"));
     }
     text
 }

@@ -1,7 +1,8 @@
 //! Which samples a network learns from, and which it is judged by.
 //!
-//! Every split but the one by sample keeps a case together, all its sections and mirror images: the unit that is dealt
-//! out is the case.
+//! Every split but the one by sample keeps a case together, all its sections and mirror images, and with it the cases of the
+//! same state on another mesh or over another bed, which know its load within a few per cent: the unit that is dealt out is
+//! the state.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -77,7 +78,7 @@ pub enum SplitError {
         vehicle: String,
         /// What it has.
         found: usize,
-        /// Cases or samples.
+        /// States or samples.
         what: &'static str,
         /// What it needs.
         needed: usize,
@@ -107,12 +108,13 @@ pub enum SplitError {
 }
 
 impl Split {
-    /// The cases that are on both sides.
+    /// The held-out cases whose state is learnt from.
     pub fn leaks(&self, dataset: &Dataset) -> BTreeSet<String> {
-        let cases = |side: &[usize]| -> BTreeSet<String> {
-            side.iter().map(|&index| dataset.samples[index].case.clone()).collect()
-        };
-        &cases(&self.training) & &cases(&self.held_out)
+        let state_of = state_of(dataset);
+        let case = |&index: &usize| dataset.samples[index].case.as_str();
+        let learnt: BTreeSet<usize> = self.training.iter().map(|number| state_of[case(number)]).collect();
+        let leaks = self.held_out.iter().map(case).filter(|case| learnt.contains(&state_of[case]));
+        leaks.map(str::to_owned).collect()
     }
 
     /// Both sides as data sets.
@@ -146,14 +148,34 @@ pub fn split(dataset: &Dataset, by: By, seed: u64) -> Result<Vec<Split>, SplitEr
     }
 }
 
-/// The cases of each vehicle, in the order of the samples.
-fn cases(dataset: &Dataset) -> BTreeMap<&str, Vec<&str>> {
+/// What a case asks for: the state of its vehicle to a millionth, whatever the bed does.
+fn asked(sample: &Sample) -> [i64; 10] {
+    let (v, w, up) = (&sample.condition.velocity, &sample.condition.angular_velocity, &sample.condition.up);
+    let numbers =
+        [v.x, v.y, v.z, w.x, w.y, w.z, up.x, up.y, sample.condition.depth, 1e-3 * sample.condition.density];
+    numbers.map(|x| (1e6 * x).round() as i64)
+}
+
+/// The states of each vehicle, in the order of the samples: the cases of each.
+fn states(dataset: &Dataset) -> BTreeMap<&str, Vec<Vec<&str>>> {
     let mut seen = BTreeSet::new();
-    let mut cases: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    let mut states: BTreeMap<&str, Vec<Vec<&str>>> = BTreeMap::new();
+    let mut known: HashMap<(&str, [i64; 10]), usize> = HashMap::new();
     for sample in dataset.samples.iter().filter(|sample| seen.insert(sample.case.as_str())) {
-        cases.entry(&sample.vehicle).or_default().push(&sample.case);
+        let of_vehicle = states.entry(&sample.vehicle).or_default();
+        let state = *known.entry((&sample.vehicle, asked(sample))).or_insert(of_vehicle.len());
+        if state == of_vehicle.len() {
+            of_vehicle.push(Vec::new());
+        }
+        of_vehicle[state].push(&sample.case);
     }
-    cases
+    states
+}
+
+/// A number for the state of each case, the same for cases of one state.
+pub fn state_of(dataset: &Dataset) -> HashMap<&str, usize> {
+    let states = states(dataset).into_values().flatten().enumerate();
+    states.flat_map(|(number, cases)| cases.into_iter().map(move |case| (case, number))).collect()
 }
 
 /// How many of `count` are held out: rounded, and at least one on either side.
@@ -169,10 +191,10 @@ fn held_out_count(count: usize, share: f64, vehicle: &str, what: &'static str) -
 
 fn by_case(dataset: &Dataset, share: f64, random: &mut Random) -> Result<Split, SplitError> {
     let mut held_out = BTreeSet::new();
-    for (vehicle, mut cases) in cases(dataset) {
-        let count = held_out_count(cases.len(), share, vehicle, "cases")?;
-        random.fork().shuffle(&mut cases);
-        held_out.extend(cases.into_iter().take(count));
+    for (vehicle, mut states) in states(dataset) {
+        let count = held_out_count(states.len(), share, vehicle, "states")?;
+        random.fork().shuffle(&mut states);
+        held_out.extend(states.into_iter().take(count).flatten());
     }
     let name = format!("{:.0} % of the cases of each vehicle", 100.0 * share);
     Ok(Split::new(name, dataset, |_, sample| held_out.contains(sample.case.as_str())))
@@ -198,13 +220,14 @@ fn folds(dataset: &Dataset, count: usize, random: &mut Random) -> Result<Vec<Spl
         return Err(SplitError::Parts { count });
     }
     let mut fold_of: HashMap<&str, usize> = HashMap::new();
-    for (vehicle, mut cases) in cases(dataset) {
-        if cases.len() < count {
-            let (vehicle, found) = (vehicle.to_owned(), cases.len());
-            return Err(SplitError::TooFew { vehicle, found, what: "cases", needed: count });
+    for (vehicle, mut states) in states(dataset) {
+        if states.len() < count {
+            let (vehicle, found) = (vehicle.to_owned(), states.len());
+            return Err(SplitError::TooFew { vehicle, found, what: "states", needed: count });
         }
-        random.fork().shuffle(&mut cases);
-        fold_of.extend(cases.into_iter().enumerate().map(|(index, case)| (case, index % count)));
+        random.fork().shuffle(&mut states);
+        let dealt = states.into_iter().enumerate();
+        fold_of.extend(dealt.flat_map(|(i, cases)| cases.into_iter().map(move |case| (case, i % count))));
     }
     let fold = |number: usize| {
         let name = format!("group {} of {count}", number + 1);
@@ -214,15 +237,15 @@ fn folds(dataset: &Dataset, count: usize, random: &mut Random) -> Result<Vec<Spl
 }
 
 fn by_vehicle(dataset: &Dataset) -> Result<Vec<Split>, SplitError> {
-    let cases = cases(dataset);
-    if let (1, Some(vehicle)) = (cases.len(), cases.keys().next()) {
+    let states = states(dataset);
+    if let (1, Some(vehicle)) = (states.len(), states.keys().next()) {
         return Err(SplitError::OneVehicle { vehicle: (*vehicle).to_owned() });
     }
     let without = |vehicle: &&str| {
         let name = format!("vehicle {vehicle}");
         Split::new(name, dataset, |_, sample| sample.vehicle == **vehicle)
     };
-    Ok(cases.keys().map(without).collect())
+    Ok(states.keys().map(without).collect())
 }
 
 /// What the parts are made by.
@@ -238,7 +261,7 @@ fn ranges(dataset: &Dataset, bins: usize, quantity: &Quantity<'_>) -> Result<Vec
     }
     let mut part_of: HashMap<&str, usize> = HashMap::new();
     let mut names = vec![Vec::new(); bins];
-    for vehicle in cases(dataset).into_keys() {
+    for vehicle in states(dataset).into_keys() {
         let values = case_means(dataset, vehicle, quantity);
         let (min, max) = values.values().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
         if max - min < 1e-9 * max.abs() || values.is_empty() {

@@ -41,31 +41,52 @@ pub fn mean_magnitude<'a>(errors: impl Iterator<Item = &'a Vec3>) -> [f64; 3] {
     (sum / f64::max(count, 1.0)).into()
 }
 
-/// How far stated deviations are those of the errors.
+/// A state with the errors of its sections, and the deviation that is stated of their mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flow {
+    /// Error of each section.
+    pub errors: Vec<Vec3>,
+    /// One standard deviation.
+    pub stated: Vec3,
+}
+
+/// How far stated deviations are those of the errors of mean flows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Calibration {
+    /// Cases that it is told from.
+    pub cases: usize,
     /// Share of the errors within one stated deviation: 0.683 for normal errors.
     pub within_one: [f64; 3],
     /// Within two: 0.954.
     pub within_two: [f64; 3],
     /// Root mean square of the error over its stated deviation: 1.
     pub error_over_stated: [f64; 3],
+    /// Root mean square of what the sections swing around their mean, which no deviation states.
+    pub swing: [f64; 3],
 }
 
 impl Calibration {
-    /// Of pairs of error and stated deviation; those are left out of which nothing is stated, as of hydrostatics at rest, and
-    /// `None` where there are no others.
-    pub fn of(pairs: &[(Vec3, Vec3)]) -> Option<Self> {
-        let pairs: Vec<&(Vec3, Vec3)> = pairs.iter().filter(|(_, stated)| stated.min() > 0.0).collect();
-        if pairs.is_empty() {
+    /// Of flows of so many cases; those are left out of which nothing is stated, as of hydrostatics at rest, and `None` where
+    /// there are no others.
+    pub fn of(flows: &[Flow], cases: usize) -> Option<Self> {
+        let flows: Vec<&Flow> = flows.iter().filter(|flow| flow.stated.min() > 0.0).collect();
+        if flows.is_empty() {
             return None;
         }
-        let count = pairs.len() as f64;
+        let means: Vec<Vec3> =
+            flows.iter().map(|flow| flow.errors.iter().sum::<Vec3>() / flow.errors.len() as f64).collect();
+        let ratios = || means.iter().zip(&flows).map(|(mean, flow)| mean.abs().component_div(&flow.stated));
+        let count = flows.len() as f64;
         let mean = |of: &dyn Fn(f64) -> f64| -> [f64; 3] {
-            std::array::from_fn(|c| pairs.iter().map(|(e, s)| of(e[c].abs() / s[c])).sum::<f64>() / count)
+            std::array::from_fn(|c| ratios().map(|ratio| of(ratio[c])).sum::<f64>() / count)
         };
         let within = |bound: f64| mean(&|ratio| if ratio <= bound { 1.0 } else { 0.0 });
+        let swings = || means.iter().zip(&flows).flat_map(|(m, flow)| flow.errors.iter().map(move |e| e - m));
+        let sections = swings().count() as f64;
+        let swing = |c: usize| (swings().map(|swing| swing[c].powi(2)).sum::<f64>() / sections).sqrt();
         Some(Self {
+            cases,
+            swing: std::array::from_fn(swing),
             within_one: within(1.0),
             within_two: within(2.0),
             error_over_stated: mean(&|ratio| ratio.powi(2)).map(f64::sqrt),
@@ -104,13 +125,16 @@ mod tests {
 
     #[test]
     fn deviations_that_are_half_the_errors_are_seen_as_such() {
-        let mut pairs: Vec<_> =
-            (0..4).map(|_| (Vec3::new(2.0, -1.0, 0.5), Vec3::new(1.0, 1.0, 1.0))).collect();
-        pairs.push((Vec3::new(9.0, 9.0, 9.0), Vec3::zeros()));
-        let calibration = Calibration::of(&pairs).unwrap();
+        // the means are 2, -1 and 0.5, and z swings by 4
+        let errors = vec![Vec3::new(2.0, -1.0, 4.5), Vec3::new(2.0, -1.0, -3.5)];
+        let mut flows = vec![Flow { errors, stated: Vec3::new(1.0, 1.0, 1.0) }; 4];
+        let at_rest = Flow { errors: vec![Vec3::new(9.0, 9.0, 9.0)], stated: Vec3::zeros() };
+        flows.push(at_rest.clone());
+        let calibration = Calibration::of(&flows, 4).unwrap();
         assert_eq!(calibration.error_over_stated, [2.0, 1.0, 0.5]);
         assert_eq!((calibration.within_one, calibration.within_two), ([0.0, 1.0, 1.0], [1.0, 1.0, 1.0]));
-        assert_eq!(Calibration::of(&[(Vec3::zeros(), Vec3::zeros())]), None);
+        assert_eq!((calibration.swing, calibration.cases), ([0.0, 0.0, 4.0], 4));
+        assert_eq!(Calibration::of(&[at_rest], 1), None);
     }
 
     #[test]

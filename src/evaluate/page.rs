@@ -14,10 +14,10 @@ pub(super) fn page(report: &Report) -> Result<String, PlotError> {
     let mut text = format!(
         "<p>Loads: {}. Held out: {}.</p>\n<p class=\"small\">Shaded: {LABEL}. The source paper's CFD is not public, so its \
          figures are of other cases and another mesh; they say where it stands, not which network is better.</p>\n",
-        escape(&report.data.label()),
-        escape(&report.splits.join("; ")),
+        escape(&report.about.data.label()),
+        escape(&report.about.splits.join("; ")),
     );
-    if report.by_sample {
+    if report.about.by_sample {
         text.push_str(
             "<div class=\"verdict notice\">Sections and mirror images of one case are on both sides of this split: the figures \
              test interpolation within known runs only.</div>\n",
@@ -27,7 +27,7 @@ pub(super) fn page(report: &Report) -> Result<String, PlotError> {
         text.push_str(&section(vehicle)?);
     }
     let _ = writeln!(text, "<p class=\"small\">{}</p>", escape(&report.program));
-    Ok(document(&format!("wade eval: {}", report.data.name), &text))
+    Ok(document(&format!("wade eval: {}", report.about.data.name), &text))
 }
 
 fn section(vehicle: &VehicleReport) -> Result<String, PlotError> {
@@ -186,9 +186,18 @@ fn calibration(vehicle: &VehicleReport) -> String {
     let row =
         |name: &str, values: [String; 3]| std::iter::once(name.to_owned()).chain(values).collect::<Vec<_>>();
     let rows = [
-        row("errors within one stated deviation (68.3 % where normal)", calibration.within_one.map(percent)),
+        row(
+            "errors of the mean within one stated deviation (68.3 % where normal)",
+            calibration.within_one.map(percent),
+        ),
         row("within two (95.4 %)", calibration.within_two.map(percent)),
         row("RMS of error over stated deviation (1)", calibration.error_over_stated.map(number)),
+        row("RMS swing of sections around their mean [N]", calibration.swing.map(number)),
     ];
-    table(&heads, usize::MAX, rows)
+    let note = format!(
+        "<p class=\"small\">What is stated is how far the mean flow may be off, not how it swings: errors are means over the \
+         sections of a case, of {} cases.</p>\n",
+        calibration.cases,
+    );
+    table(&heads, usize::MAX, rows) + &note
 }

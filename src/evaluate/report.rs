@@ -5,12 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::contest::{Contest, Entry, Heat};
-use super::measure::{Calibration, Errors, mean_magnitude, percentile};
+use super::measure::{Calibration, Errors, Flow, mean_magnitude, percentile};
 use super::paper::{self, Paper};
 use super::states::State;
 use super::{EvaluateError, page};
+use crate::dataset::Image;
 use crate::frame::Vec3;
 use crate::page::PlotError;
+use crate::train::Config;
 use crate::train::report::DataFile;
 use crate::vehicle::Vehicle;
 
@@ -22,16 +24,26 @@ const PARITY_POINTS: usize = 1500;
 pub struct Report {
     /// Version and commit of this program.
     pub program: String,
+    /// What it is about.
+    #[serde(flatten)]
+    pub about: About,
+    /// How the paper's figures are to be read.
+    pub paper: &'static str,
+    /// By vehicle.
+    pub vehicles: Vec<VehicleReport>,
+}
+
+/// What an evaluation is about.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct About {
     /// What was held out of.
     pub data: DataFile,
     /// What was held out; several parts in turn are pooled.
     pub splits: Vec<String>,
     /// True where sections and images of one case may be on both sides: such figures test interpolation only.
     pub by_sample: bool,
-    /// How the paper's figures are to be read.
-    pub paper: &'static str,
-    /// By vehicle.
-    pub vehicles: Vec<VehicleReport>,
+    /// Settings of each network's training, by its name.
+    pub settings: BTreeMap<String, Config>,
 }
 
 /// Figures of one vehicle.
@@ -106,7 +118,7 @@ impl Report {
     pub fn new(
         contest: &Contest,
         vehicles: &BTreeMap<String, Vehicle>,
-        (data, splits, by_sample): (DataFile, Vec<String>, bool),
+        about: About,
         program: &str,
     ) -> Result<Self, EvaluateError> {
         let of = |(name, heat): (&String, &Heat)| {
@@ -116,9 +128,7 @@ impl Report {
         };
         Ok(Self {
             program: program.to_owned(),
-            data,
-            splits,
-            by_sample,
+            about,
             paper: paper::LABEL,
             vehicles: contest.iter().map(of).collect::<Result<_, EvaluateError>>()?,
         })
@@ -147,7 +157,7 @@ impl VehicleReport {
             surfaces: groups(vehicle, heat, |surface| vehicle.surfaces[surface].name.clone()),
             kinds: groups(vehicle, heat, |s| format!("{:?}", vehicle.surfaces[s].kind).to_lowercase()),
             slices: slices(heat, &forces),
-            calibration: calibration(under_evaluation, &forces),
+            calibration: calibration(under_evaluation, &heat.states),
             paper: paper::of(&vehicle.name),
             parity: parity(under_evaluation, &forces),
         }
@@ -223,10 +233,24 @@ fn slices(heat: &Heat, forces: &[Vec3]) -> Vec<SliceReport> {
     slices
 }
 
-fn calibration(entry: &Entry, forces: &[Vec3]) -> Option<Calibration> {
-    let pair = |(p, truth): (&super::predict::Prediction, &Vec3)| Some((p.force - truth, p.uncertainty?));
-    let pairs: Option<Vec<_>> = entry.predictions.iter().zip(forces).map(pair).collect();
-    Calibration::of(&pairs?)
+/// What is stated is how far the mean flow may be off: errors are averaged over the sections of a case first.
+fn calibration(entry: &Entry, states: &[State]) -> Option<Calibration> {
+    let mut flows: Vec<(&State, Flow)> = Vec::new();
+    let mut last: BTreeMap<(&str, Image), usize> = BTreeMap::new();
+    for (state, prediction) in states.iter().zip(&entry.predictions) {
+        let (error, stated) = (prediction.force - state.force(), prediction.uncertainty?);
+        let flow = last.get(&(state.case.as_str(), state.image)).copied();
+        match flow.filter(|&flow| flows[flow].0.condition == state.condition) {
+            Some(flow) => flows[flow].1.errors.push(error),
+            None => {
+                last.insert((&state.case, state.image), flows.len());
+                flows.push((state, Flow { errors: vec![error], stated }));
+            }
+        }
+    }
+    let flows: Vec<Flow> = flows.into_iter().map(|(_, flow)| flow).collect();
+    let cases = last.keys().map(|(case, _)| case).collect::<BTreeSet<_>>().len();
+    Calibration::of(&flows, cases)
 }
 
 fn parity(entry: &Entry, forces: &[Vec3]) -> Vec<(Vec3, Vec3)> {

@@ -1,6 +1,7 @@
 //! The states of a data set with the loads that belong to them.
 
 use crate::condition::Condition;
+use crate::dataset::Image;
 use crate::frame::Vec3;
 use crate::train::label::{Label, labels, order};
 use crate::train::samples::Sample;
@@ -14,6 +15,8 @@ pub struct State {
     pub vehicle: String,
     /// Name of the case.
     pub case: String,
+    /// Which image of it.
+    pub image: Image,
     /// The state, in the ground-contact convention of the data set.
     pub condition: Condition,
     /// The load on each surface, with the vehicle's own hydrostatics, in its order.
@@ -63,6 +66,7 @@ pub fn states(source: &Source, numbers: &[usize]) -> Result<Vec<State>, TrainErr
         Ok(State {
             vehicle: (*name).clone(),
             case: sample.case.clone(),
+            image: sample.image,
             condition: sample.condition,
             features: Sample::new(vehicle, index, sample, &labels),
             labels,

@@ -99,7 +99,7 @@ impl Checkpoint {
 fn write(path: &Path, state: &State, task: &str) -> Result<(), Fault> {
     let singles = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let doubles = |values: &[f64]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-    let rows = state.history.iter().flat_map(|e| [e.training_loss, e.held_out_loss, e.learning_rate]);
+    let rows = state.history.iter().flat_map(|e| [e.training_loss, e.validation_loss, e.learning_rate]);
     let best = state.best.as_ref().map_or(&[][..], |(parameters, _)| parameters);
     let tensors = [
         ("parameters", Dtype::F32, singles(&state.layers.parameters)),
@@ -163,7 +163,7 @@ fn read(path: &Path, sizes: Sizes, task: &str) -> Result<State, Fault> {
     let epoch = |(index, row): (usize, &[f64; 3])| Epoch {
         number: index as u32 + 1,
         training_loss: row[0],
-        held_out_loss: row[1],
+        validation_loss: row[1],
         learning_rate: row[2],
     };
     Ok(State {

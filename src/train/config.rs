@@ -23,7 +23,7 @@ pub struct Config {
     pub held_out_batch: usize,
     /// Learning rate at the start.
     pub learning_rate: f64,
-    /// Epochs without improvement of the held-out loss after which the learning rate is halved.
+    /// Epochs without improvement of the loss on the validation states after which the learning rate is halved.
     pub patience: u32,
     /// Learning rate below which training ends; 0 for the number of epochs alone.
     pub least_learning_rate: f64,
@@ -33,6 +33,9 @@ pub struct Config {
     pub front_rear: bool,
     /// Share held out, by case and by sample.
     pub held_out_share: f64,
+    /// Share of the training side that the paper's network does not learn from: its loss sets the pace of the learning rate.
+    /// The paper calls it the validation subset and does not say how large it is, nor whether its figures are of the same.
+    pub validation_share: f64,
     /// Parts of the range, by depth and by heading.
     pub parts: usize,
     /// Threads at most, 1 or 2: a batch is worked on in two halves either way, so the bits are the same.
@@ -67,10 +70,9 @@ impl Default for AnchoredConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
-    /// Those of the last epoch: the held-out cases set the pace of the paper's learning rate but choose no weights.
+    /// Those of the last epoch.
     Last,
-    /// Those with the least loss of those that set the pace: where these are held-out ones, the errors on the held-out cases
-    /// are then those of a choice among epochs.
+    /// Those with the least loss that sets the pace.
     Best,
 }
 
@@ -104,6 +106,7 @@ impl Default for Config {
             keep: Keep::Last,
             front_rear: false,
             held_out_share: 0.2,
+            validation_share: 0.1,
             parts: 5,
             threads: 2,
             weight_decay: 0.0,
@@ -160,6 +163,7 @@ impl Config {
         }
         let shares = [
             ("held_out_share", self.held_out_share),
+            ("validation_share", self.validation_share),
             ("loss.alpha", self.loss.alpha),
             ("anchored.loss.exponent", self.anchored.loss.exponent),
         ];

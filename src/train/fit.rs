@@ -1,4 +1,4 @@
-//! The epochs: batches in random order, gradient steps, a look at the held-out loss. Knows no feature and no loss.
+//! The epochs: batches in random order, gradient steps, a look at the validation loss. Knows no feature and no loss.
 
 use std::thread;
 
@@ -24,8 +24,9 @@ pub struct Epoch {
     pub number: u32,
     /// Mean loss over the training samples, each taken when its batch was.
     pub training_loss: f64,
-    /// Mean loss over the held-out samples after the epoch.
-    pub held_out_loss: f64,
+    /// Mean loss over the validation samples after the epoch; older records call it that of the held-out ones.
+    #[serde(alias = "held_out_loss")]
+    pub validation_loss: f64,
     /// Learning rate of the epoch.
     pub learning_rate: f64,
 }
@@ -41,7 +42,7 @@ pub struct State {
     pub plateau: Plateau,
     /// Every epoch so far.
     pub history: Vec<Epoch>,
-    /// Parameters and number of the epoch with the least held-out loss, where these are kept.
+    /// Parameters and number of the epoch with the least loss that sets the pace, where these are kept.
     pub best: Option<(Vec<f32>, u32)>,
 }
 
@@ -92,17 +93,17 @@ impl<'a> Fit<'a> {
             sum += self.step(&batch)? * batch.len() as f64;
         }
         let training_loss = sum / self.task.training.len() as f64;
-        let held_out_loss = self.held_out_loss()?;
-        if !(training_loss.is_finite() && held_out_loss.is_finite()) {
+        let validation_loss = self.validation_loss()?;
+        if !(training_loss.is_finite() && validation_loss.is_finite()) {
             return Err(TrainError::Diverged { epoch: number });
         }
-        let pace = self.task.objective.pace(training_loss, held_out_loss);
+        let pace = self.task.objective.pace(training_loss, validation_loss);
         let best = pace < self.state.plateau.best;
         if best && self.config.keep == Keep::Best {
             self.state.best = Some((self.state.layers.parameters.clone(), number));
         }
         self.state.plateau.observe(pace);
-        let epoch = Epoch { number, training_loss, held_out_loss, learning_rate };
+        let epoch = Epoch { number, training_loss, validation_loss, learning_rate };
         self.state.history.push(epoch);
         Ok(epoch)
     }
@@ -130,8 +131,8 @@ impl<'a> Fit<'a> {
         Ok(losses.iter().sum())
     }
 
-    fn held_out_loss(&self) -> Result<f64, TrainError> {
-        let batches = batches(&self.task.held_out, self.config.held_out_batch, None);
+    fn validation_loss(&self) -> Result<f64, TrainError> {
+        let batches = batches(&self.task.validation, self.config.held_out_batch, None);
         let of = |batches: &[Vec<&Rows>]| -> Result<Vec<f64>, TrainError> {
             let loss = |rows: &Vec<&Rows>| {
                 let batch = self.task.batch(rows)?;
@@ -143,7 +144,7 @@ impl<'a> Fit<'a> {
         let (first, second) = batches.split_at(batches.len().div_ceil(PARTS));
         let (first, second) = both(self.config.threads, || of(first), || of(second));
         let sum: f64 = first?.iter().chain(&second?).sum();
-        Ok(sum / self.task.held_out.len() as f64)
+        Ok(sum / self.task.validation.len() as f64)
     }
 
     /// The layers that are kept, and the epoch after which they were so.

@@ -123,17 +123,20 @@ pub enum TrainError {
     /// A side of the split without a sample.
     #[error("the {side} side of the split is empty")]
     EmptySide {
-        /// Training or held-out.
+        /// Training, held-out or validation.
         side: &'static str,
     },
-    /// A case on both sides of a split that promises to keep cases together.
-    #[error("the split leaks: {count} cases are on both sides, the first is `{first}`")]
+    /// A state on both sides of a split that promises to keep states together.
+    #[error("the split leaks: the states of {count} held-out cases are learnt from, the first is `{first}`")]
     Leak {
         /// How many.
         count: usize,
         /// One of them.
         first: String,
     },
+    /// A training side of which no share can be taken for validation.
+    #[error("validation_share of the training side: {0}")]
+    Validation(#[from] split::SplitError),
     /// Nothing in a batch.
     #[error("a batch is empty")]
     EmptyBatch,
@@ -223,7 +226,7 @@ fn check_beds(data: &Dataset) -> Result<(), TrainError> {
     Ok(())
 }
 
-/// Which samples are held out, and whether cases may be on both sides.
+/// Which samples are held out, and whether states may be on both sides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides<'a> {
     /// The split.
@@ -233,7 +236,7 @@ pub struct Sides<'a> {
 }
 
 impl Sides<'_> {
-    /// Refuses a case on both sides, but of a split by sample, which the source paper seems to have used.
+    /// Refuses a state on both sides, but of a split by sample, which the source paper seems to have used.
     pub fn check(&self, data: &Dataset) -> Result<(), TrainError> {
         let leaks = self.split.leaks(data);
         match leaks.first() {
@@ -242,6 +245,21 @@ impl Sides<'_> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// The training side in two: what is learnt from, and a share of its states that sets the pace of the learning rate. The
+    /// held-out side is then judged by a network that knows nothing of it.
+    fn validation(&self, data: &Dataset, config: &Config) -> Result<(Vec<usize>, Vec<usize>), TrainError> {
+        let share = config.validation_share;
+        let by = match self.by {
+            split::By::Sample { .. } => split::By::Sample { share },
+            _ => split::By::Case { share },
+        };
+        let whole = &self.split.training;
+        let mut parts = split::split(&data.subset(whole), by, config.seed)?;
+        let Split { training, held_out, .. } = parts.swap_remove(0);
+        let numbers = |side: Vec<usize>| side.into_iter().map(|index| whole[index]).collect();
+        Ok((numbers(training), numbers(held_out)))
     }
 }
 
@@ -271,6 +289,9 @@ pub struct Published {
     pub variant: Variant,
     /// Its standardisation.
     pub scaling: Scaling,
+    /// Root mean square of the error of the net force over density on the validation samples, by vehicle; of all
+    /// vehicles where none of them is of this one [m4/s2].
+    pub rms: BTreeMap<String, [f64; OUTPUTS]>,
 }
 
 /// The part of a training that belongs to one vehicle.
@@ -280,9 +301,6 @@ pub struct TrainedVehicle {
     pub name: String,
     /// The states learnt from; those of all vehicles where none was of this one.
     pub domain: Domain,
-    /// Root mean square of the error of the net force over density [m4/s2]: on held-out samples, or on training samples
-    /// where none of this vehicle is held out.
-    pub held_out_rms: [f64; OUTPUTS],
     /// Errors on held-out samples in newtons.
     pub score: Score,
 }
@@ -300,26 +318,30 @@ pub fn train(
     sides.check(&source.data)?;
     check_beds(&source.data)?;
     let side = |numbers: &[usize]| samples::samples(&source.data, numbers, &source.vehicles);
-    let (training, held_out) = (side(&sides.split.training)?, side(&sides.split.held_out)?);
-    let (task, scaling) = Task::new(variant, &training, &held_out, config)?;
+    let (learnt, validation) = sides.validation(&source.data, config)?;
+    let (training, validation) = (side(&learnt)?, side(&validation)?);
+    let held_out = side(&sides.split.held_out)?;
+    let (task, scaling) = Task::new(variant, &training, &validation, config)?;
     let begun = Instant::now();
     let (fit, epochs) = run(&task, config, checkpoint, progress)?;
     let (layers, kept_epoch) = fit.kept();
     let mut trained = Trained {
         name: variant.name(),
         layers,
-        learnt: Published { variant, scaling },
+        learnt: Published { variant, scaling, rms: BTreeMap::new() },
         vehicles: Vec::new(),
         history: fit.state.history,
         kept_epoch,
         epoch_s: (epochs > 0).then(|| begun.elapsed().as_secs_f64() / f64::from(epochs)),
     };
-    trained.vehicles = source
-        .vehicles
-        .keys()
-        .enumerate()
-        .map(|(index, name)| trained.vehicle(index, name, source, sides, [&training, &held_out]))
-        .collect::<Result<_, _>>()?;
+    for (index, name) in source.vehicles.keys().enumerate() {
+        let own = trained.score(&validation, |sample| sample.vehicle == index);
+        let judged = if own.samples > 0 { own } else { trained.score(&validation, |_| true) };
+        trained.learnt.rms.insert(name.clone(), judged.rms_over_density);
+        let score = trained.score(&held_out, |sample| sample.vehicle == index);
+        let domain = domain::learnt(name, source, sides)?;
+        trained.vehicles.push(TrainedVehicle { name: name.clone(), domain, score });
+    }
     Ok(trained)
 }
 
@@ -356,14 +378,14 @@ impl Trained<Published> {
         ground_contact: GroundContact,
         provenance: String,
     ) -> Weights {
-        let (scaling, held_out_rms) = (self.learnt.scaling.clone(), of_vehicle.held_out_rms);
+        let (scaling, held_out_rms) = (self.learnt.scaling.clone(), self.learnt.rms[&of_vehicle.name]);
         let form = Form::Paper(Paper { scaling, ground_contact, held_out_rms });
         Weights { network: self.layers.network(), form, provenance }
     }
 
     /// Force over density on each surface as this variant sees them [m4/s2]: nothing from one without a wet sample.
     pub fn force_over_density(&self, sample: &Sample) -> Vec<[f64; OUTPUTS]> {
-        let Published { variant, scaling } = &self.learnt;
+        let Published { variant, scaling, .. } = &self.learnt;
         let view = variant.view(sample);
         let rows = variant.rows(&view, scaling, 0.0);
         let inputs = nalgebra::DMatrix::from_vec(self.layers.sizes.inputs, view.surfaces.len(), rows.inputs);
@@ -375,29 +397,13 @@ impl Trained<Published> {
         view.fractions.iter().enumerate().map(surface).collect()
     }
 
-    fn vehicle(
-        &self,
-        index: usize,
-        name: &str,
-        source: &Source,
-        sides: Sides<'_>,
-        [training, held_out]: [&Vec<Sample>; 2],
-    ) -> Result<TrainedVehicle, TrainError> {
-        let score = |samples: &[Sample]| {
-            let of_vehicle = samples.iter().filter(|sample| sample.vehicle == index);
-            Score::of(of_vehicle.map(|sample| Judged {
-                density: sample.density,
-                truth: sample.net_force_over_density(),
-                guess: samples::sum(&self.force_over_density(sample)),
-            }))
+    /// Errors on those of some samples.
+    fn score(&self, samples: &[Sample], of: impl Fn(&Sample) -> bool) -> Score {
+        let judged = |sample: &Sample| Judged {
+            density: sample.density,
+            truth: sample.net_force_over_density(),
+            guess: samples::sum(&self.force_over_density(sample)),
         };
-        let held_out = score(held_out);
-        let judged = if held_out.samples > 0 { held_out } else { score(training) };
-        Ok(TrainedVehicle {
-            name: name.to_owned(),
-            domain: domain::learnt(name, source, sides)?,
-            held_out_rms: judged.rms_over_density,
-            score: held_out,
-        })
+        Score::of(samples.iter().filter(|sample| of(sample)).map(judged))
     }
 }

@@ -13,7 +13,7 @@ pub(super) fn page(record: &Record) -> Result<String, PlotError> {
         name: name.to_owned(),
         points: record.history.iter().map(|epoch| (f64::from(epoch.number), of(epoch))).collect(),
     };
-    let losses = [curve("training", |e| e.training_loss), curve("held out", |e| e.held_out_loss)];
+    let losses = [curve("training", |e| e.training_loss), curve("validation", |e| e.validation_loss)];
     let rate = [curve("learning rate", |e| e.learning_rate)];
     let body = format!(
         "{}{}<h2>Loss</h2>{}<h2>Learning rate</h2>{}<h2>Held-out cases</h2><p class=\"small\">{}</p>\
@@ -53,7 +53,7 @@ fn summary(record: &Record) -> String {
 
 fn table(record: &Record) -> String {
     let mut text =
-        "<table><tr><th>held-out net force</th><th>samples</th><th></th><th>MAE [N]</th><th>RMSE [N]</th>\
+        "<table><tr><th>held-out net force</th><th>number</th><th></th><th>MAE [N]</th><th>RMSE [N]</th>\
                     <th>spread of the target [N]</th></tr>"
             .to_owned();
     for vehicle in record.vehicles.iter().filter(|vehicle| vehicle.score.samples > 0) {
@@ -67,5 +67,5 @@ fn table(record: &Record) -> String {
             );
         }
     }
-    text + "</table>\n"
+    text + "</table>\n" + &format!("<p class=\"small\">Errors of {}.</p>\n", record.judged())
 }

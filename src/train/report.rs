@@ -138,6 +138,15 @@ pub fn sha256_of(path: &Path) -> std::io::Result<String> {
 }
 
 impl Record {
+    /// What the errors on the held-out side are of.
+    pub fn judged(&self) -> &'static str {
+        if self.variant == super::anchored::NAME {
+            "states, each the mean of its sections"
+        } else {
+            "sections"
+        }
+    }
+
     /// The record of a training.
     pub fn new<L>(
         trained: &Trained<L>,

@@ -1,4 +1,4 @@
-//! Everything that the epochs need: both sides of a split as rows, sizes of the layers, and what is minimised.
+//! Everything that the epochs need: what is learnt from and looked at as rows, sizes of the layers, and what is minimised.
 
 use nalgebra::DMatrix;
 use sha2::{Digest, Sha256};
@@ -18,8 +18,8 @@ pub struct Task {
     pub sizes: Sizes,
     /// What the weights learn from.
     pub training: Vec<Rows>,
-    /// What they are judged by.
-    pub held_out: Vec<Rows>,
+    /// What the loss is looked at besides: what sets the pace of the paper's network, and nothing of the anchored one.
+    pub validation: Vec<Rows>,
     /// What is minimised.
     pub objective: Objective,
     /// Inputs that never vary in training, of which nothing can be learnt.
@@ -27,19 +27,19 @@ pub struct Task {
 }
 
 impl Task {
-    /// Rows of both sides, standardised by the training side alone.
+    /// Rows to learn from and to be looked at, standardised by the former alone.
     pub fn new(
         variant: Variant,
         training: &[Sample],
-        held_out: &[Sample],
+        validation: &[Sample],
         config: &Config,
     ) -> Result<(Self, Scaling), TrainError> {
-        if training.is_empty() || held_out.is_empty() {
-            let side = if training.is_empty() { "training" } else { "held-out" };
+        if training.is_empty() || validation.is_empty() {
+            let side = if training.is_empty() { "training" } else { "validation" };
             return Err(TrainError::EmptySide { side });
         }
         let view = |side: &[Sample]| side.iter().map(|sample| variant.view(sample)).collect::<Vec<_>>();
-        let (training, held_out) = (view(training), view(held_out));
+        let (training, validation) = (view(training), view(validation));
         let scaling = scaling(&training);
         let rows = |side: &[Sample]| {
             side.iter().map(|view| variant.rows(view, &scaling, config.loss.dry_fraction)).collect()
@@ -48,7 +48,7 @@ impl Task {
         let task = Self {
             sizes: variant.sizes(),
             training: rows(&training),
-            held_out: rows(&held_out),
+            validation: rows(&validation),
             objective: Objective::Paper {
                 config: config.loss,
                 scale: TargetScale { std: scaling.target_std, mean: scaling.target_mean },
@@ -80,7 +80,7 @@ impl Task {
     /// SHA-256 of all that the bits of the weights depend on but the number of epochs.
     pub fn digest(&self, config: &Config) -> String {
         let mut hash = Sha256::new();
-        for rows in self.training.iter().chain(&self.held_out) {
+        for rows in self.training.iter().chain(&self.validation) {
             hash.update(rows.vehicle.to_le_bytes());
             rows.inputs.iter().chain(&rows.targets).for_each(|x| hash.update(x.to_le_bytes()));
         }

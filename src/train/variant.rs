@@ -81,11 +81,11 @@ impl Objective {
         }
     }
 
-    /// The loss that sets the pace of the learning rate: the held-out one, as in the paper. A network that is taught by a
+    /// The loss that sets the pace of the learning rate: that of validation, as in the paper. A network that is taught by a
     /// regression goes by its own: what held-out cases scatter is nothing that it could learn.
-    pub fn pace(&self, training: f64, held_out: f64) -> f64 {
+    pub fn pace(&self, training: f64, validation: f64) -> f64 {
         match self {
-            Self::Paper { .. } => held_out,
+            Self::Paper { .. } => validation,
             Self::Anchored(_) => training,
         }
     }

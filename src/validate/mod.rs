@@ -221,7 +221,7 @@ pub fn run(
         return Err(ValidateError::TooFewSections { sections, depths, least });
     }
     let drag_scaling = drag::drag_scaling(&groups, &vehicle.name, vehicle.dimensions.width, &config.pairs);
-    let vertical_force = vertical::vertical_force(&groups, vehicle, config.groups.speed_mps);
+    let vertical_force = vertical::vertical_force(&groups, vehicle, config.groups.speed_mps, least);
     let checks = drag_scaling.checks(&sections, &config.thresholds).into_iter();
     let checks = checks.chain(vertical_force.checks(&config.thresholds)).collect();
     Ok(Tests { checks, drag_scaling, vertical_force, sections, left_out })

@@ -74,7 +74,8 @@ pub fn planar_section(trial: &Trial, config: &PlanarConfig) -> Result<Range<usiz
     let depth = most_frequent_depth(trial, &moving, config).ok_or(NotPlanar::Dry)?;
     let inside = |i: &usize| moving[*i] && (trial.depth[*i] - depth).abs() <= config.depth_tolerance_m;
     let run = longest_run(trial, inside);
-    let duration_s = trial.t[run.end - 1] - trial.t[run.start];
+    // few samples at the ends of the window may all be a rounding farther from their mean than the tolerance
+    let duration_s = run.clone().last().map_or(0.0, |last| trial.t[last] - trial.t[run.start]);
     if duration_s <= config.duration_s || run.len() <= config.samples {
         return Err(NotPlanar::Short { samples: run.len(), duration_s });
     }
@@ -97,7 +98,7 @@ fn most_frequent_depth(trial: &Trial, moving: &[bool], config: &PlanarConfig) ->
     Some(depths[start..start + count].iter().sum::<f64>() / count as f64)
 }
 
-/// The longest run of samples without a hole in time; of one sample at least.
+/// The longest run of samples without a hole in time; empty where none is inside.
 fn longest_run(trial: &Trial, inside: impl Fn(&usize) -> bool) -> Range<usize> {
     let mut longest = 0..0;
     for piece in pieces(&trial.t) {

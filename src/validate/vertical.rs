@@ -89,9 +89,14 @@ impl SpeedBin {
     }
 }
 
-/// Fits each depth, and sets the intercepts against depth and against the mesh.
-pub fn vertical_force(groups: &[DepthGroup<'_>], vehicle: &Vehicle, bin_mps: f64) -> VerticalForce {
-    let depths: Vec<VerticalAtDepth> = groups.iter().map(|group| at_depth(group, vehicle)).collect();
+/// Fits each depth that has at least so many sections, and sets the intercepts against depth and against the mesh.
+pub fn vertical_force(
+    groups: &[DepthGroup<'_>],
+    vehicle: &Vehicle,
+    bin_mps: f64,
+    least: usize,
+) -> VerticalForce {
+    let depths: Vec<VerticalAtDepth> = groups.iter().map(|group| at_depth(group, vehicle, least)).collect();
     VerticalForce {
         f0_against_depth: f0_against_depth(&depths, vehicle),
         speed_bins: speed_bins(groups, bin_mps),
@@ -110,9 +115,10 @@ fn mesh_curve(groups: &[DepthGroup<'_>], vehicle: &Vehicle) -> Vec<(f64, f64, f6
     (0..=CURVE_STEPS).map(point).collect()
 }
 
-fn at_depth(group: &DepthGroup<'_>, vehicle: &Vehicle) -> VerticalAtDepth {
+fn at_depth(group: &DepthGroup<'_>, vehicle: &Vehicle, least: usize) -> VerticalAtDepth {
     let fz = group.values(|section| section.fz_n);
-    let fit: Option<LineFit> = line(&group.values(|section| section.speed_squared_m2ps2), &fz);
+    let fit: Option<LineFit> = line(&group.values(|section| section.speed_squared_m2ps2), &fz)
+        .filter(|_| group.sections.len() >= least);
     let (mesh_wetted_n, mesh_dry_n) = at_rest(vehicle, group.depth_m, group.density_kgpm3);
     VerticalAtDepth {
         depth_m: group.depth_m,
@@ -204,7 +210,10 @@ impl VerticalForce {
                         "F0 against depth is a line through {} points with R2 {:.4}; {least} is asked for.",
                         f0.points, f0.r2
                     ),
-                    None => "F0 is known at fewer than three depths: no line can be judged.".to_owned(),
+                    None => format!(
+                        "F0 is known at fewer than three depths, each of {} sections or more: no line can be judged.",
+                        thresholds.sections
+                    ),
                 },
             ),
             Check::new(

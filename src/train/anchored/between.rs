@@ -44,13 +44,17 @@ impl<'a> Between<'a> {
         taught
     }
 
-    /// For each training state one more among it and two neighbors; none of a vehicle that the teacher does not know. On a
-    /// line through two cases, where the network was taught, it is nearer to the teacher than it is elsewhere.
-    pub fn fresh(&self, random: &mut Random) -> Vec<Option<Known>> {
+    /// For each training state `count` more among it and two neighbors, fewer of one that has none; nothing of a vehicle that
+    /// the teacher does not know. On a line through two cases, where the network was taught, it is nearer to the teacher than
+    /// it is elsewhere.
+    pub fn fresh(&self, count: usize, random: &mut Random) -> Vec<Vec<Known>> {
         let mut of = |state: &Known| {
             let near = self.neighbors(state);
-            let on_a_line = drawn(state.condition, &near, random)?;
-            self.learn(state, drawn(on_a_line, &near, random)?)
+            let mut one = || {
+                let on_a_line = drawn(state.condition, &near, random)?;
+                self.learn(state, drawn(on_a_line, &near, random)?)
+            };
+            (0..count).filter_map(|_| one()).collect()
         };
         self.training.iter().map(&mut of).collect()
     }

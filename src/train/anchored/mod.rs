@@ -1,16 +1,18 @@
 //! Learning the remainder that the anchored model adds to hydrostatics and a simple drag ([`crate::anchor`]).
 //!
 //! Reading order: `known` (states and what CFD found), `gaussian` and `teacher` (what the cases say together), `between`
-//! (the states in which it is taught), `loss`, this file (rows, the network, where the training cases lie), `spread` (how
-//! far the answer may be off).
+//! (the states in which it is taught), `loss`, this file (rows, the network, where the training cases lie), `ensemble` and
+//! `spread` (how far the answer may be off).
 
 mod between;
+mod ensemble;
 mod gaussian;
 pub mod known;
 pub mod loss;
 pub mod spread;
 mod teacher;
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use nalgebra::DMatrix;
@@ -23,12 +25,13 @@ use super::task::Task;
 use super::variant::{Objective, Rows};
 use super::{Config, Sides, Source, TrainError, Trained, TrainedVehicle, domain, run};
 use crate::anchor::{COORDINATES, DYNAMIC, GLOBAL, OUTPUTS, STATIC};
-use crate::dataset::Image;
+use crate::dataset::{Image, split};
 use crate::frame::Vec3;
 use crate::model::network::WIDTH;
 use crate::model::{Anchored, Form, SPREAD, Weights};
 use crate::random::Random;
 use between::Between;
+use ensemble::Ensemble;
 use known::{Known, Prepared};
 use spread::{Missed, Spread};
 use teacher::Teacher;
@@ -41,6 +44,11 @@ pub const SIZES: Sizes = Sizes { inputs: STATIC + DYNAMIC + GLOBAL, width: WIDTH
 
 /// Share of the training cases that keep at most the usual distance to their nearest neighbor.
 const USUAL: f64 = 0.95;
+/// States between the cases, for each case, in which the ensemble is asked how far it goes apart.
+const FRESH: usize = 3;
+
+/// What goes with the network, by vehicle: the same standardisation, and its own factors and cases.
+pub type Learnt = BTreeMap<String, Box<Anchored>>;
 
 /// Trains one network for all vehicles of a data set to answer as the regressions do that are fitted to the training cases,
 /// and to say how far off these are in a case that they do not know.
@@ -50,14 +58,14 @@ pub fn train(
     config: &Config,
     checkpoint: Option<&Checkpoint>,
     progress: &dyn Fn(&Epoch),
-) -> Result<Trained<Box<Anchored>>, TrainError> {
+) -> Result<Trained<Learnt>, TrainError> {
     config.validate()?;
     sides.check(&source.data)?;
     let vehicles = Prepared::all(&source.data, &source.vehicles)?;
     let states = |numbers: &[usize]| Known::states(&source.data, numbers, &vehicles);
     let (training, held_out) = (states(&sides.split.training), states(&sides.split.held_out));
-    let (mut form, unit) = form(&training);
-    let teacher = Teacher::new(&training, &vehicles, unit)?;
+    let (form, unit) = form(&training);
+    let teacher = Teacher::new(training.iter(), &vehicles, unit, None)?;
     let mut random = Random::new(config.seed);
     let between = Between { training: &training, vehicles: &vehicles, teacher: &teacher, unit: &unit };
     let taught = between.taught(config.anchored.between, &mut random);
@@ -67,19 +75,21 @@ pub fn train(
     let epoch_s = (epochs > 0).then(|| begun.elapsed().as_secs_f64() / f64::from(epochs));
     let (mut layers, kept_epoch) = fit.kept();
     let history = fit.state.history;
-    let mut errors = teacher.errors(training.len());
-    // states that the network has not seen tell what it loses of what it was taught
-    for (error, state) in errors.iter_mut().zip(between.fresh(&mut random)) {
-        let lost = |s: &Known| predict(&layers, s, &vehicles[s.vehicle], &form) - s.dynamic();
-        *error += state.as_ref().map_or_else(Vec3::zeros, lost);
-    }
-    let spread = Spread::fit(&missed(&layers, &training, &vehicles, &form, &errors));
-    form.spread = spread.factors.map(|k| k as f32);
+    let state_of = split::state_of(&source.data);
+    let state_of = |state: &Known| state_of[state.case.as_str()];
+    let ensemble = Ensemble::new(&training, &state_of, &vehicles, (&teacher, unit), &mut random)?;
+    let fresh = between.fresh(FRESH, &mut random);
+    let missed = missed(&layers, (&training, &fresh), &vehicles, &form, (&ensemble, &teacher));
+    let spread = Spread::fit(&missed, vehicles.len());
     layers.set_output(SPREAD, &spread.weights, spread.bias);
+    let of_vehicle = |(index, factors): (usize, &[f64; 3])| {
+        (vehicles[index].name.clone(), of_vehicle(&form, &training, index, factors))
+    };
+    let learnt = spread.factors.iter().enumerate().map(of_vehicle).collect();
     let mut trained =
-        Trained { name: NAME, layers, learnt: form, vehicles: Vec::new(), history, kept_epoch, epoch_s };
+        Trained { name: NAME, layers, learnt, vehicles: Vec::new(), history, kept_epoch, epoch_s };
     trained.vehicles = (0..vehicles.len())
-        .map(|index| trained.vehicle(index, &vehicles, source, sides, [&training, &held_out]))
+        .map(|index| trained.vehicle(index, &vehicles, source, sides, &held_out))
         .collect::<Result<_, _>>()?;
     Ok(trained)
 }
@@ -89,37 +99,45 @@ pub fn train(
 /// a state over the other bed is no stranger.
 const LEAST_UNIT: [f64; COORDINATES] = [0.05, 0.05, 0.05, 0.2, 0.2, 0.1, 0.1, 10.0];
 
-/// Standardisation, and where the training cases lie, with the unit of each coordinate.
-fn form(training: &[Known]) -> (Box<Anchored>, [f64; COORDINATES]) {
+/// Standardisation, and the unit of each coordinate.
+fn form(training: &[Known]) -> (Anchored, [f64; COORDINATES]) {
     let (mean, std) = super::task::moments(training.iter().map(|state| state.reading.global));
     let scale = units(training.iter().map(|state| state.reading.coordinates));
-    let mut form = Box::new(Anchored {
+    let form = Anchored {
         global_mean: mean.map(|x| x as f32),
         global_std: std.map(|x| x as f32),
         spread: [0.0; 3],
         cases: Vec::new(),
         coordinate_scale: scale.map(|x| x as f32),
         near: 1.0,
-    });
-    let places: Vec<[f32; COORDINATES]> =
-        training.iter().map(|state| form.place(&state.reading.coordinates)).collect();
+    };
+    (form, scale)
+}
+
+/// The same for a vehicle, with its factors and where its training cases lie; those of all vehicles where none is of this one:
+/// a state in which another was asked is near to nothing that is known of it.
+fn of_vehicle(form: &Anchored, training: &[Known], vehicle: usize, factors: &[f64; 3]) -> Box<Anchored> {
+    let places = |of: &dyn Fn(&Known) -> bool| -> Vec<[f32; COORDINATES]> {
+        training.iter().filter(|s| of(s)).map(|state| form.place(&state.reading.coordinates)).collect()
+    };
+    let own = places(&|state| state.vehicle == vehicle);
+    let cases = if own.is_empty() { places(&|_| true) } else { own };
     let squared = |a: &[f32; COORDINATES], b: &[f32; COORDINATES]| -> f32 {
         a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
     };
-    let mut nearest: Vec<f32> = places
+    let mut nearest: Vec<f32> = cases
         .iter()
         .enumerate()
         .map(|(i, here)| {
-            let others = places.iter().enumerate().filter(|(j, _)| *j != i);
+            let others = cases.iter().enumerate().filter(|(j, _)| *j != i);
             others.map(|(_, there)| squared(here, there)).fold(f32::INFINITY, f32::min).sqrt()
         })
         .filter(|distance| distance.is_finite() && *distance > 0.0)
         .collect();
     nearest.sort_by(f32::total_cmp);
     let usual = (USUAL * nearest.len() as f64) as usize;
-    form.near = nearest.get(usual).or(nearest.last()).copied().unwrap_or(1.0);
-    form.cases = places;
-    (form, scale)
+    let near = nearest.get(usual).or(nearest.last()).copied().unwrap_or(1.0);
+    Box::new(Anchored { spread: factors.map(|k| k as f32), cases, near, ..form.clone() })
 }
 
 /// Standard deviation of each coordinate, or the least unit where that is larger.
@@ -146,7 +164,7 @@ fn task(
     let rows = |states: &[Known]| -> Vec<Rows> {
         states.iter().map(|state| rows(state, &vehicles[state.vehicle], form, config)).collect()
     };
-    let (training, held_out) = (rows(training), rows(held_out));
+    let (training, validation) = (rows(training), rows(held_out));
     let same = |input: &usize| {
         let mut values =
             training.iter().flat_map(|rows| rows.inputs.iter().skip(*input).step_by(SIZES.inputs));
@@ -155,7 +173,7 @@ fn task(
     };
     let constant = (0..SIZES.inputs).filter(same).collect();
     let objective = Objective::Anchored(config.anchored.loss);
-    Ok(Task { sizes: SIZES, training, held_out, objective, constant })
+    Ok(Task { sizes: SIZES, training, validation, objective, constant })
 }
 
 /// A row a surface: its static features, those that change, the standardised global ones.
@@ -197,35 +215,52 @@ fn predict(layers: &Layers<f32>, state: &Known, prepared: &Prepared, form: &Anch
     state.reading.surfaces.iter().enumerate().map(force).sum()
 }
 
+/// What is known of the errors: those of cases, and how large they are expected to be in states between them.
 fn missed(
     layers: &Layers<f32>,
-    training: &[Known],
+    (training, fresh): (&[Known], &[Vec<Known>]),
     vehicles: &[Prepared],
     form: &Anchored,
-    errors: &[Vec3],
+    (ensemble, teacher): (&Ensemble, &Teacher),
 ) -> Vec<Missed> {
-    let of = |(state, error): (&Known, &Vec3)| {
+    let of = |state: &Known, part: usize, is_case: bool, error: Vec3| {
         let activations = layers.forward(&columns(state, &vehicles[state.vehicle], form));
         let hidden = &activations.hidden2;
         let wet = state.reading.surfaces.iter().enumerate().filter(|(_, surface)| surface.wet_fraction > 0.0);
         let surfaces =
             wet.map(|(column, surface)| (hidden.column(column).iter().copied().collect(), surface.unit));
-        Missed { surfaces: surfaces.collect(), error: (*error).into() }
+        Missed { vehicle: state.vehicle, part, is_case, surfaces: surfaces.collect(), error: error.into() }
     };
-    // an image is missed by as much as its original
-    let originals = training.iter().zip(errors).filter(|(state, _)| state.image == Image::Original);
-    originals.map(of).collect()
+    let mut missed = Vec::new();
+    for (number, (state, fresh)) in training.iter().zip(fresh).enumerate() {
+        let (prepared, part) = (&vehicles[state.vehicle], ensemble.parts[number]);
+        // an image is missed by as much as its original
+        let of_case = ensemble.missed(number, state, prepared).filter(|_| state.image == Image::Original);
+        let Some(of_case) = of_case else { continue };
+        // states that the network has not seen tell what it loses of what it was taught
+        let lost = |fresh: &Known| predict(layers, fresh, prepared, form) - fresh.dynamic();
+        missed.push(of(state, part, true, of_case + fresh.first().map_or_else(Vec3::zeros, lost)));
+        for fresh in fresh {
+            let parts = [ensemble.deviation(fresh, prepared), teacher.noise(fresh, prepared), lost(fresh)];
+            let expected = parts.iter().map(|part| part.component_mul(part)).sum::<Vec3>().map(f64::sqrt);
+            // the mean magnitude of a Laplace distribution of that deviation
+            missed.push(of(fresh, part, false, expected * std::f64::consts::FRAC_1_SQRT_2));
+        }
+    }
+    missed
 }
 
-impl Trained<Box<Anchored>> {
+impl Trained<Learnt> {
     /// The net force in a state by the trainer's own forward pass, hydrostatics included [N].
     pub fn net_force(&self, state: &Known, vehicles: &[Prepared]) -> Vec3 {
-        state.hydrostatic() + predict(&self.layers, state, &vehicles[state.vehicle], &self.learnt)
+        let prepared = &vehicles[state.vehicle];
+        state.hydrostatic() + predict(&self.layers, state, prepared, &self.learnt[&prepared.name])
     }
 
-    /// The weights as they are served.
-    pub fn weights(&self, provenance: String) -> Weights {
-        Weights { network: self.layers.network(), form: Form::Anchored(self.learnt.clone()), provenance }
+    /// The weights of a vehicle as they are served.
+    pub fn weights(&self, of_vehicle: &TrainedVehicle, provenance: String) -> Weights {
+        let form = Form::Anchored(self.learnt[&of_vehicle.name].clone());
+        Weights { network: self.layers.network(), form, provenance }
     }
 
     fn vehicle(
@@ -234,7 +269,7 @@ impl Trained<Box<Anchored>> {
         vehicles: &[Prepared],
         source: &Source,
         sides: Sides<'_>,
-        [training, held_out]: [&[Known]; 2],
+        held_out: &[Known],
     ) -> Result<TrainedVehicle, TrainError> {
         let judged = |state: &Known| {
             let density = state.condition.density;
@@ -242,14 +277,9 @@ impl Trained<Box<Anchored>> {
             let guess = self.net_force(state, vehicles) / density;
             Judged { density, truth: truth.into(), guess: guess.into() }
         };
-        let score = |states: &[Known]| Score::of(states.iter().filter(|s| s.vehicle == index).map(judged));
-        let (name, held_out) = (vehicles[index].name.clone(), score(held_out));
-        let of_all = if held_out.samples > 0 { held_out } else { score(training) };
-        Ok(TrainedVehicle {
-            domain: domain::learnt(&name, source, sides)?,
-            held_out_rms: of_all.rms_over_density,
-            score: held_out,
-            name,
-        })
+        let name = vehicles[index].name.clone();
+        let of_vehicle = held_out.iter().filter(|state| state.vehicle == index);
+        let score = Score::of(of_vehicle.map(judged));
+        Ok(TrainedVehicle { domain: domain::learnt(&name, source, sides)?, score, name })
     }
 }

@@ -48,29 +48,28 @@ struct OfVehicle {
     has_moments: bool,
     /// One an axis of the force.
     axes: Vec<Regression<COORDINATES>>,
-    /// What each of the training states would be missed by, were it not known [N]; by its number among them.
-    errors: Vec<(usize, Vec3)>,
 }
 
 impl Teacher {
-    /// Learns from states, with the unit of each coordinate.
-    pub fn new(
-        training: &[Known],
+    /// Learns from states, with the unit of each coordinate; from nearly the same as another did, where there is one.
+    pub fn new<'a>(
+        training: impl Iterator<Item = &'a Known> + Clone,
         vehicles: &[Prepared],
         unit: [f64; COORDINATES],
+        like: Option<&Self>,
     ) -> Result<Self, TrainError> {
         let of = |(index, prepared): (usize, &Prepared)| {
-            let of_vehicle = training.iter().enumerate().filter(|(_, state)| state.vehicle == index);
-            let moves = |state: &Known| scale(&state.condition, &state.reading, prepared) > 0.0;
-            let (states, images): (Vec<_>, Vec<_>) = of_vehicle
-                .filter(|(_, state)| moves(state))
-                .partition(|(_, state)| state.image == Image::Original);
+            let moves = |state: &&Known| scale(&state.condition, &state.reading, prepared) > 0.0;
+            let of_vehicle = training.clone().filter(|state| state.vehicle == index);
+            let (states, images): (Vec<_>, Vec<_>) =
+                of_vehicle.filter(moves).partition(|state| state.image == Image::Original);
             if states.is_empty() {
                 return Ok(None);
             }
             let failed = || TrainError::Covariance { vehicle: prepared.name.clone() };
             let mirrors = [!images.is_empty(), prepared.vehicle.symmetric_left_right];
-            OfVehicle::new(&states, prepared, (unit, mirrors)).map(Some).ok_or_else(failed)
+            let like = like.and_then(|other| other.vehicles[index].as_ref());
+            OfVehicle::new(&states, prepared, (unit, mirrors), like).map(Some).ok_or_else(failed)
         };
         let vehicles = vehicles.iter().enumerate().map(of).collect::<Result<_, _>>()?;
         Ok(Self { vehicles })
@@ -86,28 +85,28 @@ impl Teacher {
         self.vehicles[vehicle].as_ref().map(|of| of.loads(condition, reading, prepared))
     }
 
-    /// What each training state would be missed by, were it not known [N]; nothing of images and of states at rest.
-    pub fn errors(&self, states: usize) -> Vec<Vec3> {
-        let mut errors = vec![Vec3::zeros(); states];
-        for &(number, error) in self.vehicles.iter().flatten().flat_map(|of| &of.errors) {
-            errors[number] = error;
-        }
-        errors
+    /// Standard deviation of what the net force in a state has for noise, as the cases say it [N]; nothing where nothing moves
+    /// and of a vehicle that was not learnt.
+    pub fn noise(&self, state: &Known, prepared: &Prepared) -> Vec3 {
+        let axes = self.vehicles[state.vehicle].iter().flat_map(|of| &of.axes);
+        let noise = Vec3::from_iterator(axes.map(|axis| axis.noise).chain([0.0; 3]).take(3));
+        noise * scale(&state.condition, &state.reading, prepared)
     }
 }
 
 impl OfVehicle {
     fn new(
-        states: &[(usize, &Known)],
+        states: &[&Known],
         prepared: &Prepared,
         (unit, mirrors): ([f64; COORDINATES], [bool; 2]),
+        like: Option<&Self>,
     ) -> Option<Self> {
         let scale_of = |state: &Known| scale(&state.condition, &state.reading, prepared);
-        let has_moments = states.iter().all(|(_, state)| state.loads.iter().all(|load| load.1.is_some()));
+        let has_moments = states.iter().all(|state| state.loads.iter().all(|load| load.1.is_some()));
         let surfaces = prepared.vehicle.surfaces.len();
         // a row a state: six numbers a surface, without a dimension
         let mut rows = DMatrix::zeros(states.len(), 6 * surfaces);
-        for (row, (_, state)) in states.iter().enumerate() {
+        for (row, state) in states.iter().enumerate() {
             let loads = View::of(&state.condition, mirrors).loads(&state.loads, prepared);
             for (surface, (force, moment)) in loads.iter().enumerate() {
                 let moment = moment.unwrap_or_default() / prepared.vehicle.dimensions.length;
@@ -117,10 +116,8 @@ impl OfVehicle {
         }
         let places: Vec<_> = states
             .iter()
-            .map(|(_, s)| View::of(&s.condition, mirrors).place(&s.condition, &s.reading, &unit))
+            .map(|s| View::of(&s.condition, mirrors).place(&s.condition, &s.reading, &unit))
             .collect();
-        let mut errors: Vec<(usize, Vec3)> =
-            states.iter().map(|(number, _)| (*number, Vec3::zeros())).collect();
         let mut axes = Vec::with_capacity(3);
         for (axis, members) in OF_AXIS.into_iter().enumerate() {
             let columns: Vec<usize> =
@@ -129,16 +126,11 @@ impl OfVehicle {
             // the first of the members is the force itself
             let net = DVector::from_fn(values.ncols(), |i, _| if i % members.len() == 0 { 1.0 } else { 0.0 });
             let leading = &values * &net;
-            let scatter: Vec<f64> = states.iter().map(|(_, s)| s.scatter[axis] / scale_of(s)).collect();
-            let regression = Regression::new(places.clone(), leading.as_slice(), &scatter, &values)?;
-            for ((_, error), (missed, (_, state))) in
-                errors.iter_mut().zip(regression.left_out(&net).into_iter().zip(states))
-            {
-                error[axis] = missed * scale_of(state);
-            }
-            axes.push(regression);
+            let scatter: Vec<f64> = states.iter().map(|s| s.scatter[axis] / scale_of(s)).collect();
+            let like = like.map(|other| &other.axes[axis]);
+            axes.push(Regression::new(places.clone(), leading.as_slice(), &scatter, &values, like)?);
         }
-        Some(Self { unit, mirrors, has_moments, axes, errors })
+        Some(Self { unit, mirrors, has_moments, axes })
     }
 
     fn loads(&self, condition: &Condition, reading: &Reading, prepared: &Prepared) -> Vec<Load> {
