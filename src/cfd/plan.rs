@@ -33,7 +33,7 @@ pub enum Set {
     Driving,
     /// Surge accelerations.
     Unsteady,
-    /// Cases that others know the answer of: at rest, head-on at the paper's depths, three meshes.
+    /// Cases that others know the answer of: at rest, head-on at the paper's depths, four meshes.
     Check,
     /// Straight ahead over the depths and speeds of the table: how a vehicle is driven most, and an edge of the
     /// hypercube that holds next to no case.
@@ -391,13 +391,13 @@ impl Plan {
             .collect()
     }
 
-    /// At rest at three depths; head-on at two speeds for each; one of them on three meshes.
+    /// At rest at three depths; head-on at two speeds for each; one of them on four meshes.
     fn checks(&self) -> Vec<Case> {
         let speed = self.campaign.table.speed_mps.max;
         let depths = self.trial_depths();
         let speeds = [0.0, 0.25 * speed, 0.5 * speed];
         let states = depths.iter().flat_map(|&depth| speeds.map(|speed| (speed, depth, 1.0)));
-        let meshes = [0.72, 0.5].map(|scale| (speeds[2], depths[1], scale));
+        let meshes = [0.72, 0.5, 0.36].map(|scale| (speeds[2], depths[1], scale));
         let mut all: Vec<(f64, f64, f64)> = states.chain(meshes).collect();
         // a table of one depth asks for each state three times
         let mut seen = Vec::new();

@@ -1,5 +1,5 @@
 //! How much of the plan is computed, and how far it can be trusted: at rest against Archimedes, head-on against the
-//! source paper, on three meshes, and the cases that look odd.
+//! source paper, on finer and finer meshes, and the cases that look odd.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
