@@ -168,10 +168,10 @@ pub enum SolveError {
 }
 
 impl SolveError {
-    /// True where smaller time steps may help: a solver that gave up, or wrote what is no number. One that was too slow would
-    /// be slower still.
+    /// True where smaller time steps may help: the solver gave up, wrote what is no number, or took too long, as it does
+    /// where its adaptive steps collapse.
     pub fn is_divergence(&self) -> bool {
-        matches!(self, Self::Program { program: "interFoam", .. } | Self::Forces(_))
+        matches!(self, Self::Program { program: "interFoam", .. } | Self::TooLong { .. } | Self::Forces(_))
     }
 }
 

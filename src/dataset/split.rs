@@ -78,7 +78,7 @@ pub enum SplitError {
         vehicle: String,
         /// What it has.
         found: usize,
-        /// States or samples.
+        /// Cases of different states, or samples.
         what: &'static str,
         /// What it needs.
         needed: usize,
@@ -192,7 +192,7 @@ fn held_out_count(count: usize, share: f64, vehicle: &str, what: &'static str) -
 fn by_case(dataset: &Dataset, share: f64, random: &mut Random) -> Result<Split, SplitError> {
     let mut held_out = BTreeSet::new();
     for (vehicle, mut states) in states(dataset) {
-        let count = held_out_count(states.len(), share, vehicle, "states")?;
+        let count = held_out_count(states.len(), share, vehicle, "cases of different states")?;
         random.fork().shuffle(&mut states);
         held_out.extend(states.into_iter().take(count).flatten());
     }
@@ -223,7 +223,12 @@ fn folds(dataset: &Dataset, count: usize, random: &mut Random) -> Result<Vec<Spl
     for (vehicle, mut states) in states(dataset) {
         if states.len() < count {
             let (vehicle, found) = (vehicle.to_owned(), states.len());
-            return Err(SplitError::TooFew { vehicle, found, what: "states", needed: count });
+            return Err(SplitError::TooFew {
+                vehicle,
+                found,
+                what: "cases of different states",
+                needed: count,
+            });
         }
         random.fork().shuffle(&mut states);
         let dealt = states.into_iter().enumerate();

@@ -208,7 +208,8 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
 
 fn rejected(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Rejected> {
     let whole = judge.missing();
-    let share = |gain: f64| (gain / whole).clamp(0.0, 1.0);
+    // where nothing is missing nothing has a share
+    let share = |gain: f64| if whole > f64::MIN_POSITIVE { (gain / whole).clamp(0.0, 1.0) } else { 0.0 };
     let free = library.iter().filter(|effect| !found.members.iter().any(|m| judge.effect(m) == **effect));
     let mut all: Vec<Rejected> = free
         .filter_map(|&effect| {
