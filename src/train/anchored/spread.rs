@@ -185,7 +185,7 @@ mod tests {
     fn states() -> Vec<Missed> {
         let mut random = Random::new(3);
         let mut state = |number: usize| {
-            let (on, vehicle) = (number % 2 == 0, number / 2 % 2);
+            let (on, vehicle) = (number.is_multiple_of(2), number / 2 % 2);
             let size = if on { 10.0 } else { 1.0 } * if vehicle == 1 { 2.0 } else { 1.0 };
             let mut laplace = || {
                 let u = random.unit() - 0.5;
