@@ -128,6 +128,11 @@ fn a_load_in_shallow_water_alone_is_described_there_and_not_applied() {
     assert_eq!(report.verdict, Verdict::NoCandidateFits, "{} {:?}", report.summary, names(&report));
     let text = report.gap.unexplained.clone().unwrap_or_default();
     assert!(text.contains("where depth <=") && report.effects.is_empty(), "{text}");
+    // whatever was found and is not named is told with what it would explain
+    let told = |name: &str| report.rejected.iter().any(|rejected| rejected.name == name);
+    let untold: Vec<_> =
+        report.excitation.iter().filter(|e| e.not_testable.is_none() && !told(e.name)).collect();
+    assert!(untold.is_empty(), "{untold:?}");
     let border = |region: &gap::Region| match &region.conditions[..] {
         [one] if one.quantity == "depth" => one.at_most,
         _ => None,
@@ -523,6 +528,14 @@ fn a_force_of_no_effect_has_no_name() {
         assert_eq!(report.verdict, Verdict::NoCandidateFits, "{name}: {}", report.summary);
         assert!(report.effects.is_empty() && report.gap.unexplained.is_some());
     }
+}
+
+#[test]
+fn what_passes_and_leaves_too_much_is_told_and_not_named() {
+    let report = run(&with(&["drag_coefficient_error", "outside_sine"], 3.0, 14).0);
+    assert_eq!(report.verdict, Verdict::NoCandidateFits, "{}", report.summary);
+    let drag = report.rejected.iter().find(|rejected| rejected.name == "drag_coefficient_error");
+    assert_eq!(drag.and_then(|drag| drag.why), Some(gap::Refusal::Incomplete), "{:?}", report.rejected);
 }
 
 #[test]

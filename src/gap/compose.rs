@@ -12,7 +12,7 @@ use super::experiment::separating;
 use super::fit::{Fit, Parameter, fit};
 use super::gated::Gated;
 use super::holdout::{closures, explained, worse};
-use super::judge::{Judge, Member};
+use super::judge::{Judge, Member, Refusal};
 use super::noise::{Floor, floors_of};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 use super::series::Series;
@@ -101,7 +101,7 @@ pub(super) fn compose(
         summary: String::new(),
         vehicle: trials.manifest.vehicle.clone(),
         generated: trials.manifest.generated.clone(),
-        rejected: rejected(judge, &found, library),
+        rejected: rejected(judge, &found, library, holds),
         effects,
         alternatives,
         separating_experiment,
@@ -206,19 +206,25 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
     loads
 }
 
-fn rejected(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Rejected> {
+/// What is not named: effects beside the set that was found, and its own members where it does not hold.
+fn rejected(judge: &Judge, found: &Found, library: &[Effect], holds: bool) -> Vec<Rejected> {
     let whole = judge.missing();
     // where nothing is missing nothing has a share
     let share = |gain: f64| if whole > f64::MIN_POSITIVE { (gain / whole).clamp(0.0, 1.0) } else { 0.0 };
-    let free = library.iter().filter(|effect| !found.members.iter().any(|m| judge.effect(m) == **effect));
-    let mut all: Vec<Rejected> = free
-        .filter_map(|&effect| {
-            let beside = judge.weighed(&found.members, effect)?;
-            let alone = judge.design.empty_loss() - judge.ranked(&[], effect)?.first()?.0;
-            let (why, name) = (beside.refused, effect.name());
-            Some(Rejected { name, why, share_of_gap: share(beside.gain), share_alone: share(alone) })
-        })
-        .collect();
+    let of = |&effect: &Effect| {
+        let others = found.members.iter().filter(|member| judge.effect(member) != effect);
+        let others: Vec<Member> = others.cloned().collect();
+        let is_member = others.len() < found.members.len();
+        if is_member && holds {
+            return None;
+        }
+        let beside = judge.weighed(&others, effect)?;
+        let alone = judge.design.empty_loss() - judge.ranked(&[], effect)?.first()?.0;
+        let why = beside.refused.or(is_member.then_some(Refusal::Incomplete));
+        let (share_of_gap, share_alone) = (share(beside.gain), share(alone));
+        Some(Rejected { name: effect.name(), why, share_of_gap, share_alone })
+    };
+    let mut all: Vec<Rejected> = library.iter().filter_map(of).collect();
     all.sort_by(|a, b| b.share_alone.total_cmp(&a.share_alone).then(a.name.cmp(b.name)));
     all
 }

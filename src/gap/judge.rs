@@ -76,6 +76,8 @@ pub enum Refusal {
     NotNew,
     /// Agrees with the gap from sample to sample alone, as the noise of the recorded motion does.
     SharedNoise,
+    /// Passes with others that passed, and together they leave too much to be named.
+    Incomplete,
 }
 
 /// What the gates said of an effect beside a set of columns.

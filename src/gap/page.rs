@@ -347,6 +347,7 @@ fn refusal(why: Refusal) -> &'static str {
         Refusal::NotNew => "says the same as the named",
         Refusal::SharedNoise => "agrees from sample to sample alone, as noise of the motion does",
         Refusal::Placebo => "no better than its placebos",
+        Refusal::Incomplete => "passes, but all that passes leaves too much to be named",
     }
 }
 
