@@ -164,6 +164,23 @@ impl Sample {
     }
 }
 
+/// The sections of one flow each: places in a list by case, image and condition, which tells the sections of an unsteady case
+/// apart.
+pub fn flows<'a>(sections: impl Iterator<Item = (&'a str, Image, &'a Condition)>) -> Vec<Vec<usize>> {
+    let mut flows: Vec<(&Condition, Vec<usize>)> = Vec::new();
+    let mut last: BTreeMap<(&str, Image), usize> = BTreeMap::new();
+    for (place, (case, image, condition)) in sections.enumerate() {
+        match last.get(&(case, image)).filter(|&&flow| flows[flow].0 == condition) {
+            Some(&flow) => flows[flow].1.push(place),
+            None => {
+                last.insert((case, image), flows.len());
+                flows.push((condition, vec![place]));
+            }
+        }
+    }
+    flows.into_iter().map(|(_, places)| places).collect()
+}
+
 impl Dataset {
     /// The samples of these numbers, in that order, with the same meta data.
     pub fn subset(&self, samples: &[usize]) -> Self {

@@ -9,7 +9,7 @@ use super::measure::{Calibration, Errors, Flow, mean_magnitude, percentile};
 use super::paper::{self, Paper};
 use super::states::State;
 use super::{EvaluateError, page};
-use crate::dataset::Image;
+use crate::dataset::flows;
 use crate::frame::Vec3;
 use crate::page::PlotError;
 use crate::train::Config;
@@ -149,7 +149,7 @@ impl VehicleReport {
         let under_evaluation = &heat.entries[0];
         Self {
             name: vehicle.name.clone(),
-            cases: heat.states.iter().map(|state| state.case.as_str()).collect::<BTreeSet<_>>().len(),
+            cases: cases(&heat.states),
             samples: heat.states.len(),
             mean_force_n: mean_magnitude(forces.iter()),
             mean_moment_nm: known.map(|moments| mean_magnitude(moments.iter())),
@@ -233,24 +233,21 @@ fn slices(heat: &Heat, forces: &[Vec3]) -> Vec<SliceReport> {
     slices
 }
 
+/// Number of cases.
+fn cases(states: &[State]) -> usize {
+    states.iter().map(|state| state.case.as_str()).collect::<BTreeSet<_>>().len()
+}
+
 /// What is stated is how far the mean flow may be off: errors are averaged over the sections of a case first.
 fn calibration(entry: &Entry, states: &[State]) -> Option<Calibration> {
-    let mut flows: Vec<(&State, Flow)> = Vec::new();
-    let mut last: BTreeMap<(&str, Image), usize> = BTreeMap::new();
-    for (state, prediction) in states.iter().zip(&entry.predictions) {
-        let (error, stated) = (prediction.force - state.force(), prediction.uncertainty?);
-        let flow = last.get(&(state.case.as_str(), state.image)).copied();
-        match flow.filter(|&flow| flows[flow].0.condition == state.condition) {
-            Some(flow) => flows[flow].1.errors.push(error),
-            None => {
-                last.insert((&state.case, state.image), flows.len());
-                flows.push((state, Flow { errors: vec![error], stated }));
-            }
-        }
-    }
-    let flows: Vec<Flow> = flows.into_iter().map(|(_, flow)| flow).collect();
-    let cases = last.keys().map(|(case, _)| case).collect::<BTreeSet<_>>().len();
-    Calibration::of(&flows, cases)
+    let sections = states.iter().map(|state| (state.case.as_str(), state.image, &state.condition));
+    let error = |place: &usize| entry.predictions[*place].force - states[*place].force();
+    let flow = |places: &Vec<usize>| {
+        let stated = entry.predictions[places[0]].uncertainty?;
+        Some(Flow { errors: places.iter().map(error).collect(), stated })
+    };
+    let flows: Option<Vec<Flow>> = flows(sections).iter().map(flow).collect();
+    Calibration::of(&flows?, cases(states))
 }
 
 fn parity(entry: &Entry, forces: &[Vec3]) -> Vec<(Vec3, Vec3)> {

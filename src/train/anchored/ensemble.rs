@@ -54,24 +54,21 @@ impl Ensemble {
 
     /// What a training state is missed by where its part is not known [N]; `None` where nothing else of its vehicle is.
     pub fn missed(&self, number: usize, state: &Known, prepared: &Prepared) -> Option<Vec3> {
-        let loads = self.members[self.parts[number]].loads(
-            state.vehicle,
-            (&state.condition, &state.reading),
-            prepared,
-        )?;
-        Some(loads.iter().map(|load| load.0).sum::<Vec3>() - state.dynamic())
+        apart(&self.members[self.parts[number]], state, prepared)
     }
 
     /// Standard deviation of the net force that the whole teacher answered a state with, by its members [N]: with a part left
     /// out each, `(n - 1) / n sum (f_i - f)^2` (the jackknife; Efron, Tibshirani, An Introduction to the Bootstrap, chapter 11).
     pub fn deviation(&self, state: &Known, prepared: &Prepared) -> Vec3 {
-        let apart = |member: &Teacher| {
-            let loads = member.loads(state.vehicle, (&state.condition, &state.reading), prepared)?;
-            Some(loads.iter().map(|load| load.0).sum::<Vec3>() - state.dynamic())
-        };
-        let squares: Vec<Vec3> =
-            self.members.iter().filter_map(apart).map(|apart| apart.component_mul(&apart)).collect();
+        let apart = self.members.iter().filter_map(|member| apart(member, state, prepared));
+        let squares: Vec<Vec3> = apart.map(|apart| apart.component_mul(&apart)).collect();
         let count = squares.len().max(1) as f64;
         (squares.iter().sum::<Vec3>() * ((count - 1.0) / count)).map(f64::sqrt)
     }
+}
+
+/// The net force that a member answers a state with, less the state's own [N]; `None` of a vehicle that it does not know.
+fn apart(member: &Teacher, state: &Known, prepared: &Prepared) -> Option<Vec3> {
+    let loads = member.loads(state.vehicle, (&state.condition, &state.reading), prepared)?;
+    Some(loads.iter().map(|load| load.0).sum::<Vec3>() - state.dynamic())
 }

@@ -6,7 +6,7 @@ use super::super::TrainError;
 use super::super::label;
 use crate::anchor::{Anchor, Reading, STATIC};
 use crate::condition::Condition;
-use crate::dataset::{Dataset, Image};
+use crate::dataset::{Dataset, Image, flows};
 use crate::frame::{GRAVITY, Vec3};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
@@ -78,23 +78,14 @@ impl Known {
     /// Images across the plane y = 0 are left out: the model answers them with the mirror image of the original's
     /// answer whatever its weights, so they would count each case twice and teach nothing.
     pub fn states(data: &Dataset, numbers: &[usize], vehicles: &[Prepared]) -> Vec<Self> {
-        let mut groups: Vec<(&crate::dataset::Sample, Vec<usize>)> = Vec::new();
-        let mut last: BTreeMap<(&str, Image), usize> = BTreeMap::new();
-        for &number in numbers {
-            let sample = &data.samples[number];
-            if !matches!(sample.image, Image::Original | Image::FrontRear) {
-                continue;
-            }
-            let key = (sample.case.as_str(), sample.image);
-            match last.get(&key).filter(|&&group| groups[group].0.condition == sample.condition) {
-                Some(&group) => groups[group].1.push(number),
-                None => {
-                    last.insert(key, groups.len());
-                    groups.push((sample, vec![number]));
-                }
-            }
-        }
-        let state = |(first, members): (&crate::dataset::Sample, Vec<usize>)| {
+        let taught =
+            |number: &usize| matches!(data.samples[*number].image, Image::Original | Image::FrontRear);
+        let numbers: Vec<usize> = numbers.iter().copied().filter(taught).collect();
+        let sections = numbers.iter().map(|&number| &data.samples[number]);
+        let flows = flows(sections.map(|s| (s.case.as_str(), s.image, &s.condition)));
+        let state = |places: Vec<usize>| {
+            let members: Vec<usize> = places.into_iter().map(|place| numbers[place]).collect();
+            let first = &data.samples[members[0]];
             let index = vehicles.iter().position(|prepared| prepared.name == first.vehicle)?;
             let prepared = &vehicles[index];
             let mut reading = Reading::default();
@@ -103,7 +94,7 @@ impl Known {
             let (case, image, condition) = (first.case.clone(), first.image, first.condition);
             Some(Self { vehicle: index, case, image, condition, reading, loads, scatter })
         };
-        groups.into_iter().filter_map(state).collect()
+        flows.into_iter().filter_map(state).collect()
     }
 
     /// Net hydrostatic force of the hull [N].
