@@ -33,8 +33,11 @@ pub enum Set {
     Driving,
     /// Surge accelerations.
     Unsteady,
-    /// Cases that others know the answer of: at rest, head-on at the paper's depths, four meshes.
+    /// Cases that others know the answer of: at rest, head-on at the paper's depths, three meshes.
     Check,
+    /// The state of the three meshes on a fourth: a million cells, an hour of a core. Weights do not learn from it; it says
+    /// how far the meshes that they learn from are off.
+    Mesh,
     /// Straight ahead over the depths and speeds of the table: how a vehicle is driven most, and an edge of the
     /// hypercube that holds next to no case.
     Ahead,
@@ -48,6 +51,7 @@ impl fmt::Display for Set {
             Self::Driving => "driving",
             Self::Unsteady => "unsteady",
             Self::Check => "check",
+            Self::Mesh => "mesh",
             Self::Ahead => "ahead",
         })
     }
@@ -310,6 +314,7 @@ impl Plan {
             Set::Driving => self.twins(count)?,
             Set::Unsteady => self.surges(),
             Set::Check => self.checks(),
+            Set::Mesh => self.finest(),
             Set::Ahead => self.ahead(),
         };
         let known: BTreeSet<String> = self.cases.iter().map(|c| c.id.clone()).collect();
@@ -391,13 +396,13 @@ impl Plan {
             .collect()
     }
 
-    /// At rest at three depths; head-on at two speeds for each; one of them on four meshes.
+    /// At rest at three depths; head-on at two speeds for each; one of them on three meshes.
     fn checks(&self) -> Vec<Case> {
         let speed = self.campaign.table.speed_mps.max;
         let depths = self.trial_depths();
         let speeds = [0.0, 0.25 * speed, 0.5 * speed];
         let states = depths.iter().flat_map(|&depth| speeds.map(|speed| (speed, depth, 1.0)));
-        let meshes = [0.72, 0.5, 0.36].map(|scale| (speeds[2], depths[1], scale));
+        let meshes = [0.72, 0.5].map(|scale| (speeds[2], depths[1], scale));
         let mut all: Vec<(f64, f64, f64)> = states.chain(meshes).collect();
         // a table of one depth asks for each state three times
         let mut seen = Vec::new();
@@ -414,6 +419,14 @@ impl Plan {
                 ..Case::steady(&self.campaign.vehicle, Set::Check, i, speed, depth)
             })
             .collect()
+    }
+
+    /// The check's state of several meshes on cells 0.36 times as long.
+    fn finest(&self) -> Vec<Case> {
+        let speed = 0.5 * self.campaign.table.speed_mps.max;
+        let [_, depth, _] = self.trial_depths();
+        let case = Case::steady(&self.campaign.vehicle, Set::Mesh, 0, speed, depth);
+        vec![Case { cell_scale: 0.36, ..case }]
     }
 
     /// Straight ahead at quarters of the highest speed: what the checks leave out at their depths, and all of it at
@@ -603,10 +616,21 @@ mod tests {
     }
 
     #[test]
+    fn the_fourth_mesh_is_of_the_state_of_the_other_three() {
+        let mut plan = plan();
+        plan.extend(Set::Check, 0, 1, 0.378).unwrap();
+        plan.extend(Set::Mesh, 0, 1, 0.378).unwrap();
+        let finer: Vec<&Case> = plan.cases.iter().filter(|case| case.cell_scale != 1.0).collect();
+        let scales: Vec<f64> = finer.iter().map(|case| case.cell_scale).collect();
+        assert_eq!(scales, [0.72, 0.5, 0.36]);
+        assert!(finer.iter().all(|case| coordinates(case) == coordinates(finer[0])));
+    }
+
+    #[test]
     fn a_folder_reads_back_as_written_and_a_bad_row_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let mut plan = plan();
-        for set in [Set::Paper, Set::Wide, Set::Unsteady, Set::Check, Set::Ahead] {
+        for set in [Set::Paper, Set::Wide, Set::Unsteady, Set::Check, Set::Mesh, Set::Ahead] {
             plan.extend(set, 5, 1, 0.378).unwrap();
         }
         plan.write(folder.path()).unwrap();

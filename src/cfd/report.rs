@@ -299,12 +299,12 @@ fn straight_ahead<'a>(cases: &'a [&CaseSummary]) -> Vec<&'a CaseSummary> {
 
 /// The check case that was computed on several meshes, coarsest first.
 fn meshes(cases: &[&CaseSummary]) -> Vec<OnMesh> {
-    let finer: Vec<&CaseSummary> = of_set(cases, Set::Check).filter(|case| case.cell_scale != 1.0).collect();
-    let Some(first) = finer.first() else { return Vec::new() };
+    let all = || of_set(cases, Set::Check).chain(of_set(cases, Set::Mesh));
+    let Some(first) = all().find(|case| case.cell_scale != 1.0) else { return Vec::new() };
     let same = |case: &&CaseSummary| {
         case.speed_mps == first.speed_mps && (case.depth_m - first.depth_m).abs() < 1e-9
     };
-    let mut all: Vec<&CaseSummary> = of_set(cases, Set::Check).filter(same).collect();
+    let mut all: Vec<&CaseSummary> = all().filter(same).collect();
     all.sort_by(|a, b| b.cell_scale.total_cmp(&a.cell_scale));
     let row = |case: &CaseSummary| OnMesh {
         id: case.id.clone(),

@@ -72,6 +72,7 @@ enum SetName {
     Driving,
     Unsteady,
     Check,
+    Mesh,
     Ahead,
 }
 
@@ -83,6 +84,7 @@ impl From<SetName> for Set {
             SetName::Driving => Self::Driving,
             SetName::Unsteady => Self::Unsteady,
             SetName::Check => Self::Check,
+            SetName::Mesh => Self::Mesh,
             SetName::Ahead => Self::Ahead,
         }
     }
