@@ -2,7 +2,7 @@
 //! forces have the right size and sign. Where OpenFOAM is not installed these tests say so and are skipped.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
@@ -118,25 +118,37 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
 
     // neither another solver's cases nor those of other settings join the data set
     let sections = std::fs::read(Path::new(&campaign).join("sections.parquet")).expect("a data set");
-    for (path, from, to, says) in [
-        (outcomes.join("husky-paper-0001.json"), solver.label(), "another solver".to_owned(), "computed by"),
+    let outcome = outcomes.join("husky-paper-0001.json");
+    let settings = Path::new(&campaign).join("campaign.toml");
+    let label = solver.label();
+    let edited = [
+        (vec![(&outcome, label.as_str(), "another solver")], "computed by"),
+        (vec![(&settings, "windows = ", "windows = 1")], "other settings"),
         (
-            Path::new(&campaign).join("campaign.toml"),
-            "windows = ".to_owned(),
-            "windows = 1".to_owned(),
+            vec![
+                (&settings, "windows = ", "windows = 1"),
+                (&outcome, "\"windows\":1,\"sample_s", "\"windows\":11,\"sample_s"),
+            ],
             "with the settings",
         ),
-    ] {
-        let text = std::fs::read_to_string(&path).expect("a file");
-        std::fs::write(&path, text.replace(&from, &to)).expect("written");
+    ];
+    for (edits, says) in edited {
+        let texts: Vec<String> =
+            edits.iter().map(|(path, ..)| std::fs::read_to_string(path).expect("a file")).collect();
+        for ((path, from, to), text) in edits.iter().zip(&texts) {
+            assert!(text.contains(from), "{text}");
+            std::fs::write(path, text.replace(from, to)).expect("written");
+        }
         let whole = std::fs::read_to_string(&summaries).expect("summaries");
         std::fs::write(&summaries, whole.lines().map(older).collect::<String>()).expect("written");
         let mixed = wade(&["campaign", "collect", &campaign]);
         let said = stderr(&mixed);
         assert!(!mixed.status.success() && said.contains(says), "{said}");
-        assert!(said.contains("husky-paper-0001") && said.contains("wade dataset merge"), "{said}");
+        assert!(said.contains("husky-paper-0001"), "{said}");
         std::fs::write(&summaries, whole).expect("written");
-        std::fs::write(&path, text).expect("written");
+        for ((path, ..), text) in edits.iter().zip(&texts) {
+            std::fs::write(path, text).expect("written");
+        }
     }
     assert_eq!(std::fs::read(Path::new(&campaign).join("sections.parquet")).expect("still there"), sections);
 
@@ -152,6 +164,27 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
     let report = wade(&["campaign", "report", &campaign, "--json"]);
     assert!(report.status.success() && stdout(&report).contains("\"suspicious\""), "{}", stderr(&report));
     assert!(stdout(&report).contains("\"outdated\": 0"), "{}", stdout(&report));
+}
+
+#[test]
+fn two_runs_in_one_folder_compute_each_case_once() {
+    if openfoam().is_none() {
+        return;
+    }
+    let (_folder, campaign) = planned(COARSE);
+    let run = || {
+        let mut run = command(&["campaign", "run", &campaign, "--jobs", "1"]);
+        run.stdout(Stdio::piped()).spawn().expect("wade runs")
+    };
+    let computed = [run(), run()].map(|run| {
+        let output = run.wait_with_output().expect("it ends");
+        let said = stdout(&output);
+        assert!(output.status.success() && said.contains(" 0 set aside"), "{said}");
+        said.split(' ').next().and_then(|count| count.parse::<usize>().ok()).expect("a count")
+    });
+    assert_eq!(computed.iter().sum::<usize>(), 2, "{computed:?}");
+    let collected = wade(&["campaign", "collect", &campaign]);
+    assert!(stdout(&collected).contains("2 of 2 cases, 2 of them new"), "{}", stderr(&collected));
 }
 
 #[test]
@@ -175,6 +208,54 @@ fn a_still_case_feels_archimedes_on_its_own_mesh() {
     println!("at rest the solver is {:+.2} % off Archimedes on the mesh", 100.0 * error);
     // -2.5 % where faces between cells of two sizes drive the air above them
     assert!(error.abs() < 0.01, "{error}");
+}
+
+/// Net force along x of the sections of a case, with their times and accelerations.
+fn along(data: &dataset::Dataset, case: &str) -> Vec<(f64, f64, f64)> {
+    let of_case = data.samples.iter().filter(|sample| sample.case == case);
+    of_case.map(|sample| (sample.start_s, sample.condition.acceleration.x, sample.net_force().x)).collect()
+}
+
+#[test]
+fn a_ramp_pulls_back_as_added_mass_does_a_bed_may_move_and_an_unsettled_case_gets_another_window() {
+    if openfoam().is_none() {
+        return;
+    }
+    let (_folder, campaign) = planned(&COARSE.replace("windows = 1", "windows = 2\ndrift = 0.0"));
+    let rows = "id,set,speed_mps,heading_deg,depth_m,density_kgpm3,roll_deg,pitch_deg,bed,cell_scale,end_speed_mps,ramp_s\n\
+                steady,paper,0.5,0,0.15,1000,0,0,parked,1,0.5,0\nrolling,driving,0.5,0,0.15,1000,0,0,driving,1,0.5,0\n\
+                ramp,unsteady,0.25,0,0.15,1000,0,0,parked,1,0.75,0.5\n";
+    std::fs::write(Path::new(&campaign).join("plan.csv"), rows).expect("written");
+    let run = wade(&["campaign", "run", &campaign, "--jobs", "2", "--keep"]);
+    assert!(run.status.success(), "{}", stderr(&run));
+    assert!(wade(&["campaign", "collect", &campaign]).status.success());
+    let data = dataset::read(&Path::new(&campaign).join("sections.parquet")).expect("a data set");
+    let mean = |rows: &[(f64, f64, f64)]| rows.iter().map(|row| row.2).sum::<f64>() / rows.len() as f64;
+
+    // the second window follows the first, over a restart of the solver
+    let steady = along(&data, "steady");
+    assert_eq!(steady.len(), 4);
+    assert!((steady[0].0 - 1.0).abs() < 1e-9 && (steady[3].0 - 1.3).abs() < 1e-9, "{steady:?}");
+    let ratio = mean(&along(&data, "rolling")) / mean(&steady);
+    println!("with a moving bed and turning wheels {ratio:.3} of the drag");
+    assert!((0.6..1.4).contains(&ratio), "{ratio}");
+
+    // what the ramp adds at its start pulls against the acceleration, and is as large as the water about the hull can make it
+    let ramp = along(&data, "ramp");
+    let before = mean(&ramp.iter().copied().filter(|row| row.0 < 0.55).collect::<Vec<_>>());
+    let first = ramp.iter().find(|row| row.1 > 0.0).expect("a section within the ramp");
+    let displaced = {
+        let sample = data.samples.iter().find(|sample| sample.case == "ramp").expect("a sample");
+        sample.surfaces.iter().map(|surface| surface.rest.expect("at rest").force.z).sum::<f64>() / 9.81
+    };
+    let share = (before - first.2) / (displaced * first.1);
+    println!("added mass over the displaced: {share:.2}");
+    assert!((0.1..1.0).contains(&share), "{share}: {ramp:?}");
+    // the solver's steps meet both ends of the ramp
+    let log = std::fs::read_to_string(Path::new(&campaign).join("work/ramp/log.interFoam")).expect("a log");
+    for time in ["Time = 0.6\n", "Time = 1.1\n"] {
+        assert!(log.contains(time), "no step ends at {time}");
+    }
 }
 
 #[test]

@@ -20,6 +20,11 @@ pub const AIR_DENSITY: f64 = 1.0;
 const TURBULENCE: (f64, f64) = (0.03, 0.07);
 /// Speed below which the inflow is no longer less turbulent [m/s].
 const LEAST_TURBULENT_SPEED: f64 = 0.05;
+/// Sections of an unsteady case before its ramp [s].
+pub const SECTIONS_BEFORE_S: f64 = 0.5;
+/// Largest time step of an unsteady case [s]: short enough that the Courant number seldom asks for less, so that steps begin
+/// and end with the ramp.
+const UNSTEADY_STEP_S: f64 = 0.01;
 /// `C_mu` of the k-omega model.
 const C_MU: f64 = 0.09;
 
@@ -41,9 +46,9 @@ pub struct Settings {
     pub drift: f64,
     /// Windows at most; the last one is kept.
     pub windows: u32,
-    /// Time between two samples of the forces [s]; also the largest time step.
+    /// Time between two samples of the forces [s]; also the largest time step of a steady case.
     pub sample_s: f64,
-    /// Wall-clock time after which a case is given up [s].
+    /// Wall-clock time after which a program of a case is given up [s]; longer on finer meshes, see [`Settings::limit`].
     pub limit_s: f64,
     /// The mesh.
     pub mesh: MeshSettings,
@@ -74,6 +79,71 @@ impl Settings {
         let time =
             if speed > 0.0 { (self.settle_lengths * length / speed).clamp(least, most) } else { least };
         (10.0 * time).ceil() / 10.0
+    }
+
+    /// Time that a program may take on cells `cell_scale` times as long [s]: there are as many more as they are smaller.
+    pub fn limit(&self, cell_scale: f64) -> f64 {
+        self.limit_s / cell_scale.min(1.0).powi(3)
+    }
+
+    /// A field out of its range, what it is, and what it must be.
+    pub fn fault(&self) -> Option<(&'static str, String, &'static str)> {
+        let MeshSettings { cells_per_length, wet_layer, hull_level, wheel_level, channel_m } = self.mesh;
+        let [least, most] = self.settle_s;
+        let within = |value: f64, min: f64, max: f64| (min..=max).contains(&value);
+        let fields = [
+            ("courant", within(self.courant, 0.01, 100.0), self.courant.to_string(), "from 0.01 to 100"),
+            (
+                "interface_courant",
+                within(self.interface_courant, 0.01, 100.0),
+                self.interface_courant.to_string(),
+                "from 0.01 to 100",
+            ),
+            (
+                "settle_lengths",
+                within(self.settle_lengths, 0.0, 1000.0),
+                self.settle_lengths.to_string(),
+                "from 0 to 1000 lengths",
+            ),
+            (
+                "settle_s",
+                within(least, SECTIONS_BEFORE_S, most) && most <= 1000.0,
+                format!("{:?}", self.settle_s),
+                "two times from 0.5 to 1000 s, the lesser first",
+            ),
+            ("window_s", within(self.window_s, 0.2, 1000.0), self.window_s.to_string(), "from 0.2 to 1000 s"),
+            ("drift", within(self.drift, 0.0, 10.0), self.drift.to_string(), "a share from 0 to 10"),
+            ("windows", (1..=100).contains(&self.windows), self.windows.to_string(), "from 1 to 100"),
+            (
+                "sample_s",
+                within(self.sample_s, 1e-4, 0.05),
+                self.sample_s.to_string(),
+                "from 0.0001 to 0.05 s",
+            ),
+            (
+                "limit_s",
+                within(self.limit_s, 1e-3, 1e7),
+                self.limit_s.to_string(),
+                "from 0.001 to 10000000 s",
+            ),
+            (
+                "mesh.cells_per_length",
+                within(cells_per_length, 1.0, 50.0),
+                cells_per_length.to_string(),
+                "from 1 to 50",
+            ),
+            ("mesh.wet_layer", within(wet_layer, 0.05, 2.0), wet_layer.to_string(), "from 0.05 to 2"),
+            ("mesh.hull_level", hull_level <= 6, hull_level.to_string(), "from 0 to 6"),
+            ("mesh.wheel_level", wheel_level <= 6, wheel_level.to_string(), "from 0 to 6"),
+            (
+                "mesh.channel_m",
+                channel_m.is_none_or(|size| size.iter().all(|&edge| within(edge, 0.1, 1000.0))),
+                format!("{channel_m:?}"),
+                "three lengths from 0.1 to 1000 m",
+            ),
+        ];
+        let wrong = fields.into_iter().find(|(_, is_right, ..)| !is_right);
+        wrong.map(|(field, _, value, expected)| (field, value, expected))
     }
 
     /// Settings for another attempt at a case that diverged.
@@ -189,6 +259,11 @@ impl Inputs<'_> {
         fill(include_str!("templates/U.viscous"), &values)
     }
 
+    fn largest_step(&self) -> f64 {
+        let steady = self.settings.sample_s;
+        if self.case.is_unsteady() { steady.min(UNSTEADY_STEP_S) } else { steady }
+    }
+
     fn settle(&self) -> f64 {
         self.settings.settle(self.vehicle.dimensions.length, self.case.speed_mps)
     }
@@ -214,9 +289,16 @@ impl Inputs<'_> {
         let speed = case.speed_mps.max(case.end_speed_mps);
         let length = vehicle.dimensions.length;
         let every = number(settings.sample_s);
+        // the solver shortens its steps to meet what is adjustable: sections of a tenth of a second, and with them the ramp
+        let samples = if case.is_unsteady() { "adjustableRunTime" } else { "runTime" };
         let origin = triple(&placement.origin);
         let force = |surface: &crate::vehicle::Surface| {
-            let values = [("surface", surface.name.as_str()), ("origin", &origin), ("every", &every)];
+            let values = [
+                ("surface", surface.name.as_str()),
+                ("origin", &origin),
+                ("every", &every),
+                ("samples", samples),
+            ];
             fill(include_str!("templates/forces"), &values)
         };
         let flow =
@@ -233,7 +315,7 @@ impl Inputs<'_> {
             ("write_interval_s", number(end - start)),
             ("courant", number(settings.courant)),
             ("interface_courant", number(settings.interface_courant)),
-            ("largest_step_s", number(settings.sample_s)),
+            ("largest_step_s", number(self.largest_step())),
             ("functions", functions),
         ];
         fill(include_str!("templates/controlDict"), &values)
@@ -273,12 +355,12 @@ impl Inputs<'_> {
     /// Acceleration of the vehicle against time, of which the solver takes the opposite as a body force; dense, since it is
     /// interpolated. It is half a largest step late: an implicit step takes the acceleration of its end, while the inflow
     /// changes by its mean over the step. Where the two differ, the water as a whole pushes the hull, for that one step with
-    /// the whole inertia of what it displaces.
+    /// the whole inertia of what it displaces: steps longer or shorter than the largest would do so.
     fn acceleration_table(&self) -> String {
         let (case, settle) = (self.case, self.settle());
         let acceleration = (case.end_speed_mps - case.speed_mps) / case.ramp_s;
-        let step = 0.005;
-        let start = settle + 0.5 * self.settings.sample_s;
+        let step = 0.5 * UNSTEADY_STEP_S;
+        let start = settle + 0.5 * self.largest_step();
         let rows = (self.first_end() / step).ceil() as usize + 2;
         let row = |i: usize| {
             let time = i as f64 * step;

@@ -1,14 +1,15 @@
 //! Outcomes of cases to what is kept of a campaign: `sections.parquet`, the data set, and `cases.csv`, a row a case.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::plan::{Bed, Case, Plan, Set};
+use super::plan::{Bed, CAMPAIGN_FILE, Case, Plan, Set, write_whole};
 use super::run::{RunError, Work};
-use super::solve::{Load, METHOD, Outcome, first_method};
+use super::solve::{Load, Outcome, method};
 use crate::condition::GroundContact;
 use crate::dataset::{self, Dataset, DatasetError, Image, Meta, Rest, Sample, SurfaceLoad};
 use crate::frame::Vec3;
@@ -18,6 +19,11 @@ use crate::vehicle::Vehicle;
 pub const SECTIONS_FILE: &str = "sections.parquet";
 /// File of the summaries.
 pub const CASES_FILE: &str = "cases.csv";
+
+/// The method of summaries from before methods had a number.
+fn first_method() -> u32 {
+    1
+}
 
 /// What is kept of a case beside its sections.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,7 +47,7 @@ pub struct CaseSummary {
     pub density_kgpm3: f64,
     /// Size of the cells relative to the settings.
     pub cell_scale: f64,
-    /// How it was computed, see [`METHOD`].
+    /// How it was computed, see [`method`].
     #[serde(default = "first_method")]
     pub method: u32,
     /// Cells of the mesh.
@@ -85,9 +91,9 @@ pub struct CaseSummary {
 }
 
 impl CaseSummary {
-    /// True where this version would compute the case another way.
-    pub fn is_outdated(&self) -> bool {
-        self.method < METHOD
+    /// True where this version would compute the case of this summary another way.
+    pub fn is_outdated(&self, case: &Case) -> bool {
+        self.method < method(case)
     }
 
     /// Summary of an outcome.
@@ -237,7 +243,7 @@ impl Collected {
             writer.serialize(case).map_err(|error| syntax(error.to_string()))?;
         }
         let bytes = writer.into_inner().map_err(|error| syntax(error.to_string()))?;
-        std::fs::write(&path, bytes).map_err(|source| CollectError::Io { path: path.clone(), source })
+        write_whole(&path, &bytes).map_err(|source| CollectError::Io { path: path.clone(), source })
     }
 }
 
@@ -245,11 +251,15 @@ impl Collected {
 ///
 /// A case that was collected before and was computed again since, by a newer method, is replaced.
 pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Result<usize, CollectError> {
+    // one after the other: each adds to what it has read
+    let path = folder.join(CAMPAIGN_FILE);
+    let campaign = File::open(&path).and_then(|file| file.lock().map(|()| file));
+    let _alone = campaign.map_err(|source| CollectError::Io { path, source })?;
     let mut collected = Collected::read(folder, plan)?;
     let mut fresh = Vec::new();
     for case in &plan.cases {
         let before = collected.cases.get(&case.id).map_or(0, |summary| summary.method);
-        fresh.extend(work.outcome(case)?.filter(|outcome| outcome.method > before));
+        fresh.extend(work.outcome(&plan.campaign, case)?.filter(|outcome| outcome.method > before));
     }
     if fresh.is_empty() {
         return if collected.cases.is_empty() {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Rotation3, UnitVector3};
@@ -122,6 +123,12 @@ impl Case {
         self.ramp_s > 0.0
     }
 
+    /// True where both are the same flow on the same mesh.
+    fn is_same_state(&self, other: &Self) -> bool {
+        let other = Self { id: self.id.clone(), set: self.set, ..other.clone() };
+        *self == other
+    }
+
     /// True when wheels stand on the bed as on level ground.
     pub fn is_level(&self) -> bool {
         self.roll_deg == 0.0 && self.pitch_deg == 0.0
@@ -176,6 +183,18 @@ pub struct Campaign {
     pub settings: Settings,
 }
 
+impl Campaign {
+    /// Refuses settings of the campaign file at `path` that nothing can be computed with.
+    pub fn check_settings(&self, path: &Path) -> Result<(), PlanError> {
+        match self.settings.fault() {
+            Some((field, value, expected)) => {
+                Err(PlanError::Setting { path: path.to_owned(), field, value, expected })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
 /// The format this version writes and reads.
 pub const FORMAT: u32 = 1;
 
@@ -213,6 +232,38 @@ pub enum PlanError {
         path: PathBuf,
         /// The name.
         id: String,
+    },
+    /// A name that is no name of a folder.
+    #[error(
+        "{path}: `{id}` names no case: letters, digits, `-` and `_`, and none of `outcomes`, `failed` and `locks`"
+    )]
+    Name {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        id: String,
+    },
+    /// Settings that nothing can be computed with.
+    #[error("{path}: settings: {field} is {value}, which is not {expected}")]
+    Setting {
+        /// The file.
+        path: PathBuf,
+        /// The field.
+        field: &'static str,
+        /// What it is.
+        value: String,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// A speed that changes where it cannot.
+    #[error("{path}: case `{id}`: {fault}")]
+    Ramp {
+        /// The file.
+        path: PathBuf,
+        /// The case.
+        id: String,
+        /// What is wrong.
+        fault: &'static str,
     },
     /// A number out of its range.
     #[error("{path}: case `{id}`: {field} is {value}, which is not {expected}")]
@@ -268,6 +319,7 @@ impl Plan {
         if campaign.format != FORMAT {
             return Err(PlanError::Format { path, found: campaign.format });
         }
+        campaign.check_settings(&path)?;
         let path = folder.join(PLAN_FILE);
         let mut reader = csv::Reader::from_path(&path).map_err(|e| syntax(&path, &e))?;
         let cases: Vec<Case> =
@@ -287,20 +339,17 @@ impl Plan {
         std::fs::create_dir_all(folder).map_err(|source| io(folder, source))?;
         let path = folder.join(CAMPAIGN_FILE);
         let text = toml::to_string(&self.campaign).map_err(|e| syntax(&path, &e))?;
-        std::fs::write(&path, text).map_err(|source| io(&path, source))?;
+        write_whole(&path, text.as_bytes()).map_err(|source| io(&path, source))?;
         let path = folder.join(PLAN_FILE);
         let mut writer = csv::Writer::from_writer(Vec::new());
         for case in &self.cases {
             writer.serialize(case).map_err(|e| syntax(&path, &e))?;
         }
         let bytes = writer.into_inner().map_err(|e| syntax(&path, &e))?;
-        // a plan is extended in place: the old one stays whole until the new one is
-        let partial = path.with_extension("csv.partial");
-        std::fs::write(&partial, bytes).map_err(|source| io(&partial, source))?;
-        std::fs::rename(&partial, &path).map_err(|source| io(&path, source))
+        write_whole(&path, &bytes).map_err(|source| io(&path, source))
     }
 
-    /// Adds cases of a set; none is repeated, and the earlier ones stay as they are.
+    /// Adds cases of a set; no name and no state is repeated, and the earlier ones stay as they are.
     pub fn extend(&mut self, set: Set, count: usize, seed: u64, float_depth: f64) -> Result<(), PlanError> {
         // two vehicles of one seed get two plans
         let name =
@@ -317,8 +366,12 @@ impl Plan {
             Set::Mesh => self.finest(),
             Set::Ahead => self.ahead(),
         };
-        let known: BTreeSet<String> = self.cases.iter().map(|c| c.id.clone()).collect();
-        self.cases.extend(fresh.into_iter().filter(|case| !known.contains(&case.id)));
+        for case in fresh {
+            // a table of one depth asks for each state of a list several times
+            if !self.cases.iter().any(|known| known.id == case.id || known.is_same_state(&case)) {
+                self.cases.push(case);
+            }
+        }
         Ok(())
     }
 
@@ -336,6 +389,9 @@ impl Plan {
 
     fn hypercube(&self, set: Set, count: usize, ranges: &[Range; 6], random: &mut Random) -> Vec<Case> {
         let taken: Vec<[f64; 6]> = self.of(set).map(coordinates).collect();
+        // rows may have been taken out of the middle
+        let number = |case: &Case| case.id.rsplit('-').next()?.parse::<usize>().ok();
+        let first = self.of(set).filter_map(number).max().map_or(0, |last| last + 1);
         let axes: Vec<Vec<f64>> = (0..6)
             .map(|axis| {
                 let taken: Vec<f64> = taken.iter().map(|point| point[axis]).collect();
@@ -350,7 +406,7 @@ impl Plan {
                     density_kgpm3: density,
                     roll_deg: roll,
                     pitch_deg: pitch,
-                    ..Case::steady(&self.campaign.vehicle, set, taken.len() + i, speed, depth)
+                    ..Case::steady(&self.campaign.vehicle, set, first + i, speed, depth)
                 }
             })
             .collect()
@@ -365,7 +421,7 @@ impl Plan {
         if free.len() < count {
             return Err(PlanError::NoTwin { available: free.len(), wanted: count });
         }
-        free.sort_by(|a, b| a.heading_deg.total_cmp(&b.heading_deg));
+        free.sort_by(|a, b| a.heading_deg.abs().total_cmp(&b.heading_deg.abs()));
         let twin =
             |case: &Case| Case { id: twin_id(case), set: Set::Driving, bed: Bed::Driving, ..case.clone() };
         Ok(free.into_iter().take(count).map(twin).collect())
@@ -403,16 +459,8 @@ impl Plan {
         let speeds = [0.0, 0.25 * speed, 0.5 * speed];
         let states = depths.iter().flat_map(|&depth| speeds.map(|speed| (speed, depth, 1.0)));
         let meshes = [0.72, 0.5].map(|scale| (speeds[2], depths[1], scale));
-        let mut all: Vec<(f64, f64, f64)> = states.chain(meshes).collect();
-        // a table of one depth asks for each state three times
-        let mut seen = Vec::new();
-        all.retain(|state| {
-            !seen.contains(state) && {
-                seen.push(*state);
-                true
-            }
-        });
-        all.into_iter()
+        states
+            .chain(meshes)
             .enumerate()
             .map(|(i, (speed, depth, cell_scale))| Case {
                 cell_scale,
@@ -465,6 +513,14 @@ pub fn hull_hash(vehicle: &Vehicle) -> String {
     sha.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Writes a file as a whole or not at all.
+pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = tempfile::NamedTempFile::new_in(path.parent().unwrap_or(Path::new(".")))?;
+    file.write_all(bytes)?;
+    file.persist(path)?;
+    Ok(())
+}
+
 fn io(path: &Path, source: std::io::Error) -> PlanError {
     PlanError::Io { path: path.to_owned(), source }
 }
@@ -473,8 +529,13 @@ fn syntax(path: &Path, error: &dyn fmt::Display) -> PlanError {
     PlanError::Syntax { path: path.to_owned(), message: error.to_string() }
 }
 
-/// Refuses a row that no solver should see.
+/// Refuses a row that no solver should see. A case is computed in a folder of its name, which is removed afterwards.
 fn check(path: &Path, case: &Case) -> Result<(), PlanError> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let is_name = (1..=100).contains(&case.id.len()) && case.id.chars().all(is_plain);
+    if !is_name || ["outcomes", "failed", "locks"].contains(&case.id.as_str()) {
+        return Err(PlanError::Name { path: path.to_owned(), id: case.id.clone() });
+    }
     let fields = [
         ("speed_mps", case.speed_mps, 0.0, 30.0, "a speed from 0 to 30 m/s"),
         ("end_speed_mps", case.end_speed_mps, 0.0, 30.0, "a speed from 0 to 30 m/s"),
@@ -483,7 +544,7 @@ fn check(path: &Path, case: &Case) -> Result<(), PlanError> {
         ("density_kgpm3", case.density_kgpm3, 100.0, 20_000.0, "a density from 100 to 20000 kg/m3"),
         ("roll_deg", case.roll_deg, -45.0, 45.0, "an angle from -45 to 45 degrees"),
         ("pitch_deg", case.pitch_deg, -45.0, 45.0, "an angle from -45 to 45 degrees"),
-        ("cell_scale", case.cell_scale, 0.2, 5.0, "a factor from 0.2 to 5"),
+        ("cell_scale", case.cell_scale, 0.3, 5.0, "a factor from 0.3 to 5"),
         ("ramp_s", case.ramp_s, 0.0, 60.0, "a time from 0 to 60 s"),
     ];
     let wrong = fields.into_iter().find(|(_, value, min, max, _)| !(min..=max).contains(&value));
@@ -491,8 +552,19 @@ fn check(path: &Path, case: &Case) -> Result<(), PlanError> {
         Some((field, value, .., expected)) => {
             Err(PlanError::Value { path: path.to_owned(), id: case.id.clone(), field, value, expected })
         }
-        None => Ok(()),
+        None => check_ramp(path, case),
     }
+}
+
+fn check_ramp(path: &Path, case: &Case) -> Result<(), PlanError> {
+    let fault = match case.is_unsteady() {
+        true if case.bed == Bed::Driving => "wheels that turn keep their speed: a ramp needs a parked bed",
+        false if case.end_speed_mps != case.speed_mps => {
+            "end_speed_mps differs from speed_mps, and ramp_s is 0"
+        }
+        _ => return Ok(()),
+    };
+    Err(PlanError::Ramp { path: path.to_owned(), id: case.id.clone(), fault })
 }
 
 fn coordinates(case: &Case) -> [f64; 6] {
@@ -613,6 +685,51 @@ mod tests {
         for (i, state) in states.iter().enumerate() {
             assert!(!states[..i].contains(state), "{state:?}");
         }
+    }
+
+    #[test]
+    fn a_table_of_one_depth_plans_each_state_once() {
+        let mut plan = plan();
+        plan.campaign.table.depth_m = Range { min: 0.3, max: 0.3 };
+        for set in [Set::Check, Set::Ahead, Set::Unsteady, Set::Check] {
+            plan.extend(set, 0, 1, 0.378).unwrap();
+        }
+        // at rest and four speeds, two finer meshes, five ramps
+        assert_eq!(plan.cases.len(), 1 + 4 + 2 + 5);
+        assert!(plan.cases.iter().any(|case| case.id == "warthog-check-0010"), "numbers as of many depths");
+    }
+
+    #[test]
+    fn a_row_taken_out_of_the_middle_makes_no_number_twice() {
+        let mut plan = plan();
+        plan.extend(Set::Paper, 10, 1, 0.378).unwrap();
+        plan.cases.remove(4);
+        plan.extend(Set::Paper, 5, 2, 0.378).unwrap();
+        assert_eq!(plan.cases.len(), 14);
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_and_ramps_that_nothing_follows_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |change: &dyn Fn(&mut Plan)| {
+            let mut plan = plan();
+            plan.extend(Set::Paper, 2, 1, 0.378).unwrap();
+            change(&mut plan);
+            plan.write(folder.path()).unwrap();
+            Plan::read(folder.path()).unwrap_err().to_string()
+        };
+        for id in ["", "outcomes", "../elsewhere", "/tmp/elsewhere", "a/b", "."] {
+            let error = refused(&|plan| plan.cases[1].id = id.to_owned());
+            assert!(error.contains("names no case"), "{error}");
+        }
+        let error = refused(&|plan| plan.cases[1].end_speed_mps += 1.0);
+        assert!(error.contains("warthog-paper-0001") && error.contains("ramp_s is 0"), "{error}");
+        let error = refused(&|plan| (plan.cases[1].ramp_s, plan.cases[1].bed) = (1.0, Bed::Driving));
+        assert!(error.contains("parked bed"), "{error}");
+        let error = refused(&|plan| plan.campaign.settings.settle_s = [5.0, 2.0]);
+        assert!(error.contains("campaign.toml") && error.contains("settle_s"), "{error}");
+        let error = refused(&|plan| plan.campaign.settings.windows = 0);
+        assert!(error.contains("windows is 0"), "{error}");
     }
 
     #[test]

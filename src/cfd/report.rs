@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::collect::{CaseSummary, CollectError, Collected, SECTIONS_FILE};
-use super::plan::{Plan, Set};
+use super::plan::{Case, Plan, Set};
 use crate::analytic;
 use crate::condition::{Condition, GroundContact};
 use crate::dataset;
@@ -115,7 +115,7 @@ pub struct OnMesh {
     pub rest_fz_n: f64,
 }
 
-/// Driving against parked, over the pairs of the driving set.
+/// Driving against parked, over the pairs of the driving set that have both settled.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Twins {
     /// Pairs.
@@ -123,7 +123,7 @@ pub struct Twins {
     /// Median ratio of the drag along the motion, driving over parked.
     pub drag_ratio: f64,
     /// Median difference of the vertical force, driving minus parked, over the dynamic pressure on the wet front
-    /// `rho v^2 / 2 * width * depth`.
+    /// `rho v^2 / 2 * breadth * depth`, as broad as the box round the vehicle is along the motion.
     pub lift_difference: f64,
 }
 
@@ -144,6 +144,8 @@ impl Report {
         if cases.is_empty() {
             return Err(CollectError::Nothing { path: folder.to_owned() });
         }
+        let done: Vec<(&Case, &CaseSummary)> =
+            plan.cases.iter().filter_map(|case| Some((case, collected.cases.get(&case.id)?))).collect();
         let mut sets: BTreeMap<String, Count> = BTreeMap::new();
         for case in &plan.cases {
             let count = sets.entry(case.set.to_string()).or_default();
@@ -158,7 +160,7 @@ impl Report {
             vehicle: vehicle.name.clone(),
             provenance: dataset::read(&folder.join(SECTIONS_FILE))?.meta.provenance,
             sets,
-            outdated: cases.iter().filter(|case| case.is_outdated()).count(),
+            outdated: done.iter().filter(|(case, summary)| summary.is_outdated(case)).count(),
             core_hours: cases.iter().map(|case| case.core_s).sum::<f64>() / 3600.0,
             core_s_median: median(cases.iter().map(|case| case.core_s)),
             cells: [least, most],
@@ -170,7 +172,7 @@ impl Report {
             head_on: straight_ahead(&cases).into_iter().map(|c| head_on(vehicle, c)).collect(),
             meshes: meshes(&cases),
             twins: twins(&collected, vehicle),
-            suspicious: suspicious(&cases, vehicle),
+            suspicious: suspicious(&done, vehicle),
         })
     }
 
@@ -222,7 +224,7 @@ impl Report {
         }
         if let Some(twins) = &self.twins {
             line(format_args!(
-                "  driving over parked, {} pairs: drag x {:.3}, lift {:+.3} of the dynamic pressure on the wet front",
+                "  driving over parked, {} settled pairs: drag x {:.3}, lift {:+.3} of the dynamic pressure on the wet front",
                 twins.pairs, twins.drag_ratio, twins.lift_difference
             ));
         }
@@ -299,7 +301,7 @@ fn straight_ahead<'a>(cases: &'a [&CaseSummary]) -> Vec<&'a CaseSummary> {
 
 /// The check case that was computed on several meshes, coarsest first.
 fn meshes(cases: &[&CaseSummary]) -> Vec<OnMesh> {
-    let all = || of_set(cases, Set::Check).chain(of_set(cases, Set::Mesh));
+    let all = || [Set::Check, Set::Mesh, Set::Ahead].into_iter().flat_map(|set| of_set(cases, set));
     let Some(first) = all().find(|case| case.cell_scale != 1.0) else { return Vec::new() };
     let same = |case: &&CaseSummary| {
         case.speed_mps == first.speed_mps && (case.depth_m - first.depth_m).abs() < 1e-9
@@ -323,9 +325,11 @@ fn drag(case: &CaseSummary) -> f64 {
     -(case.fx_n * cos + case.fy_n * sin)
 }
 
-/// Dynamic pressure on the front of the vehicle up to the water level [N].
+/// Dynamic pressure on the box round the vehicle, seen along the motion, up to the water level [N].
 fn scale(case: &CaseSummary, vehicle: &Vehicle) -> f64 {
-    0.5 * case.density_kgpm3 * case.speed_mps.powi(2) * vehicle.dimensions.width * case.depth_m
+    let (sin, cos) = case.heading_deg.to_radians().sin_cos();
+    let breadth = vehicle.dimensions.width * cos.abs() + vehicle.dimensions.length * sin.abs();
+    0.5 * case.density_kgpm3 * case.speed_mps.powi(2) * breadth * case.depth_m
 }
 
 fn twins(collected: &Collected, vehicle: &Vehicle) -> Option<Twins> {
@@ -335,7 +339,7 @@ fn twins(collected: &Collected, vehicle: &Vehicle) -> Option<Twins> {
         .filter(|case| case.set == Set::Driving)
         .filter_map(|driving| {
             let parked = collected.cases.get(&driving.id.replacen("-driving-", "-paper-", 1))?;
-            Some((driving, parked))
+            (driving.settled && parked.settled).then_some((driving, parked))
         })
         .collect();
     (!pairs.is_empty()).then(|| Twins {
@@ -347,23 +351,25 @@ fn twins(collected: &Collected, vehicle: &Vehicle) -> Option<Twins> {
     })
 }
 
-fn suspicious(cases: &[&CaseSummary], vehicle: &Vehicle) -> Vec<Suspicious> {
-    // slow cases have coefficients of noise
-    let fast = |case: &&&CaseSummary| case.speed_mps > 0.1 && case.set != Set::Unsteady;
+fn suspicious(cases: &[(&Case, &CaseSummary)], vehicle: &Vehicle) -> Vec<Suspicious> {
+    // slow cases have coefficients of noise, and of a tilted one buoyancy is part of the force along the body's axes
+    let fast = |case: &Case| case.speed_mps > 0.1 && case.is_level() && !case.is_unsteady();
     let coefficient = |case: &CaseSummary| drag(case) / scale(case, vehicle);
-    let middle = median(cases.iter().filter(fast).map(|case| coefficient(case)));
-    let deviation = median(cases.iter().filter(fast).map(|case| (coefficient(case) - middle).abs()));
+    let usual: Vec<f64> =
+        cases.iter().filter(|(case, _)| fast(case)).map(|(_, case)| coefficient(case)).collect();
+    let middle = median(usual.iter().copied());
+    let deviation = median(usual.iter().map(|c| (c - middle).abs()));
     let usual = Range { min: middle - OUTLIER * deviation, max: middle + OUTLIER * deviation };
     let mut found = Vec::new();
-    for case in cases {
+    for (state, case) in cases {
         let mut note = |why: String| found.push(Suspicious { id: case.id.clone(), why });
         if case.attempts > 1 {
             note(format!("it diverged once and was computed with Courant {:.1}", case.courant));
         }
         if case.mass_imbalance > MASS_LOSS {
-            note(format!("{:.0} % of the water that came in did not leave", 100.0 * case.mass_imbalance));
+            note(format!("inflow and outflow differ by {:.0} %", 100.0 * case.mass_imbalance));
         }
-        if fast(&case) {
+        if fast(state) {
             let c = coefficient(case);
             if c < usual.min || c > usual.max {
                 note(format!(
@@ -371,18 +377,23 @@ fn suspicious(cases: &[&CaseSummary], vehicle: &Vehicle) -> Vec<Suspicious> {
                     usual.min, usual.max
                 ));
             }
-            if !case.settled {
-                let drift = case.drift_fx_n.abs().max(case.drift_fy_n.abs()).max(case.drift_fz_n.abs());
-                note(format!("the mean still drifts by {drift:.1} N"));
-            }
+        }
+        if !case.settled {
+            let drift = case.drift_fx_n.abs().max(case.drift_fy_n.abs()).max(case.drift_fz_n.abs());
+            note(format!("the mean still drifts by {drift:.1} N"));
         }
     }
     found
 }
 
-/// The middle value; 0 of none.
+/// The middle value, or the mean of the two in the middle; 0 of none.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    let half = values.len() / 2;
+    match values.get(half) {
+        Some(upper) if values.len().is_multiple_of(2) => 0.5 * (values[half - 1] + upper),
+        Some(middle) => *middle,
+        None => 0.0,
+    }
 }

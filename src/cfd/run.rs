@@ -1,18 +1,18 @@
 //! Many cases at a time, resumable: a case is done when its outcome is written.
 
 use std::collections::VecDeque;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use sha2::{Digest, Sha256};
 
-use super::case::{Inputs, Settings};
+use super::case::{self, Inputs, Settings};
+use super::claim::Claim;
 use super::openfoam::OpenFoam;
 use super::placement::Placement;
-use super::plan::Case;
-use super::solve::{METHOD, Outcome, SolveError, solve};
+use super::plan::{Campaign, Case, write_whole};
+use super::solve::{Outcome, SolveError, method, solve};
 use crate::vehicle::Vehicle;
 
 /// Disk that one case takes while it runs, with room [bytes].
@@ -40,6 +40,11 @@ pub enum Event {
     Done {
         /// The outcome.
         outcome: Box<Outcome>,
+    },
+    /// Another run has it or is done with it.
+    Left {
+        /// Its name.
+        id: String,
     },
     /// It is set aside; its folder stays.
     Failed {
@@ -80,7 +85,9 @@ pub enum RunError {
         path: PathBuf,
     },
     /// An outcome that does not belong to the plan.
-    #[error("{path} is the outcome of another state than the plan has under `{id}`: move it away")]
+    #[error(
+        "{path} is the outcome of another state, other settings or another hull than `{id}` has now: bring them back, name another folder of work, or move it away to compute the case anew"
+    )]
     Foreign {
         /// The outcome.
         path: PathBuf,
@@ -107,8 +114,8 @@ pub struct Work {
 }
 
 impl Work {
-    /// The outcome of a case, if it is done.
-    pub fn outcome(&self, case: &Case) -> Result<Option<Outcome>, RunError> {
+    /// The outcome of a case of a campaign, if it is done.
+    pub fn outcome(&self, campaign: &Campaign, case: &Case) -> Result<Option<Outcome>, RunError> {
         let path = self.outcome_path(&case.id);
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
@@ -119,11 +126,10 @@ impl Work {
             Ok(outcome) => outcome,
             Err(error) => return Err(RunError::Outcome { path, message: error.to_string() }),
         };
-        if outcome.case == *case {
-            Ok(Some(outcome))
-        } else {
-            Err(RunError::Foreign { path, id: case.id.clone() })
-        }
+        let is_ours = outcome.case == *case
+            && outcome.settings == campaign.settings
+            && outcome.hull_sha256 == campaign.hull_sha256;
+        if is_ours { Ok(Some(outcome)) } else { Err(RunError::Foreign { path, id: case.id.clone() }) }
     }
 
     /// Where the reason stands why a case was set aside.
@@ -143,8 +149,8 @@ impl Work {
     }
 
     /// Refuses a folder that was left by a run that was cut off and then changed.
-    fn check_untouched(&self, inputs: &Inputs) -> Result<(), RunError> {
-        let folder = self.folder.join(&inputs.case.id);
+    fn check_untouched(&self, id: &str) -> Result<(), RunError> {
+        let folder = self.folder.join(id);
         let Ok(seal) = std::fs::read_to_string(folder.join(SEAL)) else {
             return Ok(());
         };
@@ -166,13 +172,13 @@ impl Work {
 pub struct Machine<'a> {
     /// The vehicle.
     pub vehicle: &'a Vehicle,
-    /// How cases are computed.
-    pub settings: &'a Settings,
+    /// What the cases are of, and how they are computed.
+    pub campaign: &'a Campaign,
     /// The solver.
     pub solver: &'a OpenFoam,
     /// Where.
     pub work: &'a Work,
-    /// Compute those again that are done by an older [`METHOD`].
+    /// Compute those again that are done by an older [`method`].
     pub outdated: bool,
 }
 
@@ -186,9 +192,8 @@ impl Machine<'_> {
         check_disk(folder, jobs)?;
         let mut queue = VecDeque::new();
         for case in cases {
-            let is_done = |outcome: Outcome| !self.outdated || outcome.method == METHOD;
-            if !self.work.outcome(case)?.is_some_and(is_done) {
-                self.work.check_untouched(&self.inputs(case, self.settings))?;
+            if !self.is_done(case)? {
+                self.work.check_untouched(&case.id)?;
                 queue.push_back(case);
             }
         }
@@ -209,22 +214,36 @@ impl Machine<'_> {
         Ok(())
     }
 
-    fn inputs<'b>(&'b self, case: &'b Case, settings: &'b Settings) -> Inputs<'b> {
-        Inputs { vehicle: self.vehicle, case, settings, solver: self.solver }
+    fn is_done(&self, case: &Case) -> Result<bool, RunError> {
+        let is_new = |outcome: Outcome| !self.outdated || outcome.method == method(case);
+        Ok(self.work.outcome(self.campaign, case)?.is_some_and(is_new))
     }
 
     fn one(&self, case: &Case, events: &Sender<Event>) {
         // the receiver lives until every sender is gone
         let tell = |event| drop(events.send(event));
         tell(Event::Started { id: case.id.clone() });
-        let mut outcome = self.attempt(case, self.settings, 1);
+        let fail = |reason: String| {
+            // the event says it too; the file is for who comes later
+            let _ = put(&self.work.failure_path(&case.id), &reason);
+            tell(Event::Failed { id: case.id.clone(), reason });
+        };
+        let claim = match self.claim(case) {
+            Ok(Some(claim)) => claim,
+            Ok(None) => return tell(Event::Left { id: case.id.clone() }),
+            Err(error) => return fail(error.to_string()),
+        };
+        let settings = self.campaign.settings;
+        let mut outcome = self.attempt(case, &claim, settings, 1);
         if let Err(error) = &outcome
             && error.is_divergence()
         {
             tell(Event::Retried { id: case.id.clone(), reason: error.to_string() });
-            outcome = self.attempt(case, &self.settings.cautious(), 2);
+            outcome = self.attempt(case, &claim, settings.cautious(), 2);
         }
         let stored = outcome.map_err(|error| error.to_string()).and_then(|outcome| {
+            // the campaign's: what another attempt changed of them is its Courant number
+            let outcome = Outcome { settings, ..outcome };
             self.work.store(&outcome).map_err(|error| error.to_string())?;
             Ok(outcome)
         });
@@ -237,27 +256,39 @@ impl Machine<'_> {
                 let _ = std::fs::remove_file(self.work.failure_path(&case.id));
                 tell(Event::Done { outcome: Box::new(outcome) });
             }
-            Err(reason) => {
-                // the event says it too; the file is for who comes later
-                let _ = put(&self.work.failure_path(&case.id), &reason);
-                tell(Event::Failed { id: case.id.clone(), reason });
-            }
+            Err(reason) => fail(reason),
         }
     }
 
-    fn attempt(&self, case: &Case, settings: &Settings, number: u32) -> Result<Outcome, SolveError> {
+    /// None where another run computes the case, or has done so since this one began.
+    fn claim(&self, case: &Case) -> Result<Option<Claim>, RunError> {
+        let (locks, folder) = (self.work.folder.join("locks"), self.work.folder.join(&case.id));
+        let claim =
+            Claim::take(&locks, &case.id, &folder).map_err(|source| RunError::Io { path: folder, source })?;
+        Ok(if self.is_done(case)? { None } else { claim })
+    }
+
+    fn attempt(
+        &self,
+        case: &Case,
+        claim: &Claim,
+        settings: Settings,
+        number: u32,
+    ) -> Result<Outcome, SolveError> {
         let folder = self.work.folder.join(&case.id);
         let io = |source| SolveError::Io { path: folder.clone(), source };
         if folder.exists() {
             std::fs::remove_dir_all(&folder).map_err(io)?;
         }
         std::fs::create_dir_all(&folder).map_err(io)?;
-        let inputs = self.inputs(case, settings);
+        let inputs = Inputs { vehicle: self.vehicle, case, settings: &settings, solver: self.solver };
         let files = inputs.files(&Placement::new(self.vehicle, case));
+        case::write(&folder, &files).map_err(io)?;
+        // last, so that it stands for whole files
         let seal: String =
             files.iter().map(|(name, text)| format!("{}  {name}\n", hash(text.as_bytes()))).collect();
         std::fs::write(folder.join(SEAL), seal).map_err(io)?;
-        solve(&folder, &inputs, number)
+        solve(&folder, claim, &inputs, number)
     }
 }
 
@@ -275,10 +306,7 @@ fn put(path: &Path, text: &str) -> Result<(), RunError> {
     let io = |source| RunError::Io { path: path.to_owned(), source };
     let folder = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).map_err(io)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
-    file.write_all(text.as_bytes()).map_err(io)?;
-    file.persist(path).map_err(|error| io(error.error))?;
-    Ok(())
+    write_whole(path, text.as_bytes()).map_err(io)
 }
 
 fn check_disk(folder: &Path, jobs: usize) -> Result<(), RunError> {

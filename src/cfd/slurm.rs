@@ -7,8 +7,8 @@ use super::plan::{PLAN_FILE, Plan};
 /// File of the job array in the folder of the campaign.
 pub const JOB_FILE: &str = "campaign.sbatch";
 
-/// Memory of one case with room [MiB].
-const MEMORY_MIB: u32 = 2048;
+/// Memory of one case on cells of the settings' size with room, and of as many cells again [MiB].
+const MEMORY_MIB: (f64, f64) = (2048.0, 256.0);
 /// Tasks at a time, so that a large plan does not take a whole cluster.
 const AT_A_TIME: usize = 64;
 
@@ -16,7 +16,10 @@ const AT_A_TIME: usize = 64;
 pub fn job_array(plan: &Plan) -> String {
     let last = plan.cases.len().saturating_sub(1);
     let vehicle = &plan.campaign.vehicle;
-    let minutes = (plan.campaign.settings.limit_s * 2.0 / 60.0).ceil() as u64 + 5;
+    let finest = plan.cases.iter().map(|case| case.cell_scale).fold(1.0, f64::min);
+    let minutes = (plan.campaign.settings.limit(finest) * 2.0 / 60.0).ceil() as u64 + 5;
+    let (base, more) = MEMORY_MIB;
+    let memory_mib = (base + more * (finest.powi(-3) - 1.0)).ceil() as u64;
     format!(
         "#!/bin/sh
 # One task a case of {PLAN_FILE}. Submit from this folder:
@@ -27,7 +30,7 @@ pub fn job_array(plan: &Plan) -> String {
 #SBATCH --array=0-{last}%{AT_A_TIME}
 #SBATCH --ntasks=1
 #SBATCH --cpus-per-task=1
-#SBATCH --mem={MEMORY_MIB}M
+#SBATCH --mem={memory_mib}M
 #SBATCH --time={minutes}
 #SBATCH --output=work/slurm/%a.log
 set -eu

@@ -6,10 +6,11 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::case::{self, Inputs};
+use super::case::{Inputs, SECTIONS_BEFORE_S, Settings};
+use super::claim::Claim;
 use super::openfoam::{MeshKind, internal_vectors};
 use super::placement::Placement;
-use super::plan::Case;
+use super::plan::{Case, hull_hash};
 use super::poly_mesh::{MeshHull, PolyMeshError};
 use crate::dataset::CutOff;
 use crate::dataset::history::{History, HistoryError};
@@ -60,9 +61,12 @@ pub struct Outcome {
     pub case: Case,
     /// The solver, as data are labelled with it.
     pub solver: String,
-    /// How it was computed: [`METHOD`] of the version that did.
-    #[serde(default = "first_method")]
+    /// How it was computed: [`method`] of the version that did.
     pub method: u32,
+    /// The campaign's settings.
+    pub settings: Settings,
+    /// SHA-256 of the vehicle's hull and surfaces.
+    pub hull_sha256: String,
     /// Kind of the mesh.
     pub mesh_kind: MeshKind,
     /// Cells of the mesh.
@@ -77,7 +81,7 @@ pub struct Outcome {
     pub core_s: f64,
     /// Windows computed until the mean had settled.
     pub windows: u32,
-    /// True when it had.
+    /// True when it had, and for an unsteady case, which has no mean to settle.
     pub settled: bool,
     /// Change of the mean net force from the first to the second half of the last window, body frame [N].
     pub drift: [f64; 3],
@@ -94,12 +98,10 @@ pub struct Outcome {
 /// How this version computes a case: raised whenever the same case with the same settings would come out otherwise.
 ///
 /// 1: the gradient of the density was corrected for the tilt between cells of two sizes. 2: on castellated meshes it is
-/// not, since the correction drives the air above still water.
-pub const METHOD: u32 = 2;
-
-/// The method of outcomes from before methods had a number.
-pub(super) fn first_method() -> u32 {
-    1
+/// not, since the correction drives the air above still water. 3, of unsteady cases alone: the steps are as long as the
+/// delay of the body force supposes.
+pub fn method(case: &Case) -> u32 {
+    if case.is_unsteady() { 3 } else { 2 }
 }
 
 /// Why a case gave nothing.
@@ -175,12 +177,10 @@ impl SolveError {
     }
 }
 
-/// Computes a case in `folder`, which must be empty or absent.
-pub fn solve(folder: &Path, inputs: &Inputs, attempts: u32) -> Result<Outcome, SolveError> {
+/// Computes the case whose files are in `folder`, which `claim` gives to this process alone.
+pub fn solve(folder: &Path, claim: &Claim, inputs: &Inputs, attempts: u32) -> Result<Outcome, SolveError> {
     let placement = Placement::new(inputs.vehicle, inputs.case);
-    let files = inputs.files(&placement);
-    case::write(folder, &files).map_err(|source| io(folder, source))?;
-    let mut running = Running { folder, inputs, started: Instant::now() };
+    let mut running = Running { folder, claim, inputs, started: Instant::now() };
     running.program("blockMesh", &[])?;
     running.program("snappyHexMesh", &["-overwrite"])?;
     let hull = MeshHull::read(folder, inputs.vehicle, &placement)?;
@@ -194,7 +194,7 @@ pub fn solve(folder: &Path, inputs: &Inputs, attempts: u32) -> Result<Outcome, S
         let window = Window::read(folder, inputs, &placement, end)?;
         let rest = hull.at_rest(inputs.vehicle, &inputs.case.condition(0.0, 0.0));
         if inputs.case.is_unsteady()
-            || windows == settings.windows
+            || windows >= settings.windows
             || window.is_settled(&rest, settings.drift)
         {
             break window;
@@ -206,12 +206,14 @@ pub fn solve(folder: &Path, inputs: &Inputs, attempts: u32) -> Result<Outcome, S
             .map_err(|source| io(&path, source))?;
     };
     let rest = hull.at_rest(inputs.vehicle, &inputs.case.condition(0.0, 0.0));
-    let settled = window.is_settled(&rest, settings.drift);
+    let settled = inputs.case.is_unsteady() || window.is_settled(&rest, settings.drift);
     let (steps, core_s) = running.cost();
     Ok(Outcome {
         case: inputs.case.clone(),
         solver: inputs.solver.label(),
-        method: METHOD,
+        method: method(inputs.case),
+        settings: *inputs.settings,
+        hull_sha256: hull_hash(inputs.vehicle),
         mesh_kind: inputs.solver.mesh_kind,
         cells: hull.cells,
         courant: settings.courant,
@@ -237,6 +239,7 @@ fn io(path: &Path, source: std::io::Error) -> SolveError {
 
 struct Running<'a> {
     folder: &'a Path,
+    claim: &'a Claim,
     inputs: &'a Inputs<'a>,
     started: Instant,
 }
@@ -248,9 +251,16 @@ impl Running<'_> {
         let file = File::options().create(true).append(true).open(&log).map_err(|source| io(&log, source))?;
         let errors = file.try_clone().map_err(|source| io(&log, source))?;
         let mut command = self.inputs.solver.command(program);
-        let command = command.args(arguments).current_dir(self.folder).stdout(file).stderr(errors);
+        let stdin = self.claim.stdin().map_err(|source| io(self.folder, source))?;
+        let command =
+            command.args(arguments).current_dir(self.folder).stdin(stdin).stdout(file).stderr(errors);
         let mut child = command.spawn().map_err(|source| io(Path::new(program), source))?;
-        let limit = self.inputs.settings.limit_s;
+        if let Err(source) = self.claim.note(&child) {
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(io(self.folder, source));
+        }
+        let limit = self.inputs.settings.limit(self.inputs.case.cell_scale);
         let started = Instant::now();
         let status = loop {
             if let Some(status) = child.try_wait().map_err(|source| io(Path::new(program), source))? {
@@ -343,7 +353,7 @@ impl Window {
         let settings = inputs.settings;
         let length = inputs.vehicle.dimensions.length;
         let from = if inputs.case.is_unsteady() {
-            settings.settle(length, inputs.case.speed_mps) - 0.5
+            settings.settle(length, inputs.case.speed_mps) - SECTIONS_BEFORE_S
         } else {
             end - settings.window_s
         };

@@ -101,7 +101,7 @@ struct PlanCommand {
     #[command(flatten)]
     vehicles: Vehicles,
     /// What to add: `paper` and `wide` are Latin hypercubes, `driving` the straightest paper cases with a moving bed,
-    /// `unsteady`, `check` and `ahead` fixed lists
+    /// `unsteady`, `check`, `mesh` and `ahead` fixed lists, which take no `--cases`
     #[arg(long, value_enum)]
     set: SetName,
     /// Cases to add
@@ -139,6 +139,7 @@ impl PlanCommand {
         if exists && (self.settings.is_some() || self.table.is_some()) {
             bail!("{} has its settings and its table already: edit them there", self.out.display());
         }
+        plan.campaign.check_settings(&self.out.join(plan::CAMPAIGN_FILE))?;
         let before = plan.cases.len();
         let float = float_depth(&bundle.vehicle.hull.mesh, bundle.vehicle.z0, bundle.vehicle.mass);
         plan.extend(self.set.into(), self.cases, self.seed, float)?;
@@ -222,10 +223,12 @@ impl Run {
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: self.keep };
         let collected = Collected::read(&self.campaign, &plan)?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
-        let is_due =
-            |id: &str| collected.cases.get(id).is_none_or(|summary| self.outdated && summary.is_outdated());
+        let is_due = |case: &plan::Case| {
+            let summary = collected.cases.get(&case.id);
+            summary.is_none_or(|summary| self.outdated && summary.is_outdated(case))
+        };
         let is_chosen = |case: &plan::Case| {
-            is_due(&case.id)
+            is_due(case)
                 && (sets.is_empty() || sets.contains(&case.set))
                 && (self.case.is_empty() || self.case.contains(&case.id))
                 && (self.again || !work.failure_path(&case.id).exists())
@@ -235,7 +238,7 @@ impl Run {
         eprintln!("{}", solver.label());
         let machine = Machine {
             vehicle: &bundle.vehicle,
-            settings: &plan.campaign.settings,
+            campaign: &plan.campaign,
             solver: &solver,
             work: &work,
             outdated: self.outdated,
@@ -248,6 +251,9 @@ impl Run {
             println!("set aside: {id}: {reason}");
         }
         println!("{} computed, {} set aside", progress.done, failed.len());
+        if progress.left > 0 {
+            println!("{} left to another run in {}", progress.left, work.folder.display());
+        }
         let is_new = |id: &String| failed.iter().any(|(failed, _)| failed == id);
         let earlier = plan.cases.iter().filter(|case| work.failure_path(&case.id).exists());
         let earlier = earlier.filter(|case| !is_new(&case.id)).count();
@@ -367,6 +373,7 @@ struct Progress {
     bar: ProgressBar,
     total: usize,
     done: usize,
+    left: usize,
     busy: usize,
     jobs: usize,
     started: Instant,
@@ -376,7 +383,7 @@ impl Progress {
     fn new(total: usize, jobs: usize) -> Result<Self> {
         let bar = ProgressBar::new(total as u64);
         bar.set_style(ProgressStyle::with_template("{wide_bar} {pos}/{len} cases, {msg}")?);
-        Ok(Self { bar, total, done: 0, busy: 0, jobs, started: Instant::now() })
+        Ok(Self { bar, total, done: 0, left: 0, busy: 0, jobs, started: Instant::now() })
     }
 
     fn hear(&mut self, event: Event, failed: &mut Vec<(String, String)>) {
@@ -396,6 +403,11 @@ impl Progress {
                     outcome.case.id, outcome.cells, outcome.steps, outcome.core_s
                 ))
             }
+            Event::Left { id } => {
+                self.busy -= 1;
+                self.left += 1;
+                Some(format!("{id}: left to another run in this folder"))
+            }
             Event::Failed { id, reason } => {
                 self.busy -= 1;
                 let line = format!("{id}: set aside: {reason}");
@@ -414,7 +426,7 @@ impl Progress {
     }
 
     fn message(&self, failed: usize) -> String {
-        let ended = self.done + failed;
+        let ended = self.done + self.left + failed;
         let left = match ended {
             0 => "time left unknown".to_owned(),
             _ => {
