@@ -79,6 +79,8 @@ fn end_process(number: &str, folder: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use std::process::Command;
 
     use super::*;
