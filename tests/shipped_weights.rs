@@ -86,9 +86,11 @@ fn on_cases_that_neither_has_seen_the_shipped_weights_are_nearer_than_the_papers
         for (component, (anchored, paper)) in mae(anchored).into_iter().zip(mae(paper)).enumerate() {
             assert!(anchored < paper, "component {component}: {anchored} N against {paper} N");
         }
-        for share in anchored["calibration"]["within_two"].as_array().unwrap() {
-            // 95 % were right; Fz of the Husky is the worst
-            assert!(share.as_f64().unwrap() > 0.7, "twice the stated deviation holds {share} of the cases");
+        // 68 and 95 % were right; of forty cases four that are missed instead of two are nothing to wonder at
+        for (within, least) in [("within_one", 0.55), ("within_two", 0.85)] {
+            for share in anchored["calibration"][within].as_array().unwrap() {
+                assert!(share.as_f64().unwrap() > least, "{within} holds {share} of the cases");
+            }
         }
     }
 }
