@@ -5,9 +5,14 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
+use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+
+/// How often a lock is tried, and the time between.
+const TRIES: u32 = 20;
+const PAUSE: Duration = Duration::from_millis(10);
 
 /// A case that no other process computes, as long as this lives.
 ///
@@ -51,14 +56,19 @@ impl Claim {
     }
 }
 
+/// Takes a lock; false where another process has had it for a while: one that is only being started has copies of the files of
+/// the thread beside it until its own program runs.
 fn is_free(file: &File) -> io::Result<bool> {
-    match file.try_lock() {
-        Ok(()) => Ok(true),
-        Err(TryLockError::WouldBlock) => Ok(false),
-        // some file systems of clusters have no locks: there a case is guarded by nothing
-        Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(true),
-        Err(TryLockError::Error(error)) => Err(error),
+    for _ in 0..TRIES {
+        match file.try_lock() {
+            Ok(()) => return Ok(true),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
+            // some file systems of clusters have no locks: there a case is guarded by nothing
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(true),
+            Err(TryLockError::Error(error)) => return Err(error),
+        }
     }
+    Ok(false)
 }
 
 /// Ends the process of this number if it is at work in `folder`, and not another one that was given the number since.
