@@ -56,6 +56,7 @@ Settings that a file (--config) leaves out are the paper's, and those below of -
   dry_weight = 0.5
   [anchored]
   between = 40                 # states between the cases in which the network is taught, for each case
+  outside = 8                  # and on lines through any two cases and as far again beyond
   [anchored.loss]
   net_weight = 10.0
   moment_weight = 0.1

@@ -56,13 +56,15 @@ pub struct Config {
 pub struct AnchoredConfig {
     /// States between the cases in which the network is taught, for each case.
     pub between: usize,
+    /// States on lines through any two cases and beyond, for each case.
+    pub outside: usize,
     /// Weights of the loss.
     pub loss: AnchoredLoss,
 }
 
 impl Default for AnchoredConfig {
     fn default() -> Self {
-        Self { between: 40, loss: AnchoredLoss::default() }
+        Self { between: 40, outside: 8, loss: AnchoredLoss::default() }
     }
 }
 

@@ -11,8 +11,9 @@ use crate::random::Random;
 
 /// Neighbors among which the other end is drawn.
 const NEIGHBORS: usize = 8;
-/// How far states go beyond either case, in units of their distance.
+/// How far states go beyond either case, in units of their distance: where another is near, and far out.
 const BEYOND: f64 = 0.3;
+const FAR_BEYOND: f64 = 1.0;
 
 /// What states between the training cases are made of.
 #[derive(Debug, Clone, Copy)]
@@ -28,18 +29,25 @@ pub struct Between<'a> {
 }
 
 impl<'a> Between<'a> {
-    /// The training states and `count` states for each between it and a neighbor, all with the loads that the teacher gives.
-    pub fn taught(&self, count: usize, random: &mut Random) -> Vec<Known> {
-        let mut taught = Vec::with_capacity(self.training.len() * (count + 1));
+    /// The training states, `count` states for each between it and a neighbor, and `outside` states on the line through it and
+    /// any other case, up to as far again beyond either; all with the loads that the teacher gives. Far from the cases the
+    /// teacher goes back to their mean; a network that was taught nothing there carries on what it saw at their edge.
+    pub fn taught(&self, count: usize, outside: usize, random: &mut Random) -> Vec<Known> {
+        let mut taught = Vec::with_capacity(self.training.len() * (count + outside + 1));
         for state in self.training {
             let Some(itself) = self.learn(state, state.condition) else {
                 taught.push(state.clone());
                 continue;
             };
             taught.push(itself);
-            let near = self.neighbors(state);
-            let drawn = (0..count).filter_map(|_| self.learn(state, drawn(state.condition, &near, random)?));
-            taught.extend(drawn);
+            let others = self.others(state);
+            let near = &others[..others.len().min(NEIGHBORS)];
+            let lines = [(near, count, BEYOND), (&others[..], outside, FAR_BEYOND)];
+            for (ends, count, beyond) in lines {
+                let drawn = (0..count)
+                    .filter_map(|_| self.learn(state, drawn(state.condition, ends, beyond, random)?));
+                taught.extend(drawn);
+            }
         }
         taught
     }
@@ -49,10 +57,11 @@ impl<'a> Between<'a> {
     /// it is elsewhere.
     pub fn fresh(&self, count: usize, random: &mut Random) -> Vec<Vec<Known>> {
         let mut of = |state: &Known| {
-            let near = self.neighbors(state);
+            let others = self.others(state);
+            let near = &others[..others.len().min(NEIGHBORS)];
             let mut one = || {
-                let on_a_line = drawn(state.condition, &near, random)?;
-                self.learn(state, drawn(on_a_line, &near, random)?)
+                let on_a_line = drawn(state.condition, near, BEYOND, random)?;
+                self.learn(state, drawn(on_a_line, near, BEYOND, random)?)
             };
             (0..count).filter_map(|_| one()).collect()
         };
@@ -67,7 +76,8 @@ impl<'a> Between<'a> {
         Some(Known { condition, reading, loads, ..state.clone() })
     }
 
-    fn neighbors(&self, state: &Known) -> Vec<&'a Known> {
+    /// The other cases of the vehicle, nearest first.
+    fn others(&self, state: &Known) -> Vec<&'a Known> {
         let distance = |other: &Known| -> f64 {
             let (a, b) = (&state.reading.coordinates, &other.reading.coordinates);
             (0..COORDINATES).map(|i| ((a[i] - b[i]) / self.unit[i]).powi(2)).sum()
@@ -76,14 +86,14 @@ impl<'a> Between<'a> {
         let mut others: Vec<(f64, &Known)> = others.map(|other| (distance(other), other)).collect();
         others.retain(|(distance, _)| *distance > 0.0);
         others.sort_by(|a, b| a.0.total_cmp(&b.0));
-        others.into_iter().take(NEIGHBORS).map(|(_, other)| other).collect()
+        others.into_iter().map(|(_, other)| other).collect()
     }
 }
 
-/// A state on the line through one and any of its neighbors.
-fn drawn(from: Condition, near: &[&Known], random: &mut Random) -> Option<Condition> {
-    let other = near.get((random.unit() * near.len() as f64) as usize)?;
-    let share = (1.0 + 2.0 * BEYOND) * random.unit() - BEYOND;
+/// A state on the line through one and any of `others`, and up to `beyond` of their distance beyond either.
+fn drawn(from: Condition, others: &[&Known], beyond: f64, random: &mut Random) -> Option<Condition> {
+    let other = others.get((random.unit() * others.len() as f64) as usize)?;
+    let share = (1.0 + 2.0 * beyond) * random.unit() - beyond;
     Some(between(&from, &other.condition, share))
 }
 

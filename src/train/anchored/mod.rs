@@ -68,7 +68,7 @@ pub fn train(
     let teacher = Teacher::new(training.iter(), &vehicles, unit, None)?;
     let mut random = Random::new(config.seed);
     let between = Between { training: &training, vehicles: &vehicles, teacher: &teacher, unit: &unit };
-    let taught = between.taught(config.anchored.between, &mut random);
+    let taught = between.taught(config.anchored.between, config.anchored.outside, &mut random);
     let task = task(&taught, &held_out, &vehicles, &form, config)?;
     let begun = Instant::now();
     let (fit, epochs) = run(&task, config, checkpoint, progress)?;
