@@ -107,9 +107,9 @@ impl Settings {
             ),
             (
                 "settle_s",
-                within(least, SECTIONS_BEFORE_S, most) && most <= 1000.0,
+                within(least, 0.0, most) && most <= 1000.0,
                 format!("{:?}", self.settle_s),
-                "two times from 0.5 to 1000 s, the lesser first",
+                "two times from 0 to 1000 s, the lesser first",
             ),
             ("window_s", within(self.window_s, 0.2, 1000.0), self.window_s.to_string(), "from 0.2 to 1000 s"),
             ("drift", within(self.drift, 0.0, 10.0), self.drift.to_string(), "a share from 0 to 10"),

@@ -9,7 +9,7 @@ use nalgebra::{Rotation3, UnitVector3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::case::Settings;
+use super::case::{SECTIONS_BEFORE_S, Settings};
 use crate::condition::{Condition, GroundContact};
 use crate::domain::Range;
 use crate::frame::{Vec3, up_from_roll_pitch};
@@ -330,6 +330,7 @@ impl Plan {
                 return Err(PlanError::Twice { path, id: case.id.clone() });
             }
             check(&path, case)?;
+            check_ramp(&path, case, &campaign.settings)?;
         }
         Ok(Self { campaign, cases })
     }
@@ -552,13 +553,16 @@ fn check(path: &Path, case: &Case) -> Result<(), PlanError> {
         Some((field, value, .., expected)) => {
             Err(PlanError::Value { path: path.to_owned(), id: case.id.clone(), field, value, expected })
         }
-        None => check_ramp(path, case),
+        None => Ok(()),
     }
 }
 
-fn check_ramp(path: &Path, case: &Case) -> Result<(), PlanError> {
+fn check_ramp(path: &Path, case: &Case, settings: &Settings) -> Result<(), PlanError> {
     let fault = match case.is_unsteady() {
         true if case.bed == Bed::Driving => "wheels that turn keep their speed: a ramp needs a parked bed",
+        true if settings.settle_s[0] < SECTIONS_BEFORE_S => {
+            "half a second before the ramp is kept: settle_s is shorter"
+        }
         false if case.end_speed_mps != case.speed_mps => {
             "end_speed_mps differs from speed_mps, and ramp_s is 0"
         }
@@ -726,6 +730,11 @@ mod tests {
         assert!(error.contains("warthog-paper-0001") && error.contains("ramp_s is 0"), "{error}");
         let error = refused(&|plan| (plan.cases[1].ramp_s, plan.cases[1].bed) = (1.0, Bed::Driving));
         assert!(error.contains("parked bed"), "{error}");
+        let error = refused(&|plan| {
+            plan.cases[1].ramp_s = 1.0;
+            plan.campaign.settings.settle_s = [0.2, 2.0];
+        });
+        assert!(error.contains("settle_s is shorter"), "{error}");
         let error = refused(&|plan| plan.campaign.settings.settle_s = [5.0, 2.0]);
         assert!(error.contains("campaign.toml") && error.contains("settle_s"), "{error}");
         let error = refused(&|plan| plan.campaign.settings.windows = 0);
