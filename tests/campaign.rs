@@ -122,17 +122,18 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
     let settings = Path::new(&campaign).join("campaign.toml");
     let label = solver.label();
     let edited = [
-        (vec![(&outcome, label.as_str(), "another solver")], "computed by"),
-        (vec![(&settings, "windows = ", "windows = 1")], "other settings"),
+        (vec![(&outcome, label.as_str(), "another solver")], "computed by", "wade dataset merge"),
+        (vec![(&settings, "windows = ", "windows = 1")], "other settings", "move it away"),
         (
             vec![
                 (&settings, "windows = ", "windows = 1"),
                 (&outcome, "\"windows\":1,\"sample_s", "\"windows\":11,\"sample_s"),
             ],
             "with the settings",
+            "wade dataset merge",
         ),
     ];
-    for (edits, says) in edited {
+    for (edits, says, way_out) in edited {
         let texts: Vec<String> =
             edits.iter().map(|(path, ..)| std::fs::read_to_string(path).expect("a file")).collect();
         for ((path, from, to), text) in edits.iter().zip(&texts) {
@@ -144,7 +145,7 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
         let mixed = wade(&["campaign", "collect", &campaign]);
         let said = stderr(&mixed);
         assert!(!mixed.status.success() && said.contains(says), "{said}");
-        assert!(said.contains("husky-paper-0001"), "{said}");
+        assert!(said.contains("husky-paper-0001") && said.contains(way_out), "{said}");
         std::fs::write(&summaries, whole).expect("written");
         for ((path, ..), text) in edits.iter().zip(&texts) {
             std::fs::write(path, text).expect("written");
