@@ -1,6 +1,6 @@
 //! A CFD campaign with OpenFOAM: plan the cases, run them, collect per-surface forces into a data set, report.
 //!
-//! Reading order: `plan` (which states), `openfoam` (the solver that is installed, its version and its faults),
+//! Reading order: `plan` (the folder of a campaign), `sets` (which states), `openfoam` (the solver that is installed, its version and its faults),
 //! `placement` (the vehicle in the channel), `mesh` (channel and refinement), `case` (the files of one case),
 //! `poly_mesh` (the hull that the mesh really has and its load at rest), `solve` (one case from mesh to section
 //! averages), `claim` (one process a case), `run` (many at a time, resumable), `collect` (the data set), `report`, `trials` (cases as trials for `wade gap`),
@@ -19,6 +19,7 @@ pub mod plan;
 pub mod poly_mesh;
 pub mod report;
 pub mod run;
+mod sets;
 pub mod slurm;
 pub mod solve;
 pub mod trials;

@@ -242,8 +242,6 @@ impl Machine<'_> {
             outcome = self.attempt(case, &claim, settings.cautious(), 2);
         }
         let stored = outcome.map_err(|error| error.to_string()).and_then(|outcome| {
-            // the campaign's: what another attempt changed of them is its Courant number
-            let outcome = Outcome { settings, ..outcome };
             self.work.store(&outcome).map_err(|error| error.to_string())?;
             Ok(outcome)
         });
@@ -288,7 +286,7 @@ impl Machine<'_> {
         let seal: String =
             files.iter().map(|(name, text)| format!("{}  {name}\n", hash(text.as_bytes()))).collect();
         std::fs::write(folder.join(SEAL), seal).map_err(io)?;
-        solve(&folder, claim, &inputs, number)
+        solve(&folder, claim, self.campaign, &inputs, number)
     }
 }
 

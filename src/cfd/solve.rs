@@ -10,7 +10,7 @@ use super::case::{Inputs, SECTIONS_BEFORE_S, Settings};
 use super::claim::Claim;
 use super::openfoam::{MeshKind, internal_vectors};
 use super::placement::Placement;
-use super::plan::{Case, hull_hash};
+use super::plan::{Campaign, Case};
 use super::poly_mesh::{MeshHull, PolyMeshError};
 use crate::dataset::CutOff;
 use crate::dataset::history::{History, HistoryError};
@@ -177,8 +177,14 @@ impl SolveError {
     }
 }
 
-/// Computes the case whose files are in `folder`, which `claim` gives to this process alone.
-pub fn solve(folder: &Path, claim: &Claim, inputs: &Inputs, attempts: u32) -> Result<Outcome, SolveError> {
+/// Computes the case of `campaign` whose files are in `folder`, which `claim` gives to this process alone.
+pub fn solve(
+    folder: &Path,
+    claim: &Claim,
+    campaign: &Campaign,
+    inputs: &Inputs,
+    attempts: u32,
+) -> Result<Outcome, SolveError> {
     let placement = Placement::new(inputs.vehicle, inputs.case);
     let mut running = Running { folder, claim, inputs, started: Instant::now() };
     running.program("blockMesh", &[])?;
@@ -212,8 +218,8 @@ pub fn solve(folder: &Path, claim: &Claim, inputs: &Inputs, attempts: u32) -> Re
         case: inputs.case.clone(),
         solver: inputs.solver.label(),
         method: method(inputs.case),
-        settings: *inputs.settings,
-        hull_sha256: hull_hash(inputs.vehicle),
+        settings: campaign.settings,
+        hull_sha256: campaign.hull_sha256.clone(),
         mesh_kind: inputs.solver.mesh_kind,
         cells: hull.cells,
         courant: settings.courant,

@@ -41,8 +41,7 @@ impl<'a> Between<'a> {
             };
             taught.push(itself);
             let others = self.others(state);
-            let near = &others[..others.len().min(NEIGHBORS)];
-            let lines = [(near, count, BEYOND), (&others[..], outside, FAR_BEYOND)];
+            let lines = [(near(&others), count, BEYOND), (&others[..], outside, FAR_BEYOND)];
             for (ends, count, beyond) in lines {
                 let drawn = (0..count)
                     .filter_map(|_| self.learn(state, drawn(state.condition, ends, beyond, random)?));
@@ -58,10 +57,9 @@ impl<'a> Between<'a> {
     pub fn fresh(&self, count: usize, random: &mut Random) -> Vec<Vec<Known>> {
         let mut of = |state: &Known| {
             let others = self.others(state);
-            let near = &others[..others.len().min(NEIGHBORS)];
             let mut one = || {
-                let on_a_line = drawn(state.condition, near, BEYOND, random)?;
-                self.learn(state, drawn(on_a_line, near, BEYOND, random)?)
+                let on_a_line = drawn(state.condition, near(&others), BEYOND, random)?;
+                self.learn(state, drawn(on_a_line, near(&others), BEYOND, random)?)
             };
             (0..count).filter_map(|_| one()).collect()
         };
@@ -88,6 +86,10 @@ impl<'a> Between<'a> {
         others.sort_by(|a, b| a.0.total_cmp(&b.0));
         others.into_iter().map(|(_, other)| other).collect()
     }
+}
+
+fn near<'b>(others: &'b [&'b Known]) -> &'b [&'b Known] {
+    &others[..others.len().min(NEIGHBORS)]
 }
 
 /// A state on the line through one and any of `others`, and up to `beyond` of their distance beyond either.
