@@ -202,6 +202,7 @@ fn what_is_not_there_or_would_be_mixed_is_refused() {
         assert!(!output.status.success() && message.contains(says), "{message}");
     };
     refused(&["wide"], "no case of wide");
+    refused(&["paper", "wide"], "no case of wide");
     assert!(!out.exists());
     assert!(wade(&source, &["paper"], &out).status.success());
     refused(&["paper"], "holds trials already");

@@ -32,14 +32,35 @@ fn every_subcommand_shows_an_example() {
         "vehicle check",
         "vehicle list",
         "vehicle show",
+        "vehicle reload",
         "train",
         "eval",
+        "campaign",
+        "campaign plan",
+        "validate",
+        "gap",
     ];
     for command in commands {
         let arguments: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();
         let output = wade(&arguments);
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success() && text.contains("Example"), "{command}: {text}");
+    }
+}
+
+#[test]
+fn help_says_all_that_stands_above_a_command() {
+    for (command, says) in [
+        ("predict", "Columns: vx vy vz"),
+        ("soak", "Exit status 1"),
+        ("validate", "Exit status 1"),
+        ("gap", "Exit status 1"),
+        ("campaign run", "Killed at any time"),
+    ] {
+        let arguments: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();
+        let output = wade(&arguments);
+        let text = String::from_utf8_lossy(&output.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(says), "{command}: {text}");
     }
 }
 

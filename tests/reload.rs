@@ -2,6 +2,7 @@
 
 mod common;
 
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -69,6 +70,28 @@ fn a_bad_bundle_is_refused_over_grpc_and_the_old_version_stays() {
     let after = served.tcp("husky", Method::Unary).evaluate(&state()).expect("still served");
     assert_eq!(after.bundle_version, before.bundle_version);
     assert_eq!(after.wrench, before.wrench);
+}
+
+#[test]
+fn the_command_line_has_a_server_read_its_bundles_again_and_says_what_it_refused() {
+    let folder = copy_of_vehicles();
+    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let reload = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+        let output = command.args(["vehicle", "reload", "--server", &served.url()]).args(arguments).output();
+        let output = output.expect("the program runs");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let version = write_next_version(&folder.path().join("husky"));
+    let (code, said) = reload(&[]);
+    assert!(code == Some(0) && said.contains(&format!("serves husky, version {version}")), "{said}");
+    assert!(said.contains("serves warthog"), "{said}");
+    std::fs::write(folder.path().join("husky/hull.stl"), b"not a hull").expect("written");
+    let (code, said) = reload(&["husky"]);
+    assert!(code == Some(1) && said.contains(&format!("keeps husky, version {version}")), "{said}");
+    assert!(said.contains("hull.stl"), "{said}");
+    let (code, said) = reload(&["rover"]);
+    assert!(code == Some(1) && said.contains("rover"), "{said}");
 }
 
 #[test]

@@ -31,13 +31,13 @@ const FORCES: [&str; 3] = ["fx", "fy", "fz"];
 /// Why cases could not be turned into trials.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseTrialsError {
-    /// Nothing of these sets is in the data set.
+    /// Nothing of this set is in the data set.
     #[error(
-        "no case of {sets} is in the data set of the campaign: plan it (wade campaign plan --set), run it, collect it"
+        "no case of {set} is in the data set of the campaign: plan it (wade campaign plan --set), run it, collect it"
     )]
     Nothing {
-        /// The sets.
-        sets: String,
+        /// The set.
+        set: Set,
     },
     /// Surfaces that are not the vehicle's.
     #[error(transparent)]
@@ -65,9 +65,12 @@ pub fn trials(
     for sample in dataset.samples.iter().filter(chosen) {
         cases.entry(&sample.case).or_default().push(sample);
     }
-    let surfaces = dataset.meta.vehicles.get(&vehicle.name).filter(|_| !cases.is_empty());
-    let surfaces = surfaces.ok_or_else(|| CaseTrialsError::Nothing { sets: names.clone() })?;
-    let order = order(vehicle, surfaces)?;
+    let is_there = |set: &Set| cases.values().any(|samples| samples[0].set == set.to_string());
+    if let Some(set) = sets.iter().find(|set| !is_there(set)) {
+        return Err(CaseTrialsError::Nothing { set: *set });
+    }
+    // a sample of a case has surfaces
+    let order = order(vehicle, dataset.meta.vehicles.get(&vehicle.name).map_or(&[], Vec::as_slice))?;
     let wheels = wheels(plan, vehicle);
     let (mut trials, mut noise) = (Vec::new(), Noise::default());
     for (case, mut samples) in cases {

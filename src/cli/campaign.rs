@@ -38,17 +38,38 @@ pub struct CampaignCommand {
     command: Command,
 }
 
+/// The form of `--table`.
+const TABLE: &str = "  speed_mps = { min = 0.5, max = 4.0 }               # through the water
+  angle_deg = { min = 30.0, max = 90.0 }             # of the flow: 90 is straight ahead
+  depth_m = { min = 0.10, max = 0.40 }               # at the body origin
+  density_kgpm3 = { min = 1000.0, max = 1900.0 }
+";
+
+/// The form of `--settings`, with what holds without one.
+const SETTINGS: &str = "  courant = 8.0                # largest Courant number
+  interface_courant = 6.0      # and at the water's surface
+  settle_lengths = 3.5         # time before the first window, in vehicle lengths over the speed,
+  settle_s = [2.0, 30.0]       # and its bounds [s]
+  window_s = 2.0               # what is averaged [s]
+  windows = 3                  # computed at most, until the mean has settled
+  drift = 0.05                 # between the halves of a window, over the dynamic force, that counts as settled
+  sample_s = 0.05              # between two samples of the forces [s]
+  limit_s = 3600.0             # after which a program is given up [s], longer on finer meshes
+  [mesh]
+  cells_per_length = 6.1       # background cells along the vehicle
+  wet_layer = 0.42             # height of wet background cells over their length
+  hull_level = 2               # halvings at the hull
+  wheel_level = 3              # and at the wheels
+  # channel_m = [6.0, 5.0, 1.5]  length, width, height; else in vehicle lengths as in the source paper
+";
+
+// What stood above a variant would replace all that its command says of itself.
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Add cases to a plan, or begin one
     Plan(PlanCommand),
-    /// Compute the cases that are not done yet
     Run(Run),
-    /// Add the cases that are done to the campaign's data set
     Collect(Collect),
-    /// Make trials of computed cases, for `wade gap`
     Trials(Trials),
-    /// Show what the campaign covers and how far it can be trusted
     Report(Report),
 }
 
@@ -94,6 +115,16 @@ impl From<SetName> for Set {
 ///
 /// The same seed gives the same plan; called again on the same folder it adds cases and repeats none.
 #[derive(Debug, Args)]
+#[command(after_help = format!("\
+Examples:
+  wade campaign plan --vehicle husky --set paper --cases 175 --out campaigns/husky
+  wade campaign plan --vehicle husky --set driving --cases 24 --out campaigns/husky
+  wade campaign plan --vehicle rover --set paper --table ranges.toml --settings settings.toml --out campaigns/rover
+
+A file of ranges (--table), here the source paper's of the Warthog:
+{TABLE}
+Settings that a file (--settings) leaves out are these:
+{SETTINGS}"))]
 struct PlanCommand {
     /// Name of the vehicle's bundle
     #[arg(long)]
@@ -160,7 +191,10 @@ impl PlanCommand {
         let table = match &self.table {
             Some(path) => read_toml(path)?,
             None => *train::Config::default().analytic.tables.get(&self.vehicle).with_context(|| {
-                format!("no ranges are known for `{}`: give them with --table", self.vehicle)
+                format!(
+                    "no ranges are known for `{}`: give them with --table (wade campaign plan --help)",
+                    self.vehicle
+                )
             })?,
         };
         if !table.is_valid() {
@@ -441,5 +475,19 @@ impl Progress {
 
     fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_help_shows_can_be_read_and_is_what_holds_without_it() {
+        fn table(value: &impl serde::Serialize) -> toml::Table {
+            toml::Table::try_from(value).expect("a table")
+        }
+        assert_eq!(toml::from_str(SETTINGS), Ok(table(&Settings::default())));
+        assert_eq!(toml::from_str(TABLE), Ok(table(&train::plan::Table::WARTHOG)));
     }
 }

@@ -18,6 +18,25 @@ use super::gap_bench::GapBench;
 use super::running::Running;
 use super::{Vehicles, emit, usage_error};
 
+/// The form of `--config`, with what holds without one; besides `library`, which names all effects.
+const SETTINGS: &str = "  # library = [\"added_mass\", \"current\"]   effects that are looked for; all of them otherwise (CONVENTIONS.md)
+  ground_contact = \"wetted\"    # or \"dry\": whether predictions have water under the tires
+  seed = 1
+  bin_s = 0.1                  # over which samples are averaged [s]
+  block_s = 1.5                # unit of cross-validation [s]
+  folds = 8
+  held_out = 0.2               # share of the trials that take no part in naming and fitting
+  least_trials = 4
+  significance = 1e-6          # probability of a false alarm of one effect
+  share_of_remaining = 0.1     # of the gap above the floor that an effect must explain
+  share_of_gap = 0.02          # of all that is explained that one of several must
+  relevance = 0.08             # least size over the noise of a sample
+  most_effects = 4             # named together
+  placebos = 20                # phase-shifted copies that an effect must beat
+  bootstrap = 400              # draws
+  coverage = 0.6               # of the structure that what is named must explain
+";
+
 /// Find where a model and measured trials disagree, name the missing effect, and show the gap shrink
 ///
 /// Says `nothing_missing`, `named`, `ambiguous` (with the trial that would tell the candidates apart) or
@@ -26,7 +45,7 @@ use super::{Vehicles, emit, usage_error};
 /// Exit status 1: --apply was asked for and there is nothing to trust.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
-#[command(after_help = "Examples:
+#[command(after_help = format!("Examples:
   wade gap --vehicle warthog --trials trials/ --out gap/
   wade gap --vehicle warthog --trials trials/ --out gap/ --apply
   wade gap locate --vehicle warthog --trials trials/ --json
@@ -51,11 +70,14 @@ Trials: a folder of CSV files, one a trial, in SI units and body axes (forward, 
   channel_width = 6.0                      [channel_widths] run07 = inf   by trial; inf is open water
   [measured]
   method = \"load_cell\"                   inverse_dynamics, cfd
-  columns = [\"fx\"]                       repeats = [[\"run01\", \"run07\"]]   dry_twins = { run03 = \"dry03\" }
+  columns = [\"fx\"]                       repeats = [[\"run01\", \"run07\"]]   dry_twins = {{ run03 = \"dry03\" }}
   other_forces = [\"drive_fx\"]            columns of known forces, for inverse_dynamics
   known_loads = [\"hung_fz\"]              columns of loads that the cell bears besides the water's, such as known weights
   [sensor_noise]  [trial_offset]           standard deviation of a sample and of the zero from run to run: fx = 4.0
-  [body]                                   with sim_ columns: length, width, draft, mass, displaced_volume, center_of_mass")]
+  [body]                                   with sim_ columns: length, width, draft, mass, displaced_volume, center_of_mass
+
+Settings that a file (--config) leaves out are these:
+{SETTINGS}"))]
 pub struct Gap {
     #[command(subcommand)]
     step: Option<Step>,
@@ -112,7 +134,7 @@ struct Source {
     /// Folder of trials
     #[arg(long, value_name = "DIR", required = true)]
     trials: Option<PathBuf>,
-    /// Settings, TOML: library, seed, bin_s, block_s, folds, held_out, ...
+    /// Settings, TOML
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Print JSON
@@ -368,4 +390,16 @@ fn parameters(report: &Report) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_help_shows_can_be_read_and_is_what_holds_without_it() {
+        let mut settings = toml::Table::try_from(Config::default()).expect("a table");
+        assert!(settings.remove("library").is_some());
+        assert_eq!(toml::from_str(SETTINGS), Ok(settings));
+    }
 }

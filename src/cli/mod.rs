@@ -42,29 +42,19 @@ pub struct Cli {
     command: Command,
 }
 
+// What stood above a variant would replace all that its command says of itself.
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Serve vehicles over gRPC, a Unix socket and shared memory
     Serve(serve::Serve),
-    /// Ask for the forces in one state
     Query(query::Query),
-    /// Forces for every row of a table of states
     Predict(predict::Predict),
-    /// Load a server at a steady rate for a stated time and report its latency
     Soak(soak::Soak),
-    /// Plan, run and collect a CFD campaign
     Campaign(campaign::CampaignCommand),
-    /// Import CFD results, augment, split and describe data sets
     Dataset(dataset::Dataset),
-    /// Train a network for the vehicles of a folder
     Train(train::Train),
-    /// Judge the weights of the bundles by the states that their training held out
     Eval(eval::Eval),
-    /// Hold a model against two laws of physics along the motion of trials
     Validate(validate::Validate),
-    /// Find where a model and measured trials disagree, and name the missing effect
     Gap(gap::Gap),
-    /// Build, check and show vehicle bundles
     Vehicle(vehicle::Vehicle),
 }
 

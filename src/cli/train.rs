@@ -20,13 +20,14 @@ use wade::train::fit::Epoch;
 use wade::train::report::{DataFile, Record, VehicleRecord, sha256_of};
 use wade::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant, anchored};
 
+use super::running::Running;
 use super::{PROGRAM, Vehicles, bundle_names, usage_error};
 
 /// Train one network for the vehicles of a data set and write it into their bundles
 ///
 /// The data set is split, mirrored and standardised by its training side; the bundles get the weights under their next
-/// version, labelled with where the loads come from, and the version before is kept (wade vehicle rollback). "analytic" stands for hydrostatics, form drag and skin friction by
-/// formula over the paper's parameter table, generated on the spot.
+/// version, labelled with where the loads come from, and the version before is kept (wade vehicle rollback). "analytic" stands for
+/// hydrostatics, form drag and skin friction by formula over the paper's parameter table, generated on the spot.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   wade train --data analytic --vehicles vehicles
@@ -92,6 +93,8 @@ pub struct Train {
     /// Goes on from the checkpoint, with the bits of a run that was never stopped
     #[arg(long, requires = "checkpoint")]
     resume: bool,
+    #[command(flatten)]
+    running: Running,
 }
 
 /// What to learn from, for commands that train.
@@ -335,6 +338,7 @@ impl Train {
             let next = Bundle { trained: Some(weights.clone()), effects: None, ..bundle.clone() };
             let version = bundle::succeed(&self.data.vehicles.bundle(name), next)?;
             report(of_vehicle, record.judged(), version);
+            self.running.reload(name);
         }
         // the last of all: who finds it finds the weights that it is about
         record.write(&self.out)?;

@@ -11,20 +11,49 @@ use wade::validate::{self, Config, OutFolder, Recordings, Report, Source, Subjec
 
 use super::{Vehicles, emit};
 
+/// The form of `--config`, with what holds without one.
+const SETTINGS: &str =
+    "  ground_contact = \"wetted\"    # or \"dry\": whether predictions have water under the tires
+  [mocap]
+  rate_hz = 111.0              # after resampling
+  window = 9                   # of the Savitzky-Golay filter [samples]
+  order = 2                    # of its polynomial
+  [planar]
+  duration_s = 0.2             # a section lasts longer,
+  samples = 20                 # has more samples,
+  vertical_speed_mps = 0.05    # rises or sinks less,
+  depth_tolerance_m = 0.01     # stays within this of its most frequent depth
+  least_speed_mps = 0.1        # and moves
+  [pairs]
+  speed_tolerance_mps = 0.3    # between two sections that are compared
+  least_speed_mps = 0.6        # of both
+  [groups]
+  depth_m = 0.02               # depths that differ by more are two fills
+  speed_mps = 0.5              # width of a bin of speed
+  [thresholds]
+  drag_r2 = 0.9                # least R2 of |Fx| against v^2 at every depth
+  ratio_difference = 0.3       # largest between the mean ratio of pairs and that of the fits
+  f0_r2 = 0.95                 # least R2 of F0 against depth
+  sections = 3                 # fewest from which a depth is judged
+";
+
 /// Hold a vehicle's model against two laws of physics along the motion of trials
 ///
 /// Test 1: drag grows with the square of the speed. Test 2: the vertical force is buoyancy, which grows with depth, plus
 /// lift. Only motion is needed, no measured force. Exit status 1: a check does not hold.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("source").required(true))]
-#[command(after_help = "Examples:
+#[command(after_help = format!("Examples:
   wade validate --vehicle warthog --generated 1 --out validation/
   wade validate --vehicle warthog --mocap recordings/ --out validation/ --json
   wade validate --vehicle warthog --trials trials/ --config validate.toml --out validation/
 
 A folder of recordings holds recordings.toml and one CSV a recording (t, x y z, qw qx qy qz of the marker frame, z up);
 with --generated one is written to OUT/recordings. A folder of trials holds trials.toml and one CSV a trial (t, vx vy vz,
-wx wy wz, roll pitch yaw, depth, ...); those made from recordings are written to OUT/trials.")]
+wx wy wz, roll pitch yaw, depth, ...); those made from recordings are written to OUT/trials.
+
+Settings that a file (--config) leaves out are these:
+{SETTINGS}"))]
 pub struct Validate {
     /// Name of the vehicle
     #[arg(long)]
@@ -41,7 +70,7 @@ pub struct Validate {
     /// Folder for report.json and index.html; an earlier report there is replaced
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Settings and thresholds, TOML: ground_contact = "dry", [mocap], [planar], [pairs], [groups], [thresholds]
+    /// Settings and thresholds, TOML
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Print the JSON too
@@ -140,5 +169,15 @@ impl Validate {
             text.push_str(&format!("{mark}: {}\n", check.finding));
         }
         text + &format!("{}\n", self.out.join("index.html").display())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_help_shows_can_be_read_and_is_what_holds_without_it() {
+        assert_eq!(toml::from_str(SETTINGS), Ok(toml::Table::try_from(Config::default()).expect("a table")));
     }
 }

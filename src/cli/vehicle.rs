@@ -28,7 +28,8 @@ use super::{Vehicles, bundle_names, emit};
   wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover
   wade vehicle check vehicles/husky
   wade vehicle show husky
-  wade vehicle rollback husky")]
+  wade vehicle rollback husky
+  wade vehicle reload husky")]
 pub struct Vehicle {
     #[command(subcommand)]
     command: Command,
@@ -98,6 +99,16 @@ enum Command {
         #[command(flatten)]
         running: Running,
     },
+    /// Have a running server read a bundle again; exit status 1 where it refuses and keeps the version that it serves
+    #[command(after_help = "Examples:
+  wade vehicle reload husky
+  wade vehicle reload --server unix:/run/wade/wade.sock")]
+    Reload {
+        /// Name of the vehicle [default: every vehicle that it serves]
+        name: Option<String>,
+        #[command(flatten)]
+        running: Running,
+    },
     /// Dimensions, surfaces, training domain and hydrostatics of a vehicle
     #[command(after_help = "Example: wade vehicle show warthog")]
     Show {
@@ -148,6 +159,10 @@ impl Vehicle {
                 let version = bundle::roll_back(&vehicles.bundle(&name), to)?;
                 println!("{name}: version {version} is in its place again");
                 running.reload(&name);
+            }
+            Command::Reload { name, running } => {
+                let served = running.ask(name.as_deref().unwrap_or_default())?;
+                return Ok(if served { ExitCode::SUCCESS } else { ExitCode::FAILURE });
             }
             Command::Show { name, vehicles, json } => {
                 let directory = vehicles.bundle(&name);

@@ -386,4 +386,22 @@ mod tests {
         let physics = Effect::ALL.into_iter().filter(|effect| effect.kind() == Kind::Physics);
         assert_eq!(physics.count(), PHYSICS);
     }
+
+    #[test]
+    fn the_conventions_list_every_effect_with_its_parameters() {
+        let conventions = include_str!("../../CONVENTIONS.md");
+        for effect in Effect::ALL {
+            let row = format!("| `{}` |", effect.name());
+            let row = conventions.lines().find(|line| line.starts_with(&row)).unwrap_or_default();
+            let coefficients = effect.coefficients().iter().map(|c| c.name);
+            for name in coefficients.chain(effect.shape_names().iter().map(|(name, _)| *name)) {
+                let is_component = matches!(name, "fy" | "fz" | "mx" | "my");
+                assert!(
+                    is_component || row.contains(&format!("`{name}`")),
+                    "{}: {name} in {row}",
+                    effect.name()
+                );
+            }
+        }
+    }
 }
