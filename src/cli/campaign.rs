@@ -52,7 +52,7 @@ const SETTINGS: &str = "  courant = 8.0                # largest Courant number
   settle_s = [2.0, 30.0]       # and its bounds [s]
   window_s = 2.0               # what is averaged [s]
   windows = 3                  # computed at most, until the mean has settled
-  drift = 0.05                 # between the halves of a window, over the dynamic force, that counts as settled
+  drift = 0.05                 # of the mean that counts as settled, over the dynamic force
   sample_s = 0.05              # between two samples of the forces [s]
   limit_s = 3600.0             # after which a program is given up [s], longer on finer meshes
   [mesh]
@@ -60,7 +60,7 @@ const SETTINGS: &str = "  courant = 8.0                # largest Courant number
   wet_layer = 0.42             # height of wet background cells over their length
   hull_level = 2               # halvings at the hull
   wheel_level = 3              # and at the wheels
-  # channel_m = [6.0, 5.0, 1.5]  length, width, height; else in vehicle lengths as in the source paper
+  # channel_m = [6.0, 5.0, 1.5]  length, width, height; the source paper's otherwise
 ";
 
 // What stood above a variant would replace all that its command says of itself.
@@ -119,7 +119,7 @@ impl From<SetName> for Set {
 Examples:
   wade campaign plan --vehicle husky --set paper --cases 175 --out campaigns/husky
   wade campaign plan --vehicle husky --set driving --cases 24 --out campaigns/husky
-  wade campaign plan --vehicle rover --set paper --table ranges.toml --settings settings.toml --out campaigns/rover
+  wade campaign plan --vehicle rover --set paper --table ranges.toml --out campaigns/rover
 
 A file of ranges (--table), here the source paper's of the Warthog:
 {TABLE}
