@@ -78,21 +78,25 @@ impl Plan {
         Ok(free.into_iter().take(count).map(twin).collect())
     }
 
-    /// Ramps of the speed at three depths, up and down, gentle and hard; head-on, and one broadside.
+    /// Ramps of the speed at three depths, up and down, gentle and hard; head-on, and one broadside. And from rest, where
+    /// neither drag nor waves hide what the acceleration does: below Fr_h = 1 at every depth, within 60 degrees of ahead.
     fn surges(&self) -> Vec<Case> {
         let Table { speed_mps, depth_m, .. } = self.campaign.table;
         let depth = |share: f64| depth_m.min + share * (depth_m.max - depth_m.min);
         let (slow, fast) = (0.25 * speed_mps.max, 0.5 * speed_mps.max);
-        let ramps = [
+        let moving = [
             (slow, fast, 1.0, 0.0),
             (fast, slow, 1.0, 0.0),
             (slow, fast, 0.5, 0.0),
             (slow, fast, 2.0, 0.0),
             (slow, fast, 1.0, 90.0),
         ];
-        let depths = [0.33, 0.67, 1.0];
-        let states = depths.iter().flat_map(|&share| ramps.map(|ramp| (depth(share), ramp)));
-        states
+        let from_rest = [(0.0, slow, 1.0, 0.0), (0.0, slow, 0.5, 0.0), (0.0, slow, 1.0, 60.0)];
+        let depths = [0.33, 0.67, 1.0].map(depth);
+        let moving = depths.iter().flat_map(|depth| moving.map(|ramp| (*depth, ramp)));
+        let from_rest = depths.iter().flat_map(|depth| from_rest.map(|ramp| (*depth, ramp)));
+        moving
+            .chain(from_rest)
             .enumerate()
             .map(|(i, (depth, (from, to, ramp_s, heading_deg)))| Case {
                 end_speed_mps: to,
@@ -256,8 +260,8 @@ mod tests {
         for set in [Set::Check, Set::Ahead, Set::Unsteady, Set::Check] {
             plan.extend(set, 0, 1, 0.378).unwrap();
         }
-        // at rest and four speeds, two finer meshes, five ramps
-        assert_eq!(plan.cases.len(), 1 + 4 + 2 + 5);
+        // at rest and four speeds, two finer meshes, eight ramps
+        assert_eq!(plan.cases.len(), 1 + 4 + 2 + 8);
         assert!(plan.cases.iter().any(|case| case.id == "warthog-check-0010"), "numbers as of many depths");
     }
 
