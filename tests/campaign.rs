@@ -1,13 +1,15 @@
 //! Promise: a campaign survives a kill, never computes a case twice, refuses what was changed behind its back, and its
 //! forces have the right size and sign. Where OpenFOAM is not installed these tests say so and are skipped.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
+use wade::bundle;
 use wade::cfd::openfoam::{MeshKind, OpenFoam};
 use wade::cfd::plan::Plan;
+use wade::cfd::solve::{Load, Outcome, Section, method};
 use wade::dataset;
 
 mod common;
@@ -165,6 +167,118 @@ fn a_killed_campaign_goes_on_and_its_forces_make_sense() {
     let report = wade(&["campaign", "report", &campaign, "--json"]);
     assert!(report.status.success() && stdout(&report).contains("\"suspicious\""), "{}", stderr(&report));
     assert!(stdout(&report).contains("\"outdated\": 0"), "{}", stdout(&report));
+}
+
+/// Puts down the outcome of a case that no solver computed, in which each surface feels `force` newtons along x.
+fn put_outcome(campaign: &str, number: usize, force: f64) -> PathBuf {
+    let plan = Plan::read(Path::new(campaign)).expect("a plan");
+    let vehicle = bundle::read(&common::vehicles().join("husky")).expect("a bundle").vehicle;
+    let surfaces: Vec<String> = vehicle.surfaces.iter().map(|surface| surface.name.clone()).collect();
+    let case = plan.cases[number].clone();
+    let section = Section {
+        start_s: 1.0,
+        end_s: 1.1,
+        speed_mps: case.speed_mps,
+        acceleration_mps2: 0.0,
+        loads: vec![Load { force: [force, 0.0, 0.0], ..Load::default() }; surfaces.len()],
+    };
+    let outcome = Outcome {
+        solver: "generated for a test".to_owned(),
+        method: method(&case),
+        settings: plan.campaign.settings,
+        hull_sha256: plan.campaign.hull_sha256,
+        mesh_kind: MeshKind::Castellated,
+        cells: 1000,
+        courant: 1.0,
+        attempts: 1,
+        steps: 10,
+        core_s: 1.0,
+        windows: 1,
+        settled: true,
+        drift: [0.0; 3],
+        mass_imbalance: 0.0,
+        rest: vec![Load::default(); surfaces.len()],
+        surfaces,
+        sections: vec![section],
+        case,
+    };
+    let folder = Path::new(campaign).join("work/outcomes");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join(format!("{}.json", outcome.case.id));
+    std::fs::write(&path, serde_json::to_string(&outcome).expect("JSON")).expect("written");
+    path
+}
+
+#[test]
+fn an_outcome_that_the_data_set_cannot_hold_is_refused_and_what_was_collected_stays() {
+    let (_folder, campaign) = planned(COARSE);
+    put_outcome(&campaign, 0, -1.0);
+    let first = wade(&["campaign", "collect", &campaign]);
+    assert!(stdout(&first).contains("1 of 2 cases, 1 of them new"), "{}", stderr(&first));
+    let files = ["sections.parquet", "cases.csv"].map(|name| Path::new(&campaign).join(name));
+    let contents = || files.each_ref().map(|file| std::fs::read(file).expect("collected"));
+    let before = contents();
+    put_outcome(&campaign, 1, 1e39);
+    let refused = wade(&["campaign", "collect", &campaign]);
+    let said = stderr(&refused);
+    assert_eq!(refused.status.code(), Some(1), "{said}");
+    let expected = "case `husky-paper-0001`, section 0, surface `front_lower`: fx_n is 1e39, beyond";
+    assert!(said.contains("sections.parquet: ") && said.contains(expected), "{said}");
+    assert_eq!(contents(), before);
+    put_outcome(&campaign, 1, -1.0);
+    let second = wade(&["campaign", "collect", &campaign]);
+    assert!(stdout(&second).contains("2 of 2 cases, 1 of them new"), "{}", stderr(&second));
+}
+
+#[test]
+fn a_data_set_without_its_summaries_or_the_reverse_is_refused_and_nothing_is_written() {
+    let (_folder, campaign) = planned(COARSE);
+    let collect = || wade(&["campaign", "collect", &campaign]);
+    let outcome = put_outcome(&campaign, 0, -1.0);
+    assert!(collect().status.success());
+    let files = ["sections.parquet", "cases.csv"].map(|name| Path::new(&campaign).join(name));
+    let whole = files.each_ref().map(|file| std::fs::read(file).expect("collected"));
+    // cut off between the two files: the outcome is still there
+    std::fs::remove_file(&files[1]).expect("removed");
+    let again = collect();
+    assert!(stdout(&again).contains("1 of 2 cases, 1 of them new"), "{}", stderr(&again));
+
+    std::fs::remove_file(outcome).expect("removed");
+    let refused = |what: &str| {
+        let before = files.each_ref().map(|file| std::fs::read(file).ok());
+        let output = collect();
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{what}: {said}");
+        for part in [what, "campaign/sections.parquet", "campaign/cases.csv", "restore", "remove both"] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+        assert_eq!(files.each_ref().map(|file| std::fs::read(file).ok()), before, "{what}");
+    };
+    let summaries = std::fs::read_to_string(&files[1]).expect("summaries");
+    let names = format!("{}\n", summaries.lines().next().expect("names of columns"));
+    for has_new in [false, true] {
+        if has_new {
+            put_outcome(&campaign, 1, -1.0);
+        }
+        for (file, content, what) in [
+            (&files[0], None, "sections.parquet is missing"),
+            (&files[0], Some("damaged"), "sections.parquet cannot be read"),
+            (&files[1], None, "cases.csv is missing"),
+            (&files[1], Some(names.as_str()), "cases.csv has no row for case `husky-paper-0000`"),
+        ] {
+            match content {
+                Some(content) => std::fs::write(file, content).expect("written"),
+                None => std::fs::remove_file(file).expect("removed"),
+            }
+            refused(what);
+            files.iter().zip(&whole).for_each(|(file, bytes)| std::fs::write(file, bytes).expect("restored"));
+        }
+    }
+    let second = collect();
+    assert!(stdout(&second).contains("2 of 2 cases, 1 of them new"), "{}", stderr(&second));
+    // a data set from before the second case
+    std::fs::write(&files[0], &whole[0]).expect("written");
+    refused("sections.parquet has no section of case `husky-paper-0001`");
 }
 
 #[test]

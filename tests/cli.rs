@@ -247,3 +247,70 @@ fn a_reason_is_told_once() {
         assert_eq!(error.matches("os error 2").count(), 1, "{error}");
     }
 }
+
+fn refused(arguments: &[&str], says: &str) {
+    let output = wade(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && message.contains(says), "{arguments:?}: {message}");
+}
+
+#[test]
+fn what_is_written_takes_the_place_of_nothing_else() {
+    let folder = common::copy_of_vehicles();
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let sums = || std::fs::read_to_string(path("husky/SHA256SUMS")).expect("readable");
+    let before = (sums(), std::fs::read_dir(path("husky")).expect("readable").count());
+    let bundles = path("");
+    for command in [
+        &["gap", "--vehicle", "husky", "--trials", "tests/data/wading"] as &[&str],
+        &["train", "--data", "analytic", "--epochs", "1"],
+    ] {
+        let out = path("husky");
+        refused(&[command, &["--vehicles", &bundles, "--out", &out]].concat(), "holds a vehicle bundle");
+    }
+    assert_eq!((sums(), std::fs::read_dir(path("husky")).expect("readable").count()), before);
+
+    std::fs::write(path("a.partial"), "vx,vy,vz,depth\n0.5,0,0,0.1\n").expect("written");
+    let predict =
+        |states: &str, out: &str| wade(&["predict", "--vehicle", "husky", "--states", states, "--out", out]);
+    assert!(predict(&path("a.partial"), &path("a.csv")).status.success());
+    assert_eq!(std::fs::read_to_string(path("a.csv")).expect("written").lines().count(), 2);
+    assert!(path_has(&path("a.partial"), "0.5"));
+    std::fs::write(path("bad.csv"), "vx,vy,vz,depth\n0.5,0,0,none\n").expect("written");
+    assert!(!predict(&path("bad.csv"), &path("a.csv")).status.success());
+    assert!(path_has(&path("a.csv"), "in_domain"), "a table that failed leaves the one before");
+    let names =
+        std::fs::read_dir(folder.path()).expect("readable").map(|entry| entry.expect("readable").file_name());
+    assert!(
+        names.into_iter().all(|name| !name.to_string_lossy().starts_with(".wade")),
+        "nothing half is left"
+    );
+    refused(
+        &["predict", "--vehicle", "husky", "--states", &path("a.csv"), "--out", &path("warthog")],
+        "is no file",
+    );
+    refused(&["query", "--vehicle", "rover", "--depth", "0.1"], "husky, warthog");
+}
+
+fn path_has(path: &str, text: &str) -> bool {
+    std::fs::read_to_string(path).expect("readable").contains(text)
+}
+
+#[test]
+fn a_plan_without_its_campaign_is_not_begun_anew() {
+    let folder = TempDir::new().expect("a folder");
+    let out = folder.path().to_str().expect("UTF-8");
+    let plan = ["campaign", "plan", "--vehicle", "husky", "--set", "check", "--out", out];
+    assert!(wade(&plan).status.success());
+    let (campaign, cases) = (folder.path().join("campaign.toml"), folder.path().join("plan.csv"));
+    let noted = std::fs::read_to_string(&campaign).expect("readable") + "# my settings\n";
+    std::fs::write(&campaign, &noted).expect("written");
+    assert!(
+        wade(&["campaign", "plan", "--vehicle", "husky", "--set", "mesh", "--out", out]).status.success()
+    );
+    assert_eq!(std::fs::read_to_string(&campaign).expect("readable"), noted, "what was written there stays");
+    let before = std::fs::read_to_string(&cases).expect("readable");
+    std::fs::remove_file(&campaign).expect("removed");
+    refused(&plan, "holds plan.csv and no campaign.toml");
+    assert_eq!(std::fs::read_to_string(&cases).expect("readable"), before);
+}

@@ -129,6 +129,32 @@ fn nothing_is_written_for_a_bad_data_set_and_what_was_there_stays() {
     assert!(matches!(flaw, Flaw::GroundContact { .. }), "{flaw}");
 }
 
+#[test]
+fn a_load_that_the_file_cannot_hold_is_refused_before_anything_is_written() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("data.parquet");
+    let mut largest = data(2);
+    largest.samples[1].surfaces[0].force.z = f64::from(f32::MAX);
+    dataset::write(&path, &largest).unwrap();
+    assert_eq!(dataset::read(&path).unwrap().samples[1].surfaces[0].force.z, f64::from(f32::MAX));
+    let before = fs::read(&path).unwrap();
+    let refused = |spoil: &dyn Fn(&mut dataset::SurfaceLoad)| {
+        let mut data = data(2);
+        spoil(&mut data.samples[1].surfaces[0]);
+        let error = dataset::write(&path, &data).unwrap_err().to_string();
+        assert_eq!(fs::read(&path).unwrap(), before);
+        error
+    };
+    let error = refused(&|load| load.force.z = 1e39);
+    let expected = "data.parquet: case `husky-0001`, section 0, surface `front_lower`: fz_n is 1e39, beyond";
+    assert!(error.contains(expected), "{error}");
+    let error = refused(&|load| load.moment = Some(Vec3::new(0.0, -1e300, 0.0)));
+    assert!(error.contains("surface `front_lower`: my_nm is -1e300"), "{error}");
+    let rest = Rest { force: Vec3::zeros(), moment: Vec3::new(0.0, 0.0, 1e300) };
+    let error = refused(&|load| load.rest = Some(rest));
+    assert!(error.contains("surface `front_lower`: rest_mz_nm is 1e300"), "{error}");
+}
+
 /// A file that pandas wrote; tests/data/README.md says how.
 fn by_pandas(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/parquet").join(name).with_extension("parquet")
@@ -182,6 +208,28 @@ fn a_file_that_is_cut_off_anywhere_is_refused() {
     }
     let missing = dataset::read(&folder.path().join("none.parquet")).unwrap_err();
     assert!(matches!(missing.fault, Fault::Io(_)), "{missing}");
+}
+
+#[test]
+fn a_file_that_is_damaged_anywhere_is_an_error_and_no_panic() {
+    let whole = fs::read(by_pandas("rewritten")).unwrap();
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("damaged.parquet");
+    let damaged = |place: usize| {
+        let mut bytes = whole.clone();
+        bytes[place] ^= 1;
+        fs::write(&path, bytes).unwrap();
+        dataset::read(&path)
+    };
+    // the encoding of a page and the length of a column, over which the reader of Parquet panics
+    for place in [915, 5482] {
+        let error = damaged(place).unwrap_err();
+        assert!(matches!(error.fault, Fault::Damaged { .. } | Fault::Parquet(_)), "{place}: {error}");
+        assert!(error.to_string().contains("damaged.parquet: "), "{place}: {error}");
+    }
+    // not every byte matters: some are statistics, or of the program that wrote the file
+    let refused = (4..whole.len() - 8).step_by(16).filter(|&place| damaged(place).is_err()).count();
+    assert!(refused > 100, "{refused}");
 }
 
 /// Any state and loads of a vehicle.
@@ -424,6 +472,11 @@ fn an_empty_side_is_refused_with_its_reason() {
     }
     assert!(matches!(reason(&few, By::Depth { bins: 1 }), SplitError::Parts { count: 1 }));
     assert!(matches!(reason(&few, By::Depth { bins: 30 }), SplitError::EmptyPart { .. }));
+    for bins in [1001, usize::MAX] {
+        assert!(matches!(reason(&few, By::Depth { bins }), SplitError::Parts { .. }), "{bins}");
+        assert!(matches!(reason(&few, By::Heading { bins }), SplitError::Parts { .. }), "{bins}");
+        assert!(matches!(reason(&few, By::Folds { count: bins }), SplitError::TooFew { .. }), "{bins}");
+    }
     let husky = few.subset(&(0..6).collect::<Vec<_>>());
     assert!(matches!(reason(&husky, By::Vehicle), SplitError::OneVehicle { .. }));
     let mut level = few.clone();

@@ -225,6 +225,54 @@ fn forces_that_are_not_numbers_are_named_with_their_line() {
 }
 
 #[test]
+fn a_force_beyond_what_the_file_holds_is_named_with_its_surface_and_column() {
+    let error = refused("openfoam", "warthog", |cases| {
+        edit(&cases.join(FORCE), |text| text.replace("\n3\t(-17 ", "\n3\t(1e300 "));
+    });
+    assert!(error.contains("case `warthog-head-on`"), "{error}");
+    assert!(error.contains("surface `wheel_fr`: fx_n is ") && error.contains("beyond single"), "{error}");
+}
+
+#[test]
+fn a_patch_that_feeds_two_surfaces_is_refused() {
+    let error = refused("openfoam", "warthog", |cases| {
+        let names = "\n[surfaces]\nfront = \"rear\"\n";
+        edit(&cases.join("warthog-head-on/case.toml"), |text| text + names);
+    });
+    let expected = "warthog-head-on/case.toml: surfaces `front` and `rear` are both `rear` of the solver";
+    assert!(error.contains(expected), "{error}");
+    let error = refused("fluent", "husky", |cases| {
+        let line = "wheel_fl = \"wheel-front-left\"\n";
+        edit(&cases.join("husky-oblique/case.toml"), |text| {
+            text.replace(line, &format!("{line}wheel_fr = \"wheel-front-left\"\n"))
+        });
+    });
+    assert!(error.contains("surfaces `wheel_fl` and `wheel_fr` are both"), "{error}");
+}
+
+#[test]
+fn moments_about_an_unknown_point_are_refused() {
+    let lose_center = |path: PathBuf| edit(&path, |text| text.replace("CofR", "Point"));
+    let error = refused("openfoam", "warthog", |cases| {
+        for name in ["force.dat", "moment.dat"] {
+            lose_center(cases.join(FORCE).with_file_name(name));
+        }
+    });
+    assert!(error.contains("warthog-head-on/postProcessing/wheel_fr, surface `wheel_fr`"), "{error}");
+    assert!(error.contains("# CofR : (x y z)"), "{error}");
+
+    // what wrote the moments wrote the forces beside them, about the same point
+    let cases = copy("openfoam");
+    lose_center(cases.path().join("warthog-oblique/postProcessing/hull_wheel_fr/0/moment.dat"));
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("data.parquet");
+    let output = import("openfoam", "warthog", cases.path(), &out, &[]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let data = dataset::read(&out).unwrap();
+    of_case(&data, "warthog-oblique").into_iter().for_each(|sample| check_loads(sample, true, false));
+}
+
+#[test]
 fn a_damaged_line_in_the_middle_is_named() {
     let error = refused("openfoam", "warthog", |cases| {
         edit(&cases.join(FORCE), |text| text.replace("\n3\t(-17 ", "\n3\t"));
@@ -337,6 +385,65 @@ fn an_empty_side_ends_with_its_reason_and_wrong_flags_are_usage() {
     assert!(!split.exists(), "nothing is written");
     let flags = ["split", text(&husky), "--by", "depth", "--share", "0.2", "--out", text(&split)];
     assert_eq!(wade(&flags).status.code(), Some(2));
+}
+
+#[test]
+fn a_data_set_that_is_read_is_not_written_over() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (warthog, husky, link) = (at("warthog.parquet"), at("husky.parquet"), at("link.parquet"));
+    assert!(import("openfoam", "warthog", &data().join("openfoam"), &warthog, &[]).status.success());
+    assert!(import("fluent", "husky", &data().join("fluent"), &husky, &[]).status.success());
+    std::os::unix::fs::symlink(&husky, &link).unwrap();
+    let whole = fs::read(&husky).unwrap();
+    let around = folder.path().join("../").join(folder.path().file_name().unwrap()).join("husky.parquet");
+    for out in [&husky, &link, &around].map(|path| text(path)) {
+        for arguments in [
+            vec!["describe", text(&husky), "--html", out],
+            vec!["augment", text(&husky), "--out", out],
+            vec!["merge", text(&warthog), text(&husky), "--out", out],
+            vec!["split", text(&husky), "--out", out],
+        ] {
+            let output = wade(&arguments);
+            let error = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
+            assert!(error.contains("husky.parquet, which is read"), "{arguments:?}: {error}");
+            assert_eq!(fs::read(&husky).unwrap(), whole, "{arguments:?}");
+            assert!(link.is_symlink(), "{arguments:?}");
+        }
+    }
+}
+
+#[test]
+fn a_damaged_file_is_named_and_no_panic_is_shown() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("damaged.parquet");
+    let mut bytes = fs::read(data().join("parquet/rewritten.parquet")).unwrap();
+    bytes[5482] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    let output = wade(&["describe", text(&path)]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("damaged.parquet: ") && !error.contains("panicked"), "{error}");
+}
+
+#[test]
+fn counts_that_make_no_data_set_are_usage() {
+    let folder = TempDir::new().unwrap();
+    let (husky, out) = (folder.path().join("husky.parquet"), folder.path().join("out"));
+    assert!(import("fluent", "husky", &data().join("fluent"), &husky, &[]).status.success());
+    for (arguments, option, range) in [
+        (vec!["analytic", "--vehicle", "husky", "--cases"], "--cases", "1..=1000000"),
+        (vec!["split", text(&husky), "--by", "depth", "--parts"], "--parts", "2..=1000"),
+    ] {
+        for count in ["0", "18446744073709551615"] {
+            let output = wade(&[&arguments[..], &[count, "--out", text(&out)]].concat());
+            let error = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(2), "{error}");
+            assert!(error.contains(option) && error.contains(range), "{error}");
+            assert!(!out.exists(), "nothing is written");
+        }
+    }
 }
 
 #[test]

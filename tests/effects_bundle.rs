@@ -5,9 +5,9 @@ mod common;
 
 use std::path::Path;
 
-use common::{copy_of_vehicles, copy_with_every_effect, effect, effects_file, every_effect};
+use common::{copy_folder, copy_of_vehicles, copy_with_every_effect, effect, effects_file, every_effect};
 use sha2::{Digest, Sha256};
-use wade::bundle;
+use wade::bundle::{self, Bundle};
 use wade::effects::{Effect, EffectsFile};
 use wade::model::kernel::Isa;
 
@@ -61,6 +61,45 @@ fn every_version_can_be_taken_back_and_put_back_as_it_was() {
         ["husky", "warthog"],
         "versions are no vehicles"
     );
+}
+
+#[test]
+fn no_kept_version_and_no_folder_of_others_is_lost() {
+    let copy = copy_of_vehicles();
+    let husky = copy.path().join("husky");
+    let (first, original) = (version(&husky), bytes(&husky));
+    let kept = copy.path().join(format!("husky.versions/{first}/husky"));
+    copy_folder(&copy.path().join("warthog"), &kept);
+    let before = bytes(&kept);
+    let error = bundle::apply(&husky, every_effect("husky")).expect_err("another is kept there").to_string();
+    assert!(error.contains(&format!("another version {first}")) && error.contains("versions"), "{error}");
+    assert_eq!((bytes(&husky), bytes(&kept)), (original, before));
+    assert!(!copy.path().join(".husky.new").exists(), "what was staged is gone");
+
+    std::fs::remove_dir_all(copy.path().join("husky.versions")).expect("removed");
+    copy_folder(&husky, &copy.path().join("husky.new"));
+    std::fs::write(copy.path().join("husky.new/mine"), b"mine").expect("written");
+    bundle::apply(&husky, every_effect("husky")).expect("applied");
+    assert!(copy.path().join("husky.new/mine").exists());
+    assert_eq!(bundle::names_in(copy.path()).expect("listed"), ["husky", "warthog"]);
+
+    std::fs::create_dir(copy.path().join(format!("husky.versions/{}", u32::MAX))).expect("a folder");
+    let error = bundle::apply(&husky, every_effect("husky")).expect_err("no number is left").to_string();
+    assert!(error.contains("4294967295"), "{error}");
+}
+
+#[test]
+fn a_hull_without_weights_follows_what_was_there_and_is_the_first_where_nothing_was() {
+    let copy = copy_of_vehicles();
+    let husky = copy.path().join("husky");
+    let (first, original) = (version(&husky), bytes(&husky));
+    let untrained = || Bundle { trained: None, ..bundle::read(&husky).expect("sound") };
+    let elsewhere = copy.path().join("elsewhere/husky");
+    std::fs::create_dir(copy.path().join("elsewhere")).expect("a folder");
+    assert_eq!(bundle::succeed(&elsewhere, untrained()).expect("written"), 1);
+    assert_eq!(bundle::succeed(&husky, untrained()).expect("written"), first + 1);
+    assert_eq!(bundle::roll_back(&husky, None).expect("kept"), first);
+    assert_eq!(bytes(&husky), original);
 }
 
 #[test]

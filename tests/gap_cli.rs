@@ -156,3 +156,34 @@ fn bad_input_is_refused_with_file_row_and_column_and_nothing_is_written() {
     let message = run("warthog");
     assert!(message.contains("column fz") && message.contains("same components"), "{message}");
 }
+
+#[test]
+fn repeats_that_leave_nothing_to_keep_back_are_refused() {
+    let (data, out) = (folder(5), TempDir::new().expect("a folder"));
+    let place = out.path().join("gap");
+    let manifest = data.path().join("trials.toml");
+    let text = std::fs::read_to_string(&manifest).expect("readable");
+    let repeats = r#"repeats = [["run00", "run01", "run02", "run03", "run04"]]"#;
+    std::fs::write(&manifest, format!("{text}{repeats}\n")).expect("written");
+    let (trials, place_name) = (data.path().to_str().expect("a name"), place.to_str().expect("a name"));
+    let arguments = ["gap", "--vehicle", "warthog", "--trials", trials, "--out", place_name];
+    let output = wade_on(&common::copy_of_vehicles(), &arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("cannot be kept back") && message.contains("raise held_out"), "{message}");
+    assert!(!place.exists());
+}
+
+#[test]
+fn a_benchmark_without_end_is_refused() {
+    let out = TempDir::new().expect("a folder");
+    let place = out.path().join("bench");
+    let name = place.to_str().expect("a name");
+    for cases in ["18446744073709551615", "10001"] {
+        let output = wade_on(&common::copy_of_vehicles(), &["gap", "bench", "--cases", cases, "--out", name]);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains("--cases") && message.contains("10000"), "{message}");
+        assert!(!place.exists());
+    }
+}

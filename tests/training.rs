@@ -329,6 +329,35 @@ fn the_configuration_is_toml_and_refuses_unknown_keys() {
     assert!(toml::from_str::<Config>("epoch = 3").is_err());
 }
 
+#[test]
+fn weights_that_reward_errors_and_counts_without_end_are_refused() {
+    for (text, expected) in [
+        ("[loss]\nnet_weight = -0.1", "`loss.net_weight` is -0.1, which is not 0 or more"),
+        ("[loss]\ndry_weight = nan", "`loss.dry_weight` is NaN, which is not 0 or more"),
+        ("[loss]\ndry_fraction = 2.0", "`loss.dry_fraction` is 2, which is not between 0 and 1"),
+        (
+            "[anchored.loss]\nmoment_weight = inf",
+            "`anchored.loss.moment_weight` is inf, which is not 0 or more",
+        ),
+        ("[anchored]\nbetween = 1000000000", "`anchored.between` is 1000000000, which is not at most 100000"),
+        ("[anchored]\noutside = 100001", "`anchored.outside` is 100001, which is not at most 100000"),
+        ("epochs = 4000000000", "`epochs` is 4000000000, which is not at most 10000000"),
+        ("batch = 1000000000000", "`batch` is 1000000000000, which is not at most 1000000"),
+        ("parts = 1000000000000", "`parts` is 1000000000000, which is not at most 10000"),
+        ("threads = 100000", "`threads` is 100000, which is not at most 1024"),
+        (
+            "[analytic]\ncases = 1000000000000",
+            "`analytic.cases` is 1000000000000, which is not at most 1000000",
+        ),
+    ] {
+        let config: Config = toml::from_str(text).unwrap();
+        assert_eq!(config.validate().unwrap_err().to_string(), expected);
+    }
+    for config in [Config::default(), Config::analytic(), Config::anchored()] {
+        config.validate().unwrap();
+    }
+}
+
 // the program
 
 fn wade(arguments: &[&str]) -> Command {

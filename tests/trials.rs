@@ -239,6 +239,7 @@ fn missing_and_doubled_columns_are_named() {
     assert!(missing.to_string().contains("column wz is missing; there are: t, vx"), "{missing}");
     let twice = read(MANIFEST, &[("run.csv", "t,vx,vx\n")]).expect_err("refused");
     assert!(matches!(twice.fault, Fault::DuplicateColumn { .. }), "{twice}");
+    assert!(twice.to_string().contains("column \"vx\" is there twice, as number 2 and 3"), "{twice}");
     let (half, message) = fault(&[("ax", &|_| 0.0)]);
     assert!(matches!(half, Fault::MissingColumn { column, .. } if column == "ay"), "{message}");
     let promised = format!("{MANIFEST}[measured]\ncolumns = [\"fz\"]\n");
@@ -313,4 +314,106 @@ fn a_manifest_with_unknown_names_or_numbers_is_refused() {
         let error = read(manifest, &[("run.csv", &run)]).expect_err("refused");
         assert!(error.to_string().contains("trials.toml") && error.to_string().contains(expected), "{error}");
     }
+}
+
+#[test]
+fn loads_that_cannot_be_are_named_with_row_and_column() {
+    for (column, value, unit) in
+        [("fx", 2e7, "N"), ("my", -2e8, "N m"), ("sim_fz", 1e300, "N"), ("sim_mx", f64::MAX, "N m")]
+    {
+        let (found, message) = fault(&[(column, &move |t| if t == 0.05 { value } else { 0.0 })]);
+        assert!(
+            matches!(&found, Fault::Implausible { row: 7, column: c, unit: u, .. } if (c.as_str(), *u) == (column, unit)),
+            "{message}"
+        );
+    }
+    let manifest = format!("{MANIFEST}[measured]\nother_forces = [\"drive_fx\"]\n");
+    let drive = |force: f64| read(&manifest, &[("run.csv", &table(&[("drive_fx", &move |_| force)], 200))]);
+    assert!(drive(9e6).is_ok());
+    let error = drive(-2e7).expect_err("refused");
+    assert!(
+        matches!(&error.fault, Fault::Implausible { row: 2, column, .. } if column == "drive_fx"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_clock_in_nanoseconds_is_refused_and_seconds_since_1970_are_not() {
+    let (found, message) = fault(&[("t", &|t| 1e9 * t + 1.7e18)]);
+    assert!(
+        matches!(&found, Fault::Implausible { row: 3, column, unit: "s", .. } if column == "t"),
+        "{message}"
+    );
+    trial(&[("t", &|t| t + 1.7e9)]);
+}
+
+#[test]
+fn numbers_of_the_manifest_beyond_any_measure_are_refused() {
+    let run = table(&[], 5);
+    let body = |center: &str, length: &str| {
+        format!(
+            "vehicle = \"w\"\n[body]\nlength = {length}\nwidth = 1.4\ndraft = 0.2\nmass = 280.0\n\
+             displaced_volume = 0.07\ncenter_of_mass = {center}"
+        )
+    };
+    for (manifest, expected) in [
+        ("vehicle = \"w\"\nfluid_density = 1e300".to_owned(), "must be between 1.1 and 3000 kg/m3"),
+        ("vehicle = \"w\"\nfluid_density = 1.0".to_owned(), "fluid_density = 1 must be between 1.1"),
+        ("vehicle = \"w\"\nmass = 1e20".to_owned(), "must be between 1e-6 and 1e8 kg"),
+        ("vehicle = \"w\"\nchannel_width = 1e9".to_owned(), "channel_width = 1000000000 must be between"),
+        ("vehicle = \"w\"\n[nominal_depth]\nrun = 200.0".to_owned(), "nominal_depth.run = 200 must be"),
+        ("vehicle = \"w\"\n[sensor_noise]\nfx = 1e9".to_owned(), "sensor_noise.fx = 1000000000 must be"),
+        (body("[nan, 0.0, 0.0]", "1.5"), "body.center_of_mass = NaN must be within 1000 m"),
+        (body("[0.0, 0.0, -inf]", "1.5"), "body.center_of_mass = -inf must be within 1000 m"),
+        (body("[0.0, 0.0, 0.0]", "1500.0"), "body.length = 1500 must be between 0.001 and 1000 m"),
+    ] {
+        let error = read(&manifest, &[("run.csv", &run)]).expect_err("refused").to_string();
+        assert!(error.contains("trials.toml") && error.contains(expected), "{error}");
+    }
+    // air, in which bodies fall
+    let air = read("vehicle = \"ball\"\nfluid_density = 1.204", &[("run.csv", &run)]).expect("sound");
+    assert_eq!(air.trials[0].density, [1.204; 5]);
+}
+
+#[test]
+fn repeats_twins_and_columns_that_say_nothing_are_the_fault_of_the_manifest() {
+    let run = table(&[], 5);
+    let files = [("a.csv", &run[..]), ("b.csv", &run[..]), ("c.csv", &run[..])];
+    for (measured, expected) in [
+        ("repeats = [[\"a\", \"a\"]]", "measured.repeats lists \"a\" twice"),
+        ("repeats = [[\"a\", \"b\"], [\"b\", \"c\"]]", "measured.repeats lists \"b\" twice"),
+        ("dry_twins = { a = \"a\" }", "makes \"a\" the dry twin of \"a\" and a trial in water"),
+        ("dry_twins = { a = \"b\", b = \"c\" }", "makes \"b\" the dry twin of \"a\" and a trial in water"),
+        ("columns = []", "measured.columns is empty"),
+    ] {
+        let error = read(&format!("{MANIFEST}[measured]\n{measured}\n"), &files).expect_err("refused");
+        let message = error.to_string();
+        assert!(message.contains("trials.toml") && message.contains(expected), "{message}");
+    }
+    // two trials may have one twin, and a list of one says nothing
+    let fine = "repeats = [[\"a\", \"b\"], [\"c\"]]\ndry_twins = { a = \"c\", b = \"c\" }";
+    read(&format!("{MANIFEST}[measured]\n{fine}\n"), &files).expect("sound");
+    // what is inferred has no column
+    let inferred = "columns = []\nmethod = \"inverse_dynamics\"";
+    read(&format!("{MANIFEST}[measured]\n{inferred}\n"), &files).expect("sound");
+}
+
+#[test]
+fn a_sample_that_stands_alone_is_remarked_and_an_impact_is_not() {
+    let remarks = |force: &dyn Fn(f64) -> f64| -> Vec<String> {
+        let text = table(&[("fx", force)], 200);
+        let trials = read(MANIFEST, &[("run.csv", &text)]).expect("sound");
+        trials.remarks().iter().map(ToString::to_string).collect()
+    };
+    let drag = |t: f64| -20.0 + (97.0 * t).sin();
+    let alone = remarks(&|t| if t == 0.05 { 1e4 } else { drag(t) });
+    assert!(
+        matches!(&alone[..], [one] if one.starts_with("run: row 7, column fx: 10000 stands alone")),
+        "{alone:?}"
+    );
+    let nothing: [String; 0] = [];
+    let slam = |t: f64| drag(t) + 1e4 * (-((t - 1.0) / 0.02).powi(2)).exp();
+    assert_eq!(remarks(&slam), nothing);
+    // most of it the same: no noise to judge by
+    assert_eq!(remarks(&|t| if t == 0.05 { 1e4 } else { 0.0 }), nothing);
 }

@@ -581,6 +581,15 @@ fn settings_that_make_no_sense_are_refused() {
         ("[thresholds]\ndrag_r2 = 1.5", "thresholds.drag_r2"),
         ("[groups]\nspeed_mps = nan", "groups.speed_mps"),
         ("[planar]\nsample = 3", "sample"),
+        ("[mocap]\nrate_hz = 1e12", "mocap.rate_hz = 1000000000000 must be between 1 and 10000 Hz"),
+        ("[mocap]\nrate_hz = nan", "mocap.rate_hz"),
+        (
+            "[mocap]\nwindow = 1000000000001",
+            "mocap.window = 1000000000001 must be odd and between 3 and 1001",
+        ),
+        ("[mocap]\nwindow = 8", "mocap.window"),
+        ("[mocap]\norder = 9", "mocap.order"),
+        ("[mocap]\nwindow = 51\norder = 11", "mocap.order"),
     ] {
         let found = toml::from_str::<Config>(text).map_err(|error| error.to_string());
         let message = match found {
@@ -589,4 +598,31 @@ fn settings_that_make_no_sense_are_refused() {
         };
         assert!(message.contains(expected), "{message}");
     }
+}
+
+#[test]
+fn a_recording_whose_clock_is_in_another_unit_is_named() {
+    let (vehicle, folder) = (warthog(), TempDir::new().expect("a folder"));
+    let recorded = folder.path().join("recordings");
+    generated::write(&recorded, &vehicle, 3).expect("written");
+    let sound = Recordings::read(&recorded).expect("sound");
+    let made = |recordings: &Recordings| {
+        let trials = folder.path().join("trials");
+        validate::trials_from_recordings(recordings, &vehicle, &MocapConfig::default(), &trials)
+    };
+    // nanoseconds since 1970, and milliseconds
+    for (factor, start) in [(1e9, 1.7e18), (1e3, 0.0)] {
+        let mut recordings = sound.clone();
+        let (name, recording) = recordings.recordings.iter_mut().next().expect("one");
+        let file = format!("{name}.csv");
+        recording.t.iter_mut().for_each(|t| *t = start + factor * *t);
+        let error = made(&recordings).expect_err("refused").to_string();
+        assert!(error.contains(&file) && error.contains("t must be in seconds"), "{error}");
+    }
+    // a long hole is none of a recording
+    let mut recordings = sound.clone();
+    let recording = recordings.recordings.values_mut().next().expect("one");
+    let middle = recording.t.len() / 2;
+    recording.t[middle..].iter_mut().for_each(|t| *t += 36_000.0);
+    made(&recordings).expect("made");
 }

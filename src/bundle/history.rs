@@ -7,8 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Bundle, BundleError, FILES, Fault, NETWORK_FILE, VEHICLE_FILE, VehicleFile, at, checksums, exchange,
-    read, read_bounded, stage, staging_of, tensors, write,
+    Bundle, BundleError, FILES, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, at, checksums,
+    exchange, read, read_bounded, stage, staging_of, tensors, write,
 };
 use crate::effects::EffectsFile;
 
@@ -64,13 +64,15 @@ pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleEr
     succeed(directory, Bundle { effects: Some(effects), ..bundle })
 }
 
-/// Puts a bundle in the place of the one that is there, as its next version, and keeps the latter if it could be served.
-/// Gives the new version.
+/// Puts a bundle in its place, as the next version of the one that is there, if any, and keeps the latter if it could be
+/// served. Gives the new version.
 ///
 /// The bundle changes in one step of the file system at the end; an error before it leaves everything as it was.
 pub fn succeed(directory: &Path, bundle: Bundle) -> Result<u32, BundleError> {
-    let before = version_in(directory)?;
-    let version = numbers(directory)?.last().copied().unwrap_or(0).max(before) + 1;
+    let before = if directory.exists() { version_in(directory)? } else { 0 };
+    let last = numbers(directory)?.last().copied().unwrap_or(0).max(before);
+    let version =
+        last.checked_add(1).ok_or(Fault::NoVersion { last }).map_err(at(&versions_of(directory)))?;
     let bundle = Bundle { version, ..bundle };
     if directory.join(NETWORK_FILE).exists() {
         put(&stage(directory, &bundle)?, directory, before)?;
@@ -117,17 +119,29 @@ fn version_in(directory: &Path) -> Result<u32, BundleError> {
     Ok(VehicleFile::parse(&read_bounded(&path)?, directory).map_err(at(&path))?.version)
 }
 
-/// Exchanges a staged bundle with the one in place, and moves the latter, of version `before`, to the others.
+/// Exchanges a staged bundle with the one in place, and moves the latter, of version `before`, to the others. An error
+/// leaves everything as it was.
 fn put(staged: &Path, directory: &Path, before: u32) -> Result<(), BundleError> {
     let kept = place_of(directory, before);
-    let folder = kept.parent().unwrap_or(&kept);
-    let prepare = || {
-        match fs::remove_dir_all(folder) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-            _ => fs::create_dir_all(folder)?,
+    let move_all = || {
+        if kept.exists() {
+            // a version that was put back has left its copy there
+            let sums = |folder: &Path| fs::read(folder.join(SUMS_FILE)).ok();
+            if sums(&kept) != sums(directory) {
+                return Err(Fault::KeptOther { version: before });
+            }
+            fs::remove_dir_all(&kept)?;
         }
+        fs::create_dir_all(kept.parent().unwrap_or(&kept))?;
         exchange(staged, directory)?;
-        fs::rename(staged, &kept)
+        fs::rename(staged, &kept).inspect_err(|_| {
+            // back, so that what was in place is there again
+            let _ = exchange(staged, directory);
+        })?;
+        Ok(())
     };
-    prepare().map_err(|error| at(&kept)(error.into()))
+    move_all().map_err(|fault| {
+        let _ = fs::remove_dir_all(staged);
+        at(&kept)(fault)
+    })
 }

@@ -37,7 +37,8 @@ use vehicle_file::VehicleFile;
 pub use history::{Kept, apply, kept, roll_back, succeed};
 
 /// The file that makes a folder a bundle.
-const VEHICLE_FILE: &str = "vehicle.toml";
+/// File by which a folder is known for a bundle.
+pub const VEHICLE_FILE: &str = "vehicle.toml";
 const HULL_FILE: &str = "hull.stl";
 const PATCHES_FILE: &str = "patches.safetensors";
 const SDF_FILE: &str = "sdf.safetensors";
@@ -188,6 +189,18 @@ pub enum Fault {
         /// The version in it.
         found: u32,
     },
+    /// A version of the same number that is another.
+    #[error("is another version {version} than the one that would be kept there: move it away")]
+    KeptOther {
+        /// The number of both.
+        version: u32,
+    },
+    /// There is no number above that of a kept version.
+    #[error("version {last} is the last that can be numbered: move it away")]
+    NoVersion {
+        /// The highest number there is.
+        last: u32,
+    },
     /// Nothing to go back to.
     #[error("{}", .asked.map_or_else(|| "no version before this one was kept".to_owned(), |version| format!("version {version} was not kept")))]
     NotKept {
@@ -293,8 +306,10 @@ pub fn names_in(directory: &Path) -> std::io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(directory)? {
         let entry = entry?;
+        // what is being written, or was when its program was killed, has no vehicle's name
         if entry.path().join(VEHICLE_FILE).is_file()
             && let Ok(name) = entry.file_name().into_string()
+            && vehicle_file::check_name(&name, &entry.path()).is_ok()
         {
             names.push(name);
         }
@@ -396,7 +411,7 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
 }
 
 fn staging_of(directory: &Path, name: &str) -> PathBuf {
-    directory.with_file_name(format!("{name}.new"))
+    directory.with_file_name(format!(".{name}.new"))
 }
 
 fn place(staged: &Path, directory: &Path) -> std::io::Result<()> {

@@ -194,6 +194,18 @@ pub enum CollectError {
         /// Its own.
         now: String,
     },
+    /// A data set and summaries that are not of the same cases: what is added to one would go on without the other.
+    #[error(
+        "{sections} and {cases} do not belong together: {what}: restore what was there, or remove both and collect again from the work folder"
+    )]
+    Apart {
+        /// The data set.
+        sections: PathBuf,
+        /// The summaries.
+        cases: PathBuf,
+        /// What is missing, and where.
+        what: String,
+    },
     /// Nothing is done yet.
     #[error("{path}: no case is done yet: `wade campaign run` computes them")]
     Nothing {
@@ -261,6 +273,7 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
         let before = collected.cases.get(&case.id).map_or(0, |summary| summary.method);
         fresh.extend(work.outcome(&plan.campaign, case)?.filter(|outcome| outcome.method > before));
     }
+    let so_far = data_so_far(folder, &collected, &fresh)?;
     if fresh.is_empty() {
         return if collected.cases.is_empty() {
             Err(CollectError::Nothing { path: folder.to_owned() })
@@ -269,7 +282,7 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
         };
     }
     let path = folder.join(SECTIONS_FILE);
-    let mut dataset = if path.exists() { dataset::read(&path)? } else { empty(plan, vehicle, &fresh[0]) };
+    let mut dataset = so_far.unwrap_or_else(|| empty(plan, vehicle, &fresh[0]));
     check_alike(&path, plan, &mut dataset, &fresh)?;
     let replaced: BTreeSet<&str> = fresh.iter().map(|outcome| outcome.case.id.as_str()).collect();
     dataset.samples.retain(|sample| !replaced.contains(sample.case.as_str()));
@@ -282,6 +295,56 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
     dataset::write(&path, &dataset)?;
     collected.write(folder)?;
     Ok(fresh.len())
+}
+
+/// The data set so far, if there is one. Refuses one that does not hold the cases of the summaries.
+fn data_so_far(
+    folder: &Path,
+    collected: &Collected,
+    fresh: &[Outcome],
+) -> Result<Option<Dataset>, CollectError> {
+    let (sections, cases) = (folder.join(SECTIONS_FILE), folder.join(CASES_FILE));
+    let dataset = sections.exists().then(|| dataset::read(&sections));
+    let what = match &dataset {
+        Some(Err(DatasetError { fault, .. })) => Some(format!("{SECTIONS_FILE} cannot be read ({fault})")),
+        Some(Ok(dataset)) => difference(&dataset.samples, collected, fresh, cases.exists()),
+        None => lacking(&BTreeSet::new(), collected, fresh).map(|_| format!("{SECTIONS_FILE} is missing")),
+    };
+    match what {
+        Some(what) => Err(CollectError::Apart { sections, cases, what }),
+        None => Ok(dataset.transpose()?),
+    }
+}
+
+/// What a data set and the summaries do not have in common.
+fn difference(
+    samples: &[Sample],
+    collected: &Collected,
+    fresh: &[Outcome],
+    has_summaries: bool,
+) -> Option<String> {
+    let there: BTreeSet<&str> = samples.iter().map(|sample| sample.case.as_str()).collect();
+    if let Some(id) = lacking(&there, collected, fresh) {
+        return Some(format!("{SECTIONS_FILE} has no section of case `{id}`"));
+    }
+    let is_known = |id: &str| collected.cases.contains_key(id) || is_fresh(fresh, id);
+    let unknown = there.into_iter().find(|&id| !is_known(id))?;
+    Some(match has_summaries {
+        true => format!("{CASES_FILE} has no row for case `{unknown}`"),
+        false => format!("{CASES_FILE} is missing"),
+    })
+}
+
+/// A case that the summaries hold and the data set does not.
+fn lacking<'a>(there: &BTreeSet<&str>, collected: &'a Collected, fresh: &[Outcome]) -> Option<&'a str> {
+    let mut ids = collected.cases.keys().map(String::as_str);
+    ids.find(|&id| !there.contains(id) && !is_fresh(fresh, id))
+}
+
+/// True for a case that is about to be added: a collection that was cut off between the two files may have left the
+/// sections of such a one alone.
+fn is_fresh(fresh: &[Outcome], id: &str) -> bool {
+    fresh.iter().any(|outcome| outcome.case.id == id)
 }
 
 /// Refuses outcomes of another solver than the data set's, and settings that were changed since it was begun.

@@ -182,8 +182,11 @@ pub struct Campaign {
 }
 
 impl Campaign {
-    /// Refuses settings of the campaign file at `path` that nothing can be computed with.
-    pub fn check_settings(&self, path: &Path) -> Result<(), PlanError> {
+    /// Refuses a table or settings of the campaign file at `path` that nothing can be computed with.
+    fn check(&self, path: &Path) -> Result<(), PlanError> {
+        if !self.table.is_valid() {
+            return Err(PlanError::Table { path: path.to_owned() });
+        }
         match self.settings.fault() {
             Some((field, value, expected)) => {
                 Err(PlanError::Setting { path: path.to_owned(), field, value, expected })
@@ -253,6 +256,12 @@ pub enum PlanError {
         /// What it must be.
         expected: &'static str,
     },
+    /// Ranges that are none.
+    #[error("{path}: table: a range is upside down or not finite, or a speed or density is not positive")]
+    Table {
+        /// The file.
+        path: PathBuf,
+    },
     /// A speed that changes where it cannot.
     #[error("{path}: case `{id}`: {fault}")]
     Ramp {
@@ -317,28 +326,51 @@ impl Plan {
         if campaign.format != FORMAT {
             return Err(PlanError::Format { path, found: campaign.format });
         }
-        campaign.check_settings(&path)?;
+        campaign.check(&path)?;
         let path = folder.join(PLAN_FILE);
         let mut reader = csv::Reader::from_path(&path).map_err(|e| syntax(&path, &e))?;
         let cases: Vec<Case> =
             reader.deserialize().collect::<Result<_, _>>().map_err(|e| syntax(&path, &e))?;
-        let mut seen = BTreeSet::new();
-        for case in &cases {
-            if !seen.insert(&case.id) {
-                return Err(PlanError::Twice { path, id: case.id.clone() });
-            }
-            check(&path, case)?;
-            check_ramp(&path, case, &campaign.settings)?;
-        }
-        Ok(Self { campaign, cases })
+        let plan = Self { campaign, cases };
+        plan.check_cases(&path)?;
+        Ok(plan)
     }
 
-    /// Writes the campaign folder.
+    fn check_cases(&self, path: &Path) -> Result<(), PlanError> {
+        let mut seen = BTreeSet::new();
+        for case in &self.cases {
+            if !seen.insert(&case.id) {
+                return Err(PlanError::Twice { path: path.to_owned(), id: case.id.clone() });
+            }
+            check(path, case)?;
+            check_ramp(path, case, &self.campaign.settings)?;
+        }
+        Ok(())
+    }
+
+    /// Begins a campaign folder. Nothing is written that would be refused when it is read.
     pub fn write(&self, folder: &Path) -> Result<(), PlanError> {
-        std::fs::create_dir_all(folder).map_err(|source| io(folder, source))?;
         let path = folder.join(CAMPAIGN_FILE);
+        self.campaign.check(&path)?;
+        self.check_cases(&folder.join(PLAN_FILE))?;
+        self.put(folder)
+    }
+
+    fn put(&self, folder: &Path) -> Result<(), PlanError> {
+        let path = folder.join(CAMPAIGN_FILE);
+        std::fs::create_dir_all(folder).map_err(|source| io(folder, source))?;
         let text = toml::to_string(&self.campaign).map_err(|e| syntax(&path, &e))?;
         write_whole(&path, text.as_bytes()).map_err(|source| io(&path, source))?;
+        self.put_cases(folder)
+    }
+
+    /// Writes the cases of a folder whose settings stand as they are.
+    pub fn write_cases(&self, folder: &Path) -> Result<(), PlanError> {
+        self.check_cases(&folder.join(PLAN_FILE))?;
+        self.put_cases(folder)
+    }
+
+    fn put_cases(&self, folder: &Path) -> Result<(), PlanError> {
         let path = folder.join(PLAN_FILE);
         let mut writer = csv::Writer::from_writer(Vec::new());
         for case in &self.cases {
@@ -465,8 +497,10 @@ mod tests {
             let mut plan = empty();
             plan.extend(Set::Paper, 2, 1, 0.378).unwrap();
             change(&mut plan);
-            plan.write(folder.path()).unwrap();
-            Plan::read(folder.path()).unwrap_err().to_string()
+            let refusal = plan.write(folder.path()).unwrap_err().to_string();
+            plan.put(folder.path()).unwrap();
+            assert_eq!(Plan::read(folder.path()).unwrap_err().to_string(), refusal);
+            refusal
         };
         for id in ["", "outcomes", "../elsewhere", "/tmp/elsewhere", "a/b", "."] {
             let error = refused(&|plan| plan.cases[1].id = id.to_owned());
@@ -485,6 +519,10 @@ mod tests {
         assert!(error.contains("campaign.toml") && error.contains("settle_s"), "{error}");
         let error = refused(&|plan| plan.campaign.settings.windows = 0);
         assert!(error.contains("windows is 0"), "{error}");
+        let error = refused(&|plan| plan.campaign.table.speed_mps.min = -1.0);
+        assert!(error.contains("campaign.toml: table"), "{error}");
+        let error = refused(&|plan| plan.cases[0].speed_mps = 1e300);
+        assert!(error.contains("speed_mps"), "{error}");
     }
 
     #[test]
@@ -497,7 +535,7 @@ mod tests {
         plan.write(folder.path()).unwrap();
         assert_eq!(Plan::read(folder.path()).unwrap(), plan);
         plan.cases[3].density_kgpm3 = f64::NAN;
-        plan.write(folder.path()).unwrap();
+        plan.put(folder.path()).unwrap();
         let error = Plan::read(folder.path()).unwrap_err().to_string();
         assert!(error.contains("warthog-paper-0003") && error.contains("density_kgpm3"), "{error}");
     }

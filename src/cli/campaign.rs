@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use wade::bundle;
@@ -19,7 +20,7 @@ use wade::cfd::trials;
 use wade::dataset;
 use wade::geometry::hydrostatics::float_depth;
 use wade::train;
-use wade::trials::{MANIFEST_FILE, write};
+use wade::trials::write;
 
 use super::Vehicles;
 
@@ -136,7 +137,7 @@ struct PlanCommand {
     #[arg(long, value_enum)]
     set: SetName,
     /// Cases to add
-    #[arg(long, default_value_t = 175)]
+    #[arg(long, default_value_t = 175, value_parser = RangedU64ValueParser::<usize>::from(1..=100_000))]
     cases: usize,
     /// Seed of the hypercube
     #[arg(long, default_value_t = 1)]
@@ -163,18 +164,29 @@ enum Target {
 
 impl PlanCommand {
     fn run(self) -> Result<ExitCode> {
-        let bundle = bundle::read(&self.vehicles.bundle(&self.vehicle))?;
+        let bundle = bundle::read(&self.vehicles.existing(&self.vehicle)?)?;
         let exists = self.out.join(plan::CAMPAIGN_FILE).exists();
+        let of_a_campaign = [plan::PLAN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
+        if let Some(left) = of_a_campaign.into_iter().find(|name| !exists && self.out.join(name).exists()) {
+            bail!(
+                "{} holds {left} and no {}: bring that back, or name another folder",
+                self.out.display(),
+                plan::CAMPAIGN_FILE
+            );
+        }
         let mut plan = if exists { Plan::read(&self.out)? } else { self.begin(&bundle.vehicle)? };
         plan.check_vehicle(&self.out, &bundle.vehicle)?;
         if exists && (self.settings.is_some() || self.table.is_some()) {
             bail!("{} has its settings and its table already: edit them there", self.out.display());
         }
-        plan.campaign.check_settings(&self.out.join(plan::CAMPAIGN_FILE))?;
         let before = plan.cases.len();
         let float = float_depth(&bundle.vehicle.hull.mesh, bundle.vehicle.z0, bundle.vehicle.mass);
         plan.extend(self.set.into(), self.cases, self.seed, float)?;
-        plan.write(&self.out)?;
+        if exists {
+            plan.write_cases(&self.out)?
+        } else {
+            plan.write(&self.out)?
+        }
         println!(
             "{}: {} cases, {} of them new",
             self.out.display(),
@@ -197,9 +209,6 @@ impl PlanCommand {
                 )
             })?,
         };
-        if !table.is_valid() {
-            bail!("the table has a range upside down, or a speed or density that is not positive");
-        }
         let settings: Settings = self.settings.as_ref().map_or_else(|| Ok(Settings::default()), read_toml)?;
         let hull_sha256 = plan::hull_hash(vehicle);
         let campaign =
@@ -249,7 +258,7 @@ struct Run {
 impl Run {
     fn run(self) -> Result<ExitCode> {
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        let bundle = bundle::read(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         if let Some(unknown) = self.case.iter().find(|id| !plan.cases.iter().any(|c| c.id == **id)) {
             bail!("{} has no case `{unknown}`", self.campaign.display());
@@ -320,7 +329,7 @@ struct Collect {
 impl Collect {
     fn run(self) -> Result<ExitCode> {
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        let bundle = bundle::read(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: true };
         let new = collect::collect(&self.campaign, &plan, &bundle.vehicle, &work)?;
@@ -351,14 +360,15 @@ struct Trials {
 impl Trials {
     fn run(self) -> Result<ExitCode> {
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        let bundle = bundle::read(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         let dataset = dataset::read(&self.campaign.join(collect::SECTIONS_FILE))?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
         let (manifest, trials) = trials::trials(&plan, &dataset, &bundle.vehicle, &sets)?;
-        if self.out.join(MANIFEST_FILE).exists() {
+        let holds_any = std::fs::read_dir(&self.out).is_ok_and(|mut entries| entries.next().is_some());
+        if holds_any {
             bail!(
-                "{} holds trials already, which would be mixed with these: name another folder",
+                "{} holds files already, which would be mixed with these trials: name another folder",
                 self.out.display()
             );
         }
@@ -386,7 +396,7 @@ struct Report {
 impl Report {
     fn run(self) -> Result<ExitCode> {
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read(&self.vehicles.bundle(&plan.campaign.vehicle))?;
+        let bundle = bundle::read(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         let report = report::Report::of(&self.campaign, &plan, &bundle.vehicle)?;
         if self.json {

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs::Permissions;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -22,6 +23,9 @@ use wade::vehicle::Vehicle;
 
 use super::train::Rule;
 use super::{Vehicles, emit, usage_error};
+
+/// Most cases a vehicle: far beyond what a network of this size can learn, and well within memory.
+const MOST_CASES: u64 = 1_000_000;
 
 /// Import CFD results, augment, split and describe data sets
 ///
@@ -174,7 +178,7 @@ struct Analytic {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Cases a vehicle
-    #[arg(long, default_value_t = 175)]
+    #[arg(long, default_value_t = 175, value_parser = RangedU64ValueParser::<usize>::from(1..=MOST_CASES))]
     cases: usize,
     /// The data set
     #[arg(long, value_name = "FILE")]
@@ -194,7 +198,7 @@ struct SplitFile {
     #[arg(long)]
     share: Option<f64>,
     /// Number of parts, by folds, depth and heading [default: 5]
-    #[arg(long)]
+    #[arg(long, value_parser = RangedU64ValueParser::<usize>::from(2..=split::MOST_PARTS as u64))]
     parts: Option<usize>,
     /// Seed
     #[arg(long, default_value_t = 1)]
@@ -214,12 +218,14 @@ impl Dataset {
             Command::Import(command) => command.run()?,
             Command::Analytic(command) => command.run()?,
             Command::Augment { file, out, front_rear, vehicles } => {
+                keep_inputs(&out, [&file])?;
                 let data = dataset::read(&file)?;
                 let vehicles = read_vehicles(&vehicles, data.meta.vehicles.keys())?;
                 write(&out, &mirror::augment(&data, &vehicles, front_rear)?)?;
             }
             Command::Split(command) => command.run()?,
             Command::Merge { files, set, out } => {
+                keep_inputs(&out, &files)?;
                 let mut data = dataset::read(&files[0])?;
                 for file in &files[1..] {
                     let other = dataset::read(file)?;
@@ -297,6 +303,7 @@ impl SplitFile {
     /// All sides appear together: one side beside an older other one would be a leak.
     fn run(self) -> Result<()> {
         let by = self.by();
+        keep_inputs(&self.out, [&self.file])?;
         if std::fs::read_dir(&self.out).is_ok_and(|mut entries| entries.next().is_some()) {
             bail!("{} is not empty: a split does not mix with what is there", self.out.display());
         }
@@ -341,6 +348,19 @@ fn keys<T>(map: &BTreeMap<String, T>) -> String {
     map.keys().cloned().collect::<Vec<_>>().join(", ")
 }
 
+/// Refuses to write over a data set that is read, whatever the two are called.
+fn keep_inputs(out: &Path, inputs: impl IntoIterator<Item = impl AsRef<Path>>) -> Result<()> {
+    let place = |path: &Path| std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()));
+    let Some(target) = place(out) else { return Ok(()) };
+    for input in inputs {
+        let input = input.as_ref();
+        if place(input) == Some(target) {
+            bail!("{} would be written over {}, which is read: name another", out.display(), input.display());
+        }
+    }
+    Ok(())
+}
+
 /// Writes a data set and says what is in it.
 fn write(path: &Path, data: &dataset::Dataset) -> Result<()> {
     dataset::write(path, data)?;
@@ -354,6 +374,9 @@ fn write(path: &Path, data: &dataset::Dataset) -> Result<()> {
 }
 
 fn describe(file: &Path, html: Option<PathBuf>, as_json: bool, vehicles: &Vehicles) -> Result<()> {
+    if let Some(path) = &html {
+        keep_inputs(path, [file])?;
+    }
     let data = dataset::read(file)?;
     // kinds are known where the bundle is; a data set of somebody else's vehicle is described by its surfaces
     let known: BTreeMap<_, _> = data

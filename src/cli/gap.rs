@@ -16,7 +16,7 @@ use wade::trials::Trials;
 
 use super::gap_bench::GapBench;
 use super::running::Running;
-use super::{Vehicles, emit, usage_error};
+use super::{Vehicles, check_report_folder, emit, usage_error, write_whole};
 
 /// The form of `--config`, with what holds without one; besides `library`, which names all effects.
 const SETTINGS: &str =
@@ -181,18 +181,19 @@ impl Source {
             return Err(GapError::Vehicle { trials, asked }.into());
         }
         let bundle = self.vehicles.bundle(vehicle);
-        let mut report = if bundle.is_dir() {
+        let report = if bundle.is_dir() {
             let model = self.vehicles.model(vehicle)?;
             let body = Body::of_vehicle(model.vehicle());
-            gap::run(&trials, &body, &mut predictor(&model), &config)?
+            gap::run(&trials, &body, &mut predictor(&model), &config)
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
             if let Some(trial) = alone {
                 let (trial, vehicle) = (trial.name.clone(), vehicle.clone());
                 return Err(GapError::NoPrediction { trial, vehicle }.into());
             }
-            gap::run(&trials, &gap::body_of(&trials)?, &mut |_| Predicted::default(), &config)?
+            gap::run(&trials, &gap::body_of(&trials)?, &mut |_| Predicted::default(), &config)
         };
+        let mut report = report.with_context(|| folder.display().to_string())?;
         report.sources.model = if is_simulated(&trials) {
             "the sim_ columns of the trials".into()
         } else {
@@ -241,6 +242,7 @@ impl Source {
     }
 
     fn report(&self, out: &Path, apply: Option<&Apply>) -> Result<ExitCode> {
+        check_report_folder(out)?;
         let (report, trials) = self.run()?;
         let json = serde_json::to_string_pretty(&report)? + "\n";
         let page = report.page()?;
@@ -330,11 +332,7 @@ fn bundle_hash(bundle: &Path) -> Result<String> {
 fn write(path: &Path, text: Option<&str>) -> Result<()> {
     let context = || path.display().to_string();
     match text {
-        Some(text) => {
-            let staged = path.with_extension("partial");
-            std::fs::write(&staged, text).with_context(context)?;
-            std::fs::rename(&staged, path).with_context(context)
-        }
+        Some(text) => write_whole(path, text),
         None => match std::fs::remove_file(path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error).with_context(context),
             _ => Ok(()),

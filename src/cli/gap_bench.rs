@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use wade::gap::{self, Config, GapError, Predicted};
@@ -81,10 +82,15 @@ impl Import {
     }
 }
 
+/// A number of cases that a machine can hold.
+fn count() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(..=10_000)
+}
+
 #[derive(Debug, Args)]
 struct Bench {
     /// Cases of each family; 69 are all effects at all strengths once
-    #[arg(long, value_name = "N", default_value_t = 69)]
+    #[arg(long, value_name = "N", default_value_t = 69, value_parser = count())]
     cases: usize,
     /// Seed of all that is random
     #[arg(long, default_value_t = 1)]

@@ -20,7 +20,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
 use wade::config::Config;
 use wade::model::Model;
@@ -109,19 +109,70 @@ impl Vehicles {
         self.directory().join(name)
     }
 
+    /// The folder of a bundle that must be there.
+    fn existing(&self, name: &str) -> Result<PathBuf> {
+        let (directory, bundle) = (self.directory(), self.bundle(name));
+        if !bundle.is_dir() {
+            let names = bundle_names(&directory)?.join(", ");
+            let there = if names.is_empty() { "holds none".to_owned() } else { format!("has {names}") };
+            bail!("there is no vehicle `{name}`: {} {there} (--vehicles)", directory.display());
+        }
+        Ok(bundle)
+    }
+
     /// The model without the effects that were added to it.
     fn model(&self, name: &str) -> Result<Model> {
-        Ok(wade::bundle::load(&self.bundle(name), Isa::available()[0])?)
+        Ok(wade::bundle::load(&self.existing(name)?, Isa::available()[0])?)
     }
 
     /// What a server would serve.
     fn served(&self, name: &str) -> Result<ServedVehicle> {
-        Ok(wade::bundle::load_served(&self.bundle(name), Isa::available()[0])?)
+        Ok(wade::bundle::load_served(&self.existing(name)?, Isa::available()[0])?)
     }
+}
+
+/// Refuses a folder for reports that holds a bundle: a file of either would pass for one of the other.
+fn check_report_folder(folder: &Path) -> Result<()> {
+    if folder.join(wade::bundle::VEHICLE_FILE).exists() {
+        bail!("{} holds a vehicle bundle: name another folder for the report", folder.display());
+    }
+    Ok(())
+}
+
+/// A file that takes its place once it is whole. What is there and is no file, such as a device or a folder, stays.
+struct Staged {
+    file: tempfile::NamedTempFile,
+    place: PathBuf,
+}
+
+impl Staged {
+    fn new(place: &Path) -> Result<Self> {
+        // where a link leads, so that it stays one
+        let place = place.canonicalize().unwrap_or_else(|_| place.to_owned());
+        if place.exists() && !place.is_file() {
+            bail!("{} is no file: name one to write", place.display());
+        }
+        let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let everyone = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+        let file = tempfile::Builder::new().prefix(".wade-").permissions(everyone).tempfile_in(folder);
+        let file = file.with_context(|| format!("cannot write in {}", folder.display()))?;
+        Ok(Self { file, place })
+    }
+
+    fn finish(self) -> Result<()> {
+        self.file.persist(&self.place).with_context(|| self.place.display().to_string())?;
+        Ok(())
+    }
+}
+
+/// Writes a file as a whole or not at all.
+fn write_whole(place: &Path, text: &str) -> Result<()> {
+    let mut staged = Staged::new(place)?;
+    staged.file.write_all(text.as_bytes()).with_context(|| place.display().to_string())?;
+    staged.finish()
 }
 
 /// Names of the bundles in a folder, sorted.
 fn bundle_names(directory: &Path) -> Result<Vec<String>> {
-    use anyhow::Context;
     wade::bundle::names_in(directory).with_context(|| format!("cannot read {}", directory.display()))
 }

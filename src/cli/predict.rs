@@ -12,7 +12,7 @@ use wade::service::wire::State;
 use wade::service::{Evaluated, Evaluator};
 use wade::states::{Row, unknown_columns};
 
-use super::Vehicles;
+use super::{Staged, Vehicles};
 
 /// Forces for every row of a table of states
 ///
@@ -53,8 +53,8 @@ impl Predict {
             .with_context(|| states.to_string())?;
         let headers = reader.headers().with_context(|| states.to_string())?.clone();
         check_columns(&headers).with_context(|| states.to_string())?;
-        let staged = self.out.with_extension("partial");
-        let mut writer = csv::Writer::from_path(&staged).with_context(|| staged.display().to_string())?;
+        let mut staged = Staged::new(&self.out)?;
+        let mut writer = csv::Writer::from_writer(&mut staged.file);
         writer.write_record(headers.iter().map(str::to_owned).chain(self.names(vehicle.model())))?;
         let mut evaluator = Evaluator::default();
         let mut session = headers.iter().any(|header| header == "t").then(Session::default);
@@ -71,7 +71,8 @@ impl Predict {
             writer.write_record(record.iter().map(str::to_owned).chain(added))?;
         }
         writer.flush()?;
-        std::fs::rename(&staged, &self.out).with_context(|| self.out.display().to_string())?;
+        drop(writer);
+        staged.finish()?;
         Ok(ExitCode::SUCCESS)
     }
 

@@ -21,7 +21,7 @@ use wade::train::report::{DataFile, Record, VehicleRecord, sha256_of};
 use wade::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant, anchored};
 
 use super::running::Running;
-use super::{PROGRAM, Vehicles, bundle_names, usage_error};
+use super::{PROGRAM, Vehicles, bundle_names, check_report_folder, usage_error};
 
 /// Train one network for the vehicles of a data set and write it into their bundles
 ///
@@ -318,7 +318,11 @@ impl Train {
             usage_error(&format!("--part must be 1 to {}: the split has no other part", splits.len()));
         };
         // a long training is not to end in a folder that cannot be written
+        check_report_folder(&self.out)?;
         std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
+        for name in loaded.bundles.keys() {
+            bundle::check_place(&self.data.vehicles.bundle(name), name)?;
+        }
         let sides = Sides { split, by };
         eprintln!("held out: {}; {} samples to learn from", split.name, split.training.len());
         let checkpoint =

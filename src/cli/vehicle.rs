@@ -137,14 +137,15 @@ impl Vehicle {
             Command::Build { stl, spec, out, seal } => {
                 let text = std::fs::read_to_string(&spec).with_context(|| spec.display().to_string())?;
                 let bytes = std::fs::read(&stl).with_context(|| stl.display().to_string())?;
-                build(&text, &spec, &bytes, &out, seal)?;
+                build(&text, &bytes, &out, seal)
+                    .with_context(|| format!("{} with {}", stl.display(), spec.display()))?;
             }
             Command::Generate { vehicle, out } => {
                 let (shipped, text) = match vehicle {
                     Shipped::Husky => (shipped::husky()?, shipped::HUSKY_SPEC),
                     Shipped::Warthog => (shipped::warthog()?, shipped::WARTHOG_SPEC),
                 };
-                build(text, Path::new("the shipped vehicle file"), &shipped.stl(), &out, false)?;
+                build(text, &shipped.stl(), &out, false)?;
             }
             Command::Check { bundle, json } => return Ok(check(&bundle, json)),
             Command::List { vehicles, json } => {
@@ -156,7 +157,7 @@ impl Vehicle {
                 }
             }
             Command::Rollback { name, to, vehicles, running } => {
-                let version = bundle::roll_back(&vehicles.bundle(&name), to)?;
+                let version = bundle::roll_back(&vehicles.existing(&name)?, to)?;
                 println!("{name}: version {version} is in its place again");
                 running.reload(&name);
             }
@@ -165,7 +166,7 @@ impl Vehicle {
                 return Ok(if served { ExitCode::SUCCESS } else { ExitCode::FAILURE });
             }
             Command::Show { name, vehicles, json } => {
-                let directory = vehicles.bundle(&name);
+                let directory = vehicles.existing(&name)?;
                 show(&bundle::read(&directory)?, &bundle::kept(&directory)?, json)?;
             }
         }
@@ -173,13 +174,12 @@ impl Vehicle {
     }
 }
 
-fn build(spec_text: &str, spec_path: &Path, stl: &[u8], out: &Path, seal: bool) -> Result<()> {
-    let spec: VehicleSpec = toml::from_str(spec_text).with_context(|| spec_path.display().to_string())?;
+fn build(spec_text: &str, stl: &[u8], out: &Path, seal: bool) -> Result<()> {
+    let spec: VehicleSpec = toml::from_str(spec_text)?;
     bundle::check_place(out, &spec.name)?;
-    let version = match bundle::read(out) {
-        Ok(before) => before.version + 1,
-        Err(_) if !out.exists() => 1,
-        Err(error) => return Err(error).context("the bundle in place cannot be read; move it away first"),
+    let before = match out.exists() {
+        true => Some(bundle::read(out).context("the bundle in place cannot be read; move it away first")?),
+        false => None,
     };
     let (vehicle, sealing) = build_reporting(&spec, stl, seal)?;
     if let Some(sealing) = sealing {
@@ -194,11 +194,14 @@ fn build(spec_text: &str, spec_path: &Path, stl: &[u8], out: &Path, seal: bool) 
     })?;
     bar.finish_and_clear();
     let vehicle_translation = vehicle.translation;
-    let bundle =
-        Bundle { vehicle, version, trained: None, effects: None, distance, spec: Some(spec_text.to_owned()) };
-    bundle::write(out, &bundle)?;
+    let spec = Some(spec_text.to_owned());
+    let bundle = Bundle { vehicle, version: 0, trained: None, effects: None, distance, spec };
+    let version = bundle::succeed(out, bundle)?;
     let t = vehicle_translation;
     println!("{}: version {version}, no weights yet", out.display());
+    if let Some(Bundle { vehicle, version, trained: Some(_), .. }) = before {
+        println!("version {version} is kept: wade vehicle rollback {} puts it back", vehicle.name);
+    }
     println!("body frame = axes and scale of the STL, then moved by ({:.4}, {:.4}, {:.4}) m", t.x, t.y, t.z);
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::schema::LOADS;
 use super::{Dataset, Rest, Sample};
 use crate::condition::GroundContact;
 
@@ -71,6 +72,22 @@ pub enum Flaw {
         /// What it must be.
         expected: &'static str,
     },
+    /// A load that the file, which holds loads in single precision, cannot hold.
+    #[error(
+        "case `{case}`, section {section}, surface `{surface}`: {column} is {value:e}, beyond single precision; did the run diverge?"
+    )]
+    Single {
+        /// The case.
+        case: String,
+        /// The section.
+        section: u32,
+        /// The surface.
+        surface: String,
+        /// The column.
+        column: &'static str,
+        /// What it would hold.
+        value: f64,
+    },
     /// A sample of the other convention.
     #[error("case `{case}` has ground contact {found:?}, the data set {expected:?}: keep the two apart")]
     GroundContact {
@@ -116,9 +133,12 @@ impl Dataset {
         if found != expected {
             return Err(Flaw::GroundContact { case, found, expected });
         }
-        match bad_number(sample, surfaces) {
-            Some((quantity, value, expected)) => {
-                Err(Flaw::Number { case, section, quantity, value, expected })
+        if let Some((quantity, value, expected)) = bad_number(sample, surfaces) {
+            return Err(Flaw::Number { case, section, quantity, value, expected });
+        }
+        match too_large(sample, surfaces) {
+            Some((surface, column, value)) => {
+                Err(Flaw::Single { case, section, surface: surface.to_owned(), column, value })
             }
             None => Ok(()),
         }
@@ -155,6 +175,17 @@ fn bad_number(sample: &Sample, surfaces: &[String]) -> Option<(String, f64, &'st
         let parts = [Some(load.force), load.moment, load.viscous].into_iter().flatten().chain(rest);
         let value = parts.flat_map(<[f64; 3]>::from).find(|x| !x.is_finite())?;
         Some((format!("a load on `{surface}`"), value, "finite"))
+    })
+}
+
+/// The first load that is infinite in single precision: its surface, its column and its value.
+fn too_large<'a>(sample: &Sample, surfaces: &'a [String]) -> Option<(&'a str, &'static str, f64)> {
+    sample.surfaces.iter().zip(surfaces).find_map(|(load, surface)| {
+        LOADS.iter().find_map(|column| {
+            let vector = (column.of)(load)?;
+            let axis = (0..3).find(|&axis| !(vector[axis] as f32).is_finite())?;
+            Some((surface.as_str(), column.names[axis], vector[axis]))
+        })
     })
 }
 

@@ -2,9 +2,12 @@
 //! and DuckDB. The key-value meta data carry what no column can: `wade.format`, `wade.meta` (JSON), `wade.units`
 //! (JSON, by column) and `wade.frame`.
 
+use std::cell::Cell;
 use std::fs::{File, Permissions};
 use std::os::unix::fs::PermissionsExt;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 
 use parquet::errors::ParquetError;
 use parquet::file::reader::SerializedFileReader;
@@ -38,6 +41,12 @@ pub enum Fault {
     /// Cut off, damaged, or not Parquet at all.
     #[error("cannot be read as Parquet: {0}")]
     Parquet(#[from] ParquetError),
+    /// Damaged in a way that the reader of Parquet does not expect.
+    #[error("the file is damaged: {message}")]
+    Damaged {
+        /// What the reader stumbled over.
+        message: String,
+    },
     /// Parquet, but without our meta data.
     #[error(
         "the meta data have no key `{key}`: `wade dataset` writes it, a copy by another program may lose it"
@@ -189,9 +198,37 @@ pub fn write(path: &Path, dataset: &Dataset) -> Result<(), DatasetError> {
 }
 
 fn load(path: &Path) -> Result<Dataset, Fault> {
-    let dataset = decode(&SerializedFileReader::new(File::open(path)?)?)?;
+    let file = File::open(path)?;
+    let dataset = unless_it_panics(|| decode(&SerializedFileReader::new(file)?))?;
     dataset.check()?;
     Ok(dataset)
+}
+
+thread_local! {
+    /// True while this thread decodes a file: a panic is then told as an error, and not twice.
+    static DECODES: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Parquet's own reader panics over some files that are damaged, where it should return an error.
+fn unless_it_panics(decode: impl FnOnce() -> Result<Dataset, Fault>) -> Result<Dataset, Fault> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !DECODES.get() {
+                before(info);
+            }
+        }));
+    });
+    DECODES.set(true);
+    // nothing that the panic may have left half-done outlives it
+    let outcome = panic::catch_unwind(AssertUnwindSafe(decode));
+    DECODES.set(false);
+    outcome.unwrap_or_else(|payload| {
+        let literal = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        let message = literal.or_else(|| payload.downcast_ref::<String>().cloned());
+        Err(Fault::Damaged { message: message.unwrap_or_else(|| "its reader panicked".to_owned()) })
+    })
 }
 
 fn store(path: &Path, dataset: &Dataset) -> Result<(), Fault> {

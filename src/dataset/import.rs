@@ -90,6 +90,19 @@ pub enum ImportError {
         /// The vehicle.
         vehicle: String,
     },
+    /// The load of one patch for two surfaces, which would count it twice.
+    #[error(
+        "{}: surfaces `{}` and `{}` are both `{patch}` of the solver, whose load would count twice",
+        .path.display(), .surfaces[0], .surfaces[1]
+    )]
+    SharedPatch {
+        /// The description.
+        path: PathBuf,
+        /// Both surfaces.
+        surfaces: [String; 2],
+        /// The solver's name.
+        patch: String,
+    },
     /// A Fluent case whose description does not name the columns.
     #[error("{}: a Fluent case needs the table [report] with the names of the columns", .path.display())]
     NoReport {
@@ -103,6 +116,17 @@ pub enum ImportError {
         surface: String,
         /// What is wrong.
         fault: OpenFoamError,
+    },
+    /// Moments about an unknown point.
+    #[error(
+        "{}, surface `{surface}`: no header states the point that the moments are taken about: put the line `# CofR : (x y z)` above the names of the columns",
+        .path.display()
+    )]
+    MomentCenter {
+        /// The folder of the function object.
+        path: PathBuf,
+        /// The surface.
+        surface: String,
     },
     /// Report files.
     #[error(transparent)]
@@ -207,7 +231,10 @@ impl Import {
         if let Some(surface) = case.surfaces.keys().find(|surface| !surfaces.contains(surface)) {
             return Err(ImportError::Surface { path, surface: surface.clone(), vehicle: case.vehicle });
         }
-        Ok(case)
+        match shared_patch(&case, surfaces) {
+            Some((surfaces, patch)) => Err(ImportError::SharedPatch { path, surfaces, patch }),
+            None => Ok(case),
+        }
     }
 
     /// The description and the samples of one case, whose name is that of its folder.
@@ -292,6 +319,9 @@ impl Import {
         let output = folder.join("postProcessing").join(case.name_in_solver(surface));
         let history = openfoam::read(&output, self.cut_off)
             .map_err(|fault| ImportError::OpenFoam { surface: surface.to_owned(), fault })?;
+        if history.moment.is_some() && history.about.is_none() {
+            return Err(ImportError::MomentCenter { path: output, surface: surface.to_owned() });
+        }
         let means = |history: &History<3>| {
             let means = take.from(history).map_err(|fault| sections_error(folder, surface, fault))?;
             Ok::<_, ImportError>(means.into_iter().map(Vec3::from).collect::<Vec<_>>())
@@ -300,9 +330,19 @@ impl Import {
             force: means(&history.force)?,
             viscous: Some(means(&history.viscous)?),
             moment: history.moment.as_ref().map(means).transpose()?,
-            about: history.about,
+            about: history.about.unwrap_or_else(Vec3::zeros),
         })
     }
+}
+
+/// Two surfaces for which the solver has the same name, and that.
+fn shared_patch(case: &CaseFile, surfaces: &[String]) -> Option<([String; 2], String)> {
+    let mut fed: BTreeMap<&str, &String> = BTreeMap::new();
+    surfaces.iter().find_map(|surface| {
+        let patch = case.name_in_solver(surface);
+        let other = fed.insert(patch, surface)?;
+        Some(([other.clone(), surface.clone()], patch.to_owned()))
+    })
 }
 
 fn fluent(

@@ -3,7 +3,8 @@
 //! Three forms: vectors in parentheses (v1912), plain columns with the same names (v2212), and the Foundation's one
 //! `forces.dat` with the pressure and viscous parts of forces and moments and no totals. In all of them a run that was
 //! started again adds a folder named by its start time, and a file that is there already is not overwritten but joined by
-//! `force_<start time>.dat`.
+//! `force_<start time>.dat`. The header of all of them states the point that moments are taken about, `CofR`; a file
+//! that lost it is read, and says so.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,8 +22,8 @@ pub struct SurfaceHistory {
     pub viscous: History<3>,
     /// Moment about `about` [N m].
     pub moment: Option<History<3>>,
-    /// The point that the moment is taken about [m].
-    pub about: Vec3,
+    /// The point that the moment is taken about [m]; `None` where no header states it.
+    pub about: Option<Vec3>,
 }
 
 /// Why the output of a function object was refused.
@@ -109,7 +110,8 @@ pub fn read(folder: &Path, cut_off: CutOff) -> Result<SurfaceHistory, OpenFoamEr
         return Err(OpenFoamError::NoMoments { path: folder.to_owned(), found, expected });
     }
     Ok(SurfaceHistory {
-        about: moments.as_ref().map_or(forces.about, |moments| moments.about),
+        // one function object writes both, about one point
+        about: moments.as_ref().and_then(|moments| moments.about).or(forces.about),
         force: forces.total,
         viscous: forces.viscous,
         moment: moments.map(|moments| moments.total),
@@ -122,7 +124,7 @@ struct Loads {
     start: f64,
     total: History<3>,
     viscous: History<3>,
-    about: Vec3,
+    about: Option<Vec3>,
 }
 
 fn join(to: &mut Option<Loads>, later: Loads, since: f64) -> Result<(), OpenFoamError> {
@@ -163,7 +165,7 @@ fn parts(folder: &Path, start: f64, stem: &str, cut_off: CutOff) -> Result<Vec<P
 struct Part {
     path: PathBuf,
     start: f64,
-    about: Vec3,
+    about: Option<Vec3>,
     groups: Vec<String>,
     rows: Vec<(f64, Vec<f64>)>,
 }
@@ -174,7 +176,7 @@ impl Part {
             Ok(text) => text.replace(['(', ')'], " "),
             Err(fault) => return Err(OpenFoamError::Io { path, fault }),
         };
-        let mut part = Self { path, start, about: Vec3::zeros(), groups: Vec::new(), rows: Vec::new() };
+        let mut part = Self { path, start, about: None, groups: Vec::new(), rows: Vec::new() };
         let lines = Lines::new(&text, cut_off);
         for (number, line) in lines.iter() {
             if let Some(comment) = line.strip_prefix('#') {
@@ -198,7 +200,7 @@ impl Part {
         match words[..] {
             ["CofR", ":", x, y, z] => {
                 if let [Ok(x), Ok(y), Ok(z)] = [x, y, z].map(str::parse) {
-                    self.about = Vec3::new(x, y, z);
+                    self.about = Some(Vec3::new(x, y, z));
                 }
             }
             // one file for both, without totals

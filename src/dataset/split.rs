@@ -11,6 +11,9 @@ use serde::Serialize;
 use super::{Dataset, Sample};
 use crate::random::Random;
 
+/// Most parts of a range: each is a training of its own, and holds a case.
+pub const MOST_PARTS: usize = 1000;
+
 /// What is held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum By {
@@ -65,8 +68,8 @@ pub enum SplitError {
         /// The share.
         share: f64,
     },
-    /// Fewer than two parts.
-    #[error("{count} parts: with fewer than 2 one side would be empty")]
+    /// Fewer than two parts, or more than [`MOST_PARTS`] of a range.
+    #[error("{count} parts: with fewer than 2 one side would be empty, and {MOST_PARTS} are the most")]
     Parts {
         /// Number of parts.
         count: usize,
@@ -261,7 +264,7 @@ struct Quantity<'a> {
 
 /// Equal parts of the range of a quantity, each held out in turn. A case that has no value of it is never held out.
 fn ranges(dataset: &Dataset, bins: usize, quantity: &Quantity<'_>) -> Result<Vec<Split>, SplitError> {
-    if bins < 2 {
+    if !(2..=MOST_PARTS).contains(&bins) {
         return Err(SplitError::Parts { count: bins });
     }
     let mut part_of: HashMap<&str, usize> = HashMap::new();

@@ -68,10 +68,9 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Refuses numbers that make no sense.
+    /// Refuses numbers that make no sense, and counts that nobody could wait for.
     pub fn check(&self) -> Result<(), GapError> {
-        let positive =
-            [("bin_s", self.bin_s), ("block_s", self.block_s), ("significance", self.significance)];
+        let positive = [("bin_s", self.bin_s), ("block_s", self.block_s)];
         let shares = [
             ("held_out", self.held_out),
             ("share_of_remaining", self.share_of_remaining),
@@ -79,23 +78,57 @@ impl Config {
             ("relevance", self.relevance),
             ("coverage", self.coverage),
         ];
+        // more folds than the trials have blocks are told by the trials
         let counts = [
-            ("folds", self.folds, 2, "2 or more"),
-            ("least_trials", self.least_trials, 3, "3 or more"),
-            ("most_effects", self.most_effects, 1, "1 or more"),
-            ("bootstrap", self.bootstrap, 20, "20 or more"),
+            ("folds", self.folds, 2..=usize::MAX, "2 or more"),
+            ("least_trials", self.least_trials, 3..=usize::MAX, "3 or more"),
+            ("most_effects", self.most_effects, 1..=Effect::ALL.len(), "from 1 to the size of the library"),
+            ("placebos", self.placebos, 0..=10_000, "at most 10000"),
+            ("bootstrap", self.bootstrap, 20..=100_000, "from 20 to 100000"),
         ];
         if let Some((key, value)) =
             positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
         {
             return Err(GapError::Config { key, value, expected: "positive" });
         }
+        if !(self.significance > 0.0 && self.significance < 1.0) {
+            let (key, value) = ("significance", self.significance);
+            return Err(GapError::Config { key, value, expected: "above 0 and below 1" });
+        }
         if let Some((key, value)) = shares.into_iter().find(|(_, value)| !(0.0..1.0).contains(value)) {
             return Err(GapError::Config { key, value, expected: "from 0 to below 1" });
         }
-        match counts.into_iter().find(|(_, value, least, _)| value < least) {
+        match counts.into_iter().find(|(_, value, range, _)| !range.contains(value)) {
             Some((key, value, _, expected)) => Err(GapError::Config { key, value: value as f64, expected }),
             None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn numbers_that_make_no_sense_and_counts_without_end_are_refused() {
+        for (text, expected) in [
+            ("bootstrap = 1000000000", "bootstrap = 1000000000 must be from 20 to 100000"),
+            ("placebos = 1000000000000000000", "placebos = 1000000000000000000 must be at most 10000"),
+            ("most_effects = 24", "most_effects = 24 must be from 1 to the size of the library"),
+            ("significance = 1.0", "significance = 1 must be above 0 and below 1"),
+            ("significance = 0.0", "significance = 0 must be above 0 and below 1"),
+            ("significance = nan", "significance = NaN must be above 0 and below 1"),
+            ("held_out = 1.5", "held_out = 1.5 must be from 0 to below 1"),
+            ("coverage = nan", "coverage = NaN must be from 0 to below 1"),
+            ("bin_s = inf", "bin_s = inf must be positive"),
+        ] {
+            let config: Config = toml::from_str(text).unwrap();
+            assert_eq!(config.check().unwrap_err().to_string(), expected);
+        }
+        for text in ["", "bootstrap = 100000\nplacebos = 0", "most_effects = 23\nsignificance = 0.5"] {
+            assert_eq!(toml::from_str::<Config>(text).unwrap().check(), Ok(()));
         }
     }
 }

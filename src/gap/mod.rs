@@ -142,12 +142,24 @@ pub enum GapError {
         other: String,
     },
     /// Too few to keep some back.
-    #[error("{trials} trials are too few: the method keeps some back and needs at least {least}")]
+    #[error(
+        "{trials} trials are too few: the method keeps some back and needs at least {least}, dry twins not counted"
+    )]
     TooFewTrials {
         /// Trials found.
         trials: usize,
         /// Trials needed.
         least: usize,
+    },
+    /// A trial that is kept back and repeats one that is not: what was named would be tested on what it was named by.
+    #[error(
+        "{trial}.csv cannot be kept back, since it repeats {other}.csv, which takes part in naming (measured.repeats of trials.toml): record trials that repeat none, raise held_out so that a whole group is kept back, or list only trials of one and the same command"
+    )]
+    RepeatKeptBack {
+        /// Name of the trial.
+        trial: String,
+        /// Name of one that it repeats.
+        other: String,
     },
     /// Too short to cut into blocks.
     #[error(

@@ -10,7 +10,7 @@ use super::judge::Judge;
 use super::noise::{floors, row_noise, smoothing};
 use super::nonlinear::{refine, settle, through_sensors};
 use super::report::Report;
-use super::series::{one_clock, series};
+use super::series::{Series, one_clock, series};
 use super::split::hold_out;
 use super::statistics::median;
 use super::verdict::{Found, floor_loss};
@@ -54,6 +54,7 @@ pub fn run(
     }
     let (mut all, components) = series(trials, body, predict, config)?;
     let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
+    check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
     let floors = floors(&all, &naming, &trials.manifest, &components);
     let setting = Setting {
         body,
@@ -98,6 +99,24 @@ pub fn run(
     members = judge.confirmed(&members);
     let found = Found::of(&judge, &members, &library, &general, &gap_structure);
     Ok(compose(trials, &judge, found, held, &library))
+}
+
+/// Refuses trials kept back that repeat trials which are not.
+fn check_kept_back(
+    all: &[Series],
+    naming: &[usize],
+    held: &[usize],
+    repeats: &[Vec<String>],
+) -> Result<(), GapError> {
+    for group in repeats {
+        let of_group = |trials: &[usize]| {
+            trials.iter().map(|&trial| all[trial].name.clone()).find(|name| group.contains(name))
+        };
+        if let (Some(trial), Some(other)) = (of_group(held), of_group(naming)) {
+            return Err(GapError::RepeatKeptBack { trial, other });
+        }
+    }
+    Ok(())
 }
 
 /// Radius at which the wheels roll [m]: the median of speed over turning, where wheels turn the way the vehicle goes. Most

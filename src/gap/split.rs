@@ -62,7 +62,10 @@ pub(super) fn hold_out(all: &[Series], repeats: &[Vec<String>], config: &Config)
     let fits = |trial: usize| together(trial).len() <= wanted;
     let free: Vec<usize> =
         order.iter().filter(|(class, i)| sizes[*class] >= 3 && fits(*i)).map(|(_, i)| *i).collect();
-    let free = if free.len() > wanted { free } else { order.iter().map(|(_, i)| *i).collect() };
+    let any =
+        |keep: &dyn Fn(usize) -> bool| order.iter().map(|(_, i)| *i).filter(|&i| keep(i)).collect::<Vec<_>>();
+    let free = if free.len() > wanted { free } else { any(&fits) };
+    let free = if free.is_empty() { any(&|_| true) } else { free };
     let stride = free.len() as f64 / wanted as f64;
     let start = Random::new(config.seed ^ 0x4e1d).unit();
     let mut held: Vec<usize> = Vec::new();

@@ -146,6 +146,8 @@ impl Config {
             ("threads", self.threads as f64, 1.0, "positive"),
             ("learning_rate", self.learning_rate, f64::MIN_POSITIVE, "positive"),
             ("loss.epsilon", self.loss.epsilon, f64::MIN_POSITIVE, "positive"),
+            ("loss.net_weight", self.loss.net_weight, 0.0, "0 or more"),
+            ("loss.dry_weight", self.loss.dry_weight, 0.0, "0 or more"),
             ("least_learning_rate", self.least_learning_rate, 0.0, "0 or more"),
             ("weight_decay", self.weight_decay, 0.0, "0 or more"),
             ("anchored.loss.delta", self.anchored.loss.delta, f64::MIN_POSITIVE, "positive"),
@@ -158,6 +160,21 @@ impl Config {
         if let Some((key, value, _, expected)) = refused {
             return Err(TrainError::Config { key, value, expected });
         }
+        // beyond these a training neither ends nor fits into memory
+        let most = [
+            ("analytic.cases", self.analytic.cases as f64, 1e6, "at most 1000000"),
+            ("anchored.between", self.anchored.between as f64, 1e5, "at most 100000"),
+            ("anchored.outside", self.anchored.outside as f64, 1e5, "at most 100000"),
+            ("parts", self.parts as f64, 1e4, "at most 10000"),
+            ("batch", self.batch as f64, 1e6, "at most 1000000"),
+            ("held_out_batch", self.held_out_batch as f64, 1e6, "at most 1000000"),
+            ("epochs", f64::from(self.epochs), 1e7, "at most 10000000"),
+            ("patience", f64::from(self.patience), 1e7, "at most 10000000"),
+            ("threads", self.threads as f64, 1024.0, "at most 1024"),
+        ];
+        if let Some((key, value, _, expected)) = most.into_iter().find(|(_, value, most, _)| value > most) {
+            return Err(TrainError::Config { key, value, expected });
+        }
         // with nothing to learn, random weights would be written as trained ones
         if self.least_learning_rate >= self.learning_rate {
             let (key, value) = ("least_learning_rate", self.least_learning_rate);
@@ -167,6 +184,7 @@ impl Config {
             ("held_out_share", self.held_out_share),
             ("validation_share", self.validation_share),
             ("loss.alpha", self.loss.alpha),
+            ("loss.dry_fraction", f64::from(self.loss.dry_fraction)),
             ("anchored.loss.exponent", self.anchored.loss.exponent),
         ];
         match shares.into_iter().find(|(_, share)| !(0.0..=1.0).contains(share)) {

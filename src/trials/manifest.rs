@@ -1,6 +1,6 @@
 //! `trials.toml`: what holds for all trials of a folder.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -10,6 +10,20 @@ use super::{Fault, stem};
 
 /// Name of the file.
 pub const MANIFEST_FILE: &str = "trials.toml";
+
+/// Least and largest value of a quantity, and how that is said.
+type Bounds = (f64, f64, &'static str);
+
+/// From air, in which bodies fall, on: fresh water in g/cm3 lies below it.
+const DENSITY: Bounds = (1.1, 3000.0, "between 1.1 and 3000 kg/m3");
+const LENGTH: Bounds = (1e-3, 1e3, "between 0.001 and 1000 m");
+const DEPTH: Bounds = (1e-4, 20.0, "between 0.0001 and 20 m");
+const WIDTH: Bounds = (1e-2, 1e6, "between 0.01 and 1000000 m");
+const MASS: Bounds = (1e-6, 1e8, "between 1e-6 and 1e8 kg");
+const VOLUME: Bounds = (1e-9, 1e8, "between 1e-9 and 1e8 m3");
+/// Of the center of mass, from the middle of the body.
+const PLACE: Bounds = (-1e3, 1e3, "within 1000 m");
+const DEVIATION: Bounds = (0.0, 1e8, "between 0 and 1e8 N or N m");
 
 /// What was measured, how, and on what; only the vehicle must be stated. SI units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -131,6 +145,11 @@ impl Manifest {
             true => Ok(()),
             false => Err(Fault::UnknownComponent { key, name: name.clone() }),
         };
+        let empty = self.measured.columns.as_ref().is_some_and(Vec::is_empty);
+        // with inverse dynamics it says that all is to be inferred
+        if empty && self.measured.method != Some(Method::InverseDynamics) {
+            return Err(Fault::NoColumns);
+        }
         let columns = self.measured.columns.iter().flatten();
         columns.into_iter().try_for_each(|name| component("measured.columns", name))?;
         self.sensor_noise.keys().try_for_each(|name| component("sensor_noise", name))?;
@@ -145,7 +164,21 @@ impl Manifest {
         if *method == Some(Method::InverseDynamics) && !known_loads.is_empty() {
             return Err(Fault::KnownLoadsInferred);
         }
+        self.check_groups()?;
         self.check_numbers()
+    }
+
+    /// A trial is a repeat of those in one list, and of no other; a dry twin is another trial, and none in water.
+    fn check_groups(&self) -> Result<(), Fault> {
+        let Measured { repeats, dry_twins, .. } = &self.measured;
+        let mut listed = BTreeSet::new();
+        if let Some(name) = repeats.iter().flatten().find(|name| !listed.insert(*name)) {
+            return Err(Fault::RepeatTwice { name: name.clone() });
+        }
+        match dry_twins.iter().find(|(_, dry)| dry_twins.contains_key(*dry)) {
+            Some((wet, dry)) => Err(Fault::WetTwin { wet: wet.clone(), dry: dry.clone() }),
+            None => Ok(()),
+        }
     }
 
     /// Width of the channel in which a trial was run [m].
@@ -154,47 +187,61 @@ impl Manifest {
     }
 
     fn check_numbers(&self) -> Result<(), Fault> {
-        let stated = |key: &str, value: Option<f64>| value.map(|value| (key.to_owned(), value));
+        let stated = |key: &str, value: Option<f64>, bounds: Bounds| {
+            value.map(|value| (key.to_owned(), value, bounds))
+        };
         let of_body = self.body.iter().flat_map(|body| {
             let Body { length, width, draft, mass, displaced_volume, center_of_mass: _ } = *body;
             [
-                ("length", length),
-                ("width", width),
-                ("draft", draft),
-                ("mass", mass),
-                ("displaced_volume", displaced_volume),
+                ("length", length, LENGTH),
+                ("width", width, LENGTH),
+                ("draft", draft, LENGTH),
+                ("mass", mass, MASS),
+                ("displaced_volume", displaced_volume, VOLUME),
             ]
-            .map(|(key, value)| (format!("body.{key}"), value))
+            .map(|(key, value, bounds)| (format!("body.{key}"), value, bounds))
         });
-        let lengths =
-            self.nominal_depth.iter().map(|(name, value)| (format!("nominal_depth.{name}"), *value));
-        let positive = stated("fluid_density", self.fluid_density)
+        let depths =
+            self.nominal_depth.iter().map(|(name, value)| (format!("nominal_depth.{name}"), *value, DEPTH));
+        let positive = stated("fluid_density", self.fluid_density, DENSITY)
             .into_iter()
-            .chain(stated("channel_width", self.channel_width))
-            .chain(stated("mass", self.mass))
-            .chain(lengths)
+            .chain(stated("channel_width", self.channel_width, WIDTH))
+            .chain(stated("mass", self.mass, MASS))
+            .chain(depths)
             .chain(of_body);
-        for (key, value) in positive {
+        for (key, value, bounds) in positive {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(Fault::Number { key, value, expected: "positive" });
             }
+            within(key, value, bounds)?;
         }
-        if let Some((name, &value)) =
-            self.channel_widths.iter().find(|(_, width)| width.is_nan() || **width <= 0.0)
-        {
+        for (name, &value) in &self.channel_widths {
             let key = format!("channel_widths.{name}");
-            return Err(Fault::Number { key, value, expected: "positive, or inf for open water" });
+            if value.is_nan() || value <= 0.0 {
+                return Err(Fault::Number { key, value, expected: "positive, or inf for open water" });
+            }
+            if value.is_finite() {
+                within(key, value, WIDTH)?;
+            }
+        }
+        for value in self.body.iter().flat_map(|body| body.center_of_mass) {
+            within("body.center_of_mass".to_owned(), value, PLACE)?;
         }
         for (table, deviations) in
             [("sensor_noise", &self.sensor_noise), ("trial_offset", &self.trial_offset)]
         {
             for (name, &value) in deviations {
-                if !(value >= 0.0 && value.is_finite()) {
-                    let key = format!("{table}.{name}");
-                    return Err(Fault::Number { key, value, expected: "0 or positive" });
-                }
+                within(format!("{table}.{name}"), value, DEVIATION)?;
             }
         }
         Ok(())
+    }
+}
+
+/// Refuses what is no number or lies beyond its bounds.
+fn within(key: String, value: f64, (least, most, expected): Bounds) -> Result<(), Fault> {
+    match (least..=most).contains(&value) {
+        true => Ok(()),
+        false => Err(Fault::Number { key, value, expected }),
     }
 }

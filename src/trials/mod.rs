@@ -58,10 +58,16 @@ pub enum Fault {
         present: String,
     },
     /// Two columns of one name.
-    #[error("column {column} is there twice")]
+    #[error(
+        "column \"{column}\" is there twice, as number {first} and {second}: leave one out or name it otherwise"
+    )]
     DuplicateColumn {
         /// The column.
         column: String,
+        /// Its place, from 1.
+        first: usize,
+        /// The place of the other.
+        second: usize,
     },
     /// A cell without a finite number.
     #[error(
@@ -204,6 +210,29 @@ pub enum Fault {
         "measured.known_loads is what a load cell bears; with inverse_dynamics name the columns in other_forces"
     )]
     KnownLoadsInferred,
+    /// No component at all.
+    #[error(
+        "measured.columns is empty: list the measured components, or leave the key out for those that a trial has"
+    )]
+    NoColumns,
+    /// A trial that is listed twice among the repeats.
+    #[error(
+        "measured.repeats lists \"{name}\" twice: put all trials that repeat each other into one list, each once"
+    )]
+    RepeatTwice {
+        /// The trial.
+        name: String,
+    },
+    /// A dry twin that is itself a trial in water.
+    #[error(
+        "measured.dry_twins makes \"{dry}\" the dry twin of \"{wet}\" and a trial in water, too: name the run of the same command without water"
+    )]
+    WetTwin {
+        /// The trial in water.
+        wet: String,
+        /// Its twin.
+        dry: String,
+    },
     /// A column that is promised and that no trial has.
     #[error("{key} names \"{name}\", which is a column of no trial")]
     UnknownColumn {
@@ -249,6 +278,22 @@ pub enum Remark {
         row: u64,
         /// Its length [s].
         seconds: f64,
+    },
+    /// A measured sample that is far from all others, alone.
+    #[error(
+        "{trial}: row {row}, column {column}: {value} stands alone, {ratio:.0} standard deviations from the others: mend it or leave the row out if it is none of a measurement"
+    )]
+    Outlier {
+        /// The trial.
+        trial: String,
+        /// The row.
+        row: u64,
+        /// The column.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// Its distance from the median over the robust standard deviation.
+        ratio: f64,
     },
     /// Steps that look like another unit of time.
     #[error("{trial}: a step of {step} is long for seconds; is t in another unit?")]

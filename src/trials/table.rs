@@ -81,8 +81,9 @@ impl Table {
 fn check_names(headers: &csv::StringRecord, required: &[&str]) -> Result<(), Fault> {
     let names: Vec<&str> = headers.iter().collect();
     for (index, name) in names.iter().enumerate() {
-        if names[..index].contains(name) {
-            return Err(Fault::DuplicateColumn { column: (*name).into() });
+        if let Some(first) = names[..index].iter().position(|before| before == name) {
+            let (first, second) = (first + 1, index + 1);
+            return Err(Fault::DuplicateColumn { column: (*name).into(), first, second });
         }
     }
     match required.iter().find(|name| !names.contains(name)) {

@@ -27,6 +27,13 @@ const OPTIONAL: [&str; 13] =
 /// A median step above this is no second's fraction any more [s].
 const LONG_STEP: f64 = 1.0;
 
+/// A sample stands alone that lies further than this from the median, in robust standard deviations, ...
+const FAR: f64 = 1000.0;
+/// ... while those beside it lie nearer than this share of that: the water's loads last longer than a sample.
+const NEAR: f64 = 0.01;
+/// Fewest samples of which there is a median to speak of.
+const ENOUGH: usize = 20;
+
 /// A hole in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
@@ -185,7 +192,14 @@ impl Trial {
         let gaps = self.gaps.iter();
         let gaps = gaps.map(|gap| Remark::Gap { trial: trial(), row: gap.row, seconds: gap.seconds });
         let step = median_step(&self.t).filter(|&step| step > LONG_STEP);
-        unknown.chain(gaps).chain(step.map(|step| Remark::Clock { trial: trial(), step })).collect()
+        let outliers = WRENCH.into_iter().zip(&self.measured).filter_map(|(column, values)| {
+            let values = values.as_ref()?;
+            let (sample, ratio) = outlier(values)?;
+            let (row, value) = (*self.rows.get(sample)?, values[sample]);
+            Some(Remark::Outlier { trial: trial(), row, column, value, ratio })
+        });
+        let clock = step.map(|step| Remark::Clock { trial: trial(), step });
+        unknown.chain(gaps).chain(outliers).chain(clock).collect()
     }
 }
 
@@ -210,6 +224,32 @@ fn vectors(table: &Table, names: [&str; 3]) -> Option<Vec<Vec3>> {
     }
     let [x, y, z] = names.map(|name| table.column(name));
     Some(x.iter().zip(y).zip(z).map(|((x, y), z)| Vec3::new(*x, *y, *z)).collect())
+}
+
+/// The sample that lies farthest from the median of those that stand alone, and how many robust standard deviations; `None`
+/// also where most values are the same.
+fn outlier(values: &[f64]) -> Option<(usize, f64)> {
+    if values.len() < ENOUGH {
+        return None;
+    }
+    let center = median(values.to_vec());
+    let distances: Vec<f64> = values.iter().map(|value| (value - center).abs()).collect();
+    // of a normal distribution, from its median absolute deviation
+    let deviation = 1.4826 * median(distances.clone());
+    let is_alone = |at: usize| {
+        let beside = [at.checked_sub(1), Some(at + 1)];
+        let mut beside = beside.into_iter().flatten().filter_map(|at| distances.get(at));
+        beside.all(|distance| *distance < NEAR * distances[at])
+    };
+    let far = (0..values.len()).filter(|&at| deviation > 0.0 && distances[at] > FAR * deviation);
+    let farthest = far.filter(|&at| is_alone(at)).max_by(|&a, &b| distances[a].total_cmp(&distances[b]))?;
+    Some((farthest, distances[farthest] / deviation))
+}
+
+/// The middle one of some values, the upper of two.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn gaps(table: &Table) -> Vec<Gap> {

@@ -1,6 +1,8 @@
 //! Units that cannot be: values beyond any limit, and columns that contradict each other.
 
+use super::manifest::component_of;
 use super::table::Table;
+use super::trial::WRENCH;
 use super::{Fault, TrialError, at};
 use crate::frame::{GRAVITY, Vec3};
 
@@ -16,6 +18,11 @@ const LIMITS: [(&[&str], f64, f64, &str); 8] = [
     (&["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"], -1000.0, 1000.0, "rad/s"),
 ];
 
+/// No force, and no moment, measured, predicted or known, is larger.
+const LOADS: [(f64, &str); 2] = [(1e7, "N"), (1e8, "N m")];
+/// No trial lasts longer [s].
+const LONGEST: f64 = 1e6;
+
 /// An angle and the angular velocity that is nearly its rate in a body that is nearly level.
 const ANGLES: [(&str, &str); 3] = [("roll", "wx"), ("pitch", "wy"), ("yaw", "wz")];
 
@@ -28,17 +35,35 @@ const FACTOR_TOLERANCE: f64 = 0.3;
 
 /// Refuses values beyond the limits of their column.
 pub(super) fn check_limits(table: &Table) -> Result<(), TrialError> {
+    let start = table.column("t").first().copied().unwrap_or_default();
+    check_column(table, "t", (start, start + LONGEST, "s"))?;
     for (names, min, max, unit) in LIMITS {
         for &name in names {
-            let outside = table.column(name).iter().position(|value| !(min..=max).contains(value));
-            if let Some(row) = outside {
-                let (value, row) = (table.column(name)[row], table.rows[row]);
-                let column = name.to_owned();
-                return Err(at(&table.path)(Fault::Implausible { row, column, value, min, max, unit }));
-            }
+            check_column(table, name, (min, max, unit))?;
+        }
+    }
+    for name in table.columns.keys() {
+        let own = WRENCH.iter().position(|known| *known == name.as_str());
+        if let Some(component) = own.or_else(|| component_of(name)) {
+            let (max, unit) = LOADS[component / 3];
+            check_column(table, name, (-max, max, unit))?;
         }
     }
     Ok(())
+}
+
+fn check_column(
+    table: &Table,
+    name: &str,
+    (min, max, unit): (f64, f64, &'static str),
+) -> Result<(), TrialError> {
+    match table.column(name).iter().position(|value| !(min..=max).contains(value)) {
+        Some(row) => {
+            let (value, row, column) = (table.column(name)[row], table.rows[row], name.to_owned());
+            Err(at(&table.path)(Fault::Implausible { row, column, value, min, max, unit }))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Refuses angles in degrees and angular velocities in degrees a second, which show in each other.

@@ -126,7 +126,7 @@ fn foreign(place: &Path) -> std::io::Result<Option<String>> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         entries => entries?,
     };
-    let is_report = place.join(REPORT).is_file();
+    let is_report = is_report(place);
     for entry in entries {
         let name = entry?.file_name().to_string_lossy().into_owned();
         let known = is_report && [REPORT, PAGE, TRIALS, RECORDINGS].contains(&name.as_str());
@@ -135,4 +135,29 @@ fn foreign(place: &Path) -> std::io::Result<Option<String>> {
         }
     }
     Ok(None)
+}
+
+/// True where the report in a folder is one that `wade validate` wrote: others are of other commands, with files of their own.
+fn is_report(place: &Path) -> bool {
+    let text = fs::read_to_string(place.join(REPORT)).unwrap_or_default();
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    ["passed", "not_tested", "subject"].iter().all(|key| report.get(key).is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn the_report_of_another_command_and_what_lies_beside_it_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(REPORT), r#"{"verdict": "named", "effects": []}"#).unwrap();
+        fs::create_dir(folder.path().join(TRIALS)).unwrap();
+        assert!(matches!(OutFolder::stage(folder.path(), None), Err(FolderError::Foreign { .. })));
+        fs::write(folder.path().join(REPORT), r#"{"passed": true, "not_tested": [], "subject": {}}"#)
+            .unwrap();
+        assert!(OutFolder::stage(folder.path(), None).is_ok());
+    }
 }

@@ -14,6 +14,10 @@ use crate::signal::{
 use crate::trials::{MANIFEST_FILE, Manifest, csv_text};
 use crate::vehicle::Vehicle;
 
+/// A recording is resampled to at most this many samples for each of its own, and some more: with `t` in milliseconds it
+/// would be to a thousand.
+const MOST_SAMPLES: [f64; 2] = [100.0, 1000.0];
+
 /// Rates and filter; the defaults are the paper's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -162,6 +166,18 @@ fn add_piece(
     Ok(())
 }
 
+/// Refuses stamps that cannot be seconds: between its holes a recording may not become far more samples than it has.
+fn check_clock(recording: &Recording, rate_hz: f64) -> Result<(), RecordingFault> {
+    let t = &recording.t;
+    let span = pieces(t).into_iter().map(|piece| t[piece.end - 1] - t[piece.start]).sum::<f64>();
+    let (rows, samples) = (t.len(), span * rate_hz);
+    let [each, more] = MOST_SAMPLES;
+    match samples > each * rows as f64 + more {
+        true => Err(RecordingFault::Clock { rows, span, samples, rate_hz }),
+        false => Ok(()),
+    }
+}
+
 /// Processes every recording of a vehicle and writes the trials with their `trials.toml` to a folder, which is made.
 pub fn trials_from_recordings(
     recordings: &Recordings,
@@ -194,10 +210,10 @@ pub fn trials_from_recordings(
             vehicle,
             file.recording[name].water_level_m,
         );
-        let kinematics = process(recording, &rig, config).map_err(|source| {
-            let path = recordings.directory.join(format!("{name}.csv"));
-            at(&path)(RecordingFault::Filter { rate_hz: config.rate_hz, source })
-        })?;
+        let path = recordings.directory.join(format!("{name}.csv"));
+        check_clock(recording, config.rate_hz).map_err(at(&path))?;
+        let kinematics = process(recording, &rig, config)
+            .map_err(|source| at(&path)(RecordingFault::Filter { rate_hz: config.rate_hz, source }))?;
         write(&format!("{name}.csv"), &kinematics.to_csv())?;
     }
     write(MANIFEST_FILE, &manifest.to_toml())

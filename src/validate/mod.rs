@@ -40,6 +40,7 @@ pub use vertical::{F0AgainstDepth, SpeedBin, VerticalAtDepth, VerticalForce, at_
 use crate::condition::{Condition, GroundContact};
 use crate::forces::Forces;
 use crate::model::{Model, Workspace};
+use crate::signal::MAX_ORDER;
 use crate::trials::Trials;
 use crate::vehicle::Vehicle;
 
@@ -159,7 +160,6 @@ impl Config {
     pub fn check(&self) -> Result<(), ValidateError> {
         let Self { ground_contact: _, mocap, planar, pairs, groups, thresholds } = self;
         let positive = [
-            ("mocap.rate_hz", mocap.rate_hz),
             ("planar.depth_tolerance_m", planar.depth_tolerance_m),
             ("planar.vertical_speed_mps", planar.vertical_speed_mps),
             ("pairs.speed_tolerance_mps", pairs.speed_tolerance_mps),
@@ -184,6 +184,15 @@ impl Config {
         }
         if let Some(bad) = shares.into_iter().find(|(_, value)| !(*value <= 1.0 && value.is_finite())) {
             return fault(bad, "at most 1");
+        }
+        if !(1.0..=10_000.0).contains(&mocap.rate_hz) {
+            return fault(("mocap.rate_hz", mocap.rate_hz), "between 1 and 10000 Hz");
+        }
+        if !(3..=1001).contains(&mocap.window) || mocap.window.is_multiple_of(2) {
+            return fault(("mocap.window", mocap.window as f64), "odd and between 3 and 1001");
+        }
+        if mocap.order >= mocap.window || mocap.order > MAX_ORDER {
+            return fault(("mocap.order", mocap.order as f64), "below mocap.window and at most 10");
         }
         match thresholds.sections {
             least @ (0 | 1) => fault(("thresholds.sections", least as f64), "at least 2"),

@@ -152,6 +152,20 @@ pub enum RecordingFault {
         /// Its length.
         length: f64,
     },
+    /// Stamps that are no seconds.
+    #[error(
+        "column t: {rows} rows span {span} s without holes, which are {samples:.0} samples at {rate_hz} Hz: t must be in seconds, or rate_hz be lower"
+    )]
+    Clock {
+        /// Rows of the recording.
+        rows: usize,
+        /// What they span, were it seconds, less the holes [s].
+        span: f64,
+        /// Samples that this makes.
+        samples: f64,
+        /// Rate after resampling [Hz].
+        rate_hz: f64,
+    },
     /// The filter has no answer.
     #[error("at {rate_hz} Hz, between holes in time: {source}")]
     Filter {
