@@ -285,10 +285,8 @@ fn what_is_written_takes_the_place_of_nothing_else() {
         names.into_iter().all(|name| !name.to_string_lossy().starts_with(".wade")),
         "nothing half is left"
     );
-    refused(
-        &["predict", "--vehicle", "husky", "--states", &path("a.csv"), "--out", &path("warthog")],
-        "is no file",
-    );
+    let (states, folder) = (path("a.partial"), path("warthog"));
+    refused(&["predict", "--vehicle", "husky", "--states", &states, "--out", &folder], "is no file");
     refused(&["query", "--vehicle", "rover", "--depth", "0.1"], "husky, warthog");
 }
 

@@ -283,7 +283,7 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
     }
     let path = folder.join(SECTIONS_FILE);
     let mut dataset = so_far.unwrap_or_else(|| empty(plan, vehicle, &fresh[0]));
-    check_alike(&path, plan, &mut dataset, &fresh)?;
+    check_alike(&path, plan, &dataset, &fresh)?;
     let replaced: BTreeSet<&str> = fresh.iter().map(|outcome| outcome.case.id.as_str()).collect();
     dataset.samples.retain(|sample| !replaced.contains(sample.case.as_str()));
     for outcome in &fresh {
@@ -348,12 +348,7 @@ fn is_fresh(fresh: &[Outcome], id: &str) -> bool {
 }
 
 /// Refuses outcomes of another solver than the data set's, and settings that were changed since it was begun.
-fn check_alike(
-    path: &Path,
-    plan: &Plan,
-    dataset: &mut Dataset,
-    fresh: &[Outcome],
-) -> Result<(), CollectError> {
+fn check_alike(path: &Path, plan: &Plan, dataset: &Dataset, fresh: &[Outcome]) -> Result<(), CollectError> {
     let mixed = |what: &'static str, before: &str, id: &str, now: &str| CollectError::Mixed {
         path: path.to_owned(),
         what,
@@ -365,19 +360,26 @@ fn check_alike(
         let (before, id) = (&dataset.meta.provenance, &other.case.id);
         return Err(mixed("by", before, id, &other.solver));
     }
-    // settings always have a JSON form
-    let settings = serde_json::to_string(&plan.campaign.settings).unwrap_or_default();
-    let before = dataset.meta.notes.entry("settings".to_owned()).or_insert_with(|| settings.clone());
-    match *before == settings {
-        true => Ok(()),
-        false => Err(mixed("with the settings", before, &fresh[0].case.id, &settings)),
+    let settings = settings_note(plan);
+    match dataset.meta.notes.get("settings") {
+        Some(before) if *before != settings => {
+            Err(mixed("with the settings", before, &fresh[0].case.id, &settings))
+        }
+        // one that was begun before they were noted keeps its notes: what learnt from it names it by its hash
+        _ => Ok(()),
     }
+}
+
+fn settings_note(plan: &Plan) -> String {
+    // settings always have a JSON form
+    serde_json::to_string(&plan.campaign.settings).unwrap_or_default()
 }
 
 fn empty(plan: &Plan, vehicle: &Vehicle, first: &Outcome) -> Dataset {
     let names = vehicle.surfaces.iter().map(|surface| surface.name.clone()).collect();
     let notes = [
         ("hull_sha256", plan.campaign.hull_sha256.clone()),
+        ("settings", settings_note(plan)),
         (
             "loads",
             "pressure and viscous; moments about the body origin; `rest` on the mesh of the case".to_owned(),

@@ -32,11 +32,6 @@ const COLORS: [RGBColor; 6] = [BLUE, ORANGE, GREEN, PURPLE, RED, GRAY];
 const GRID: RGBColor = RGBColor(0xe3, 0xe6, 0xea);
 const LETTERS: (&str, u32) = ("sans-serif", 13);
 
-/// What lies beyond has no place on an axis: the search for its labels would not end.
-const LARGEST: f64 = 1e100;
-/// An axis is at least this share of its values wide, or rounding would hide the steps between its labels.
-const NARROWEST: f64 = 1e-9;
-
 /// Points of one color, with the name in the legend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
@@ -44,13 +39,6 @@ pub struct Series {
     pub name: String,
     /// The points.
     pub points: Vec<(f64, f64)>,
-}
-
-impl Series {
-    /// The points that have a place.
-    fn shown(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.points.iter().copied().filter(|p| has_place(p.0) && has_place(p.1))
-    }
 }
 
 /// Points over two linear axes.
@@ -61,7 +49,7 @@ pub fn scatter(x_title: &str, y_title: &str, series: &[Series]) -> Result<String
         let mut chart = chart(area, 62).build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;
         styled(&mut chart.configure_mesh(), [x_title, y_title]).x_labels(7).y_labels(7).draw()?;
         for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
-            chart.draw_series(s.shown().map(|p| Circle::new(p, 2, color.filled())))?;
+            chart.draw_series(s.points.iter().map(|&p| Circle::new(p, 2, color.filled())))?;
         }
         Ok(())
     })
@@ -69,7 +57,7 @@ pub fn scatter(x_title: &str, y_title: &str, series: &[Series]) -> Result<String
 
 /// Lines over a linear axis; the other is logarithmic and leaves out what is not positive.
 pub fn curves(x_title: &str, y_title: &str, series: &[Series]) -> Result<String, PlotError> {
-    let positive = |s: &Series| s.shown().filter(|p| p.1 > 0.0).collect::<Vec<_>>();
+    let positive = |s: &Series| s.points.iter().copied().filter(|p| p.1 > 0.0).collect::<Vec<_>>();
     let lines: Vec<Vec<(f64, f64)>> = series.iter().map(positive).collect();
     figure((720, 320), series, |area| {
         let x = extent(lines.iter().flatten().map(|p| p.0)).unwrap_or((0.0, 1.0));
@@ -88,7 +76,6 @@ pub fn curves(x_title: &str, y_title: &str, series: &[Series]) -> Result<String,
 
 /// Lines over linear axes, and a gray band from `-band` to `band`.
 pub fn traces(x_title: &str, y_title: &str, band: f64, series: &[Series]) -> Result<String, PlotError> {
-    let band = band.min(0.5 * LARGEST);
     figure((960, 250), series, |area| {
         let points = || series.iter().flat_map(|s| &s.points);
         let (start, end) = extent(points().map(|p| p.0)).unwrap_or((0.0, 1.0));
@@ -103,7 +90,7 @@ pub fn traces(x_title: &str, y_title: &str, band: f64, series: &[Series]) -> Res
             .y_labels(7)
             .draw()?;
         for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
-            chart.draw_series(LineSeries::new(s.shown(), color.stroke_width(2)))?;
+            chart.draw_series(LineSeries::new(s.points.iter().copied(), color.stroke_width(2)))?;
         }
         Ok(())
     })
@@ -119,7 +106,7 @@ pub fn parity(x_title: &str, y_title: &str, series: &[Series]) -> Result<String,
         let diagonal = [(range.start, range.start), (range.end, range.end)];
         chart.draw_series(DashedLineSeries::new(diagonal, 5, 4, BLACK.stroke_width(1)))?;
         for (s, color) in series.iter().zip(COLORS.iter().cycle()) {
-            chart.draw_series(s.shown().map(|p| Circle::new(p, 2, color.mix(0.6).filled())))?;
+            chart.draw_series(s.points.iter().map(|&p| Circle::new(p, 2, color.mix(0.6).filled())))?;
         }
         Ok(())
     })
@@ -171,13 +158,8 @@ fn legend(series: &[Series]) -> String {
     format!("<figcaption class=\"legend\">{keys}</figcaption>")
 }
 
-/// False for what is no number, too.
-fn has_place(value: f64) -> bool {
-    value.abs() <= LARGEST
-}
-
 fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    values.filter(|value| has_place(*value)).fold(None, |range, x| match range {
+    values.fold(None, |range, x| match range {
         Some((low, high)) => Some((x.min(low), x.max(high))),
         None => Some((x, x)),
     })
@@ -186,29 +168,6 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 /// With room around it, also where all values are the same or there is none.
 fn padded(extent: Option<(f64, f64)>) -> Range<f64> {
     let Some((low, high)) = extent else { return 0.0..1.0 };
-    let size = low.abs().max(high.abs());
-    let room = if high > low { (0.05 * (high - low)).max(NARROWEST * size) } else { 0.5 * size.max(1.0) };
+    let room = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
     low - room..high + room
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-
-    use super::*;
-
-    #[test]
-    fn a_figure_of_what_has_no_place_on_an_axis_ends() {
-        let values = [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, 1e-300, 1e17, 1e17 + 16.0];
-        let points = |x: f64| values.iter().flat_map(|y| [(x, *y), (*y, x)]).collect::<Vec<_>>();
-        for x in [0.0, f64::INFINITY, 1e99] {
-            let series = [Series { name: "all".into(), points: points(x) }];
-            for band in [1.0, f64::INFINITY, f64::NAN] {
-                assert!(traces("x", "y", band, &series).unwrap().contains("<svg"));
-            }
-            for draw in [scatter, curves, parity] {
-                assert!(draw("x", "y", &series).unwrap().contains("<svg"));
-            }
-        }
-    }
 }
