@@ -113,7 +113,8 @@ impl Vehicles {
     fn existing(&self, name: &str) -> Result<PathBuf> {
         let (directory, bundle) = (self.directory(), self.bundle(name));
         if !bundle.is_dir() {
-            let names = bundle_names(&directory)?.join(", ");
+            let names = bundle_names(&directory).with_context(|| format!("there is no vehicle `{name}`"))?;
+            let names = names.join(", ");
             let there = if names.is_empty() { "holds none".to_owned() } else { format!("has {names}") };
             bail!("there is no vehicle `{name}`: {} {there} (--vehicles)", directory.display());
         }
