@@ -37,7 +37,6 @@ use vehicle_file::VehicleFile;
 pub use history::{Kept, apply, kept, roll_back, succeed};
 
 /// The file that makes a folder a bundle.
-/// File by which a folder is known for a bundle.
 pub const VEHICLE_FILE: &str = "vehicle.toml";
 const HULL_FILE: &str = "hull.stl";
 const PATCHES_FILE: &str = "patches.safetensors";
