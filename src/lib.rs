@@ -6,7 +6,7 @@
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:
-//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`forces`], [`page`], [`random`], [`signal`]), the body ([`geometry`],
+//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`files`], [`forces`], [`page`], [`random`], [`signal`]), the body ([`geometry`],
 //! [`vehicle`]), its inputs to the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]),
 //! the network ([`model`]), with the effects added to it ([`served`]), its files ([`bundle`]), what serves it ([`engine`], [`metrics`]), what it is learnt from and
 //! held against ([`dataset`], [`trials`]), the doors ([`service`], [`client`], [`soak`]), where the data come from
@@ -16,6 +16,7 @@
 
 pub mod condition;
 pub mod domain;
+pub mod files;
 pub mod forces;
 pub mod frame;
 pub mod page;

@@ -1,11 +1,9 @@
 //! SHA256SUMS, in the form that `sha256sum --check` reads.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
-
-use sha2::{Digest, Sha256};
 
 use super::Fault;
+use crate::files::sha256;
 
 /// Checksums in hexadecimal by file name.
 pub type Sums = BTreeMap<String, String>;
@@ -21,18 +19,9 @@ pub fn parse(bytes: &[u8]) -> Result<Sums, Fault> {
 
 pub fn verify(sums: &Sums, name: &str, bytes: &[u8]) -> Result<(), Fault> {
     let expected = sums.get(name).ok_or(Fault::NoChecksum)?;
-    if *expected == hexadecimal(bytes) { Ok(()) } else { Err(Fault::Checksum) }
+    if *expected == sha256(bytes) { Ok(()) } else { Err(Fault::Checksum) }
 }
 
 pub fn render(files: &BTreeMap<&'static str, Vec<u8>>) -> String {
-    files.iter().map(|(name, bytes)| format!("{}  {name}\n", hexadecimal(bytes))).collect()
-}
-
-/// SHA-256 in hexadecimal.
-pub fn hexadecimal(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().fold(String::with_capacity(64), |mut hex, byte| {
-        // writing to a String cannot fail
-        let _ = write!(hex, "{byte:02x}");
-        hex
-    })
+    files.iter().map(|(name, bytes)| format!("{}  {name}\n", sha256(bytes))).collect()
 }

@@ -7,10 +7,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{
-    Bundle, BundleError, FILES, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, at, checksums,
-    exchange, read, read_bounded, stage, staging_of, tensors, write,
+    Bundle, BundleError, FILES, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, at, exchange,
+    read, read_bounded, stage, staging_of, tensors, write,
 };
 use crate::effects::EffectsFile;
+use crate::files::sha256;
 
 /// A version that was kept.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +61,7 @@ pub fn kept(directory: &Path) -> Result<Vec<Kept>, BundleError> {
 pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleError> {
     let bundle = read(directory)?;
     let Some((weights, _)) = &bundle.trained else { return Err(at(directory)(Fault::NoWeights)) };
-    effects.evidence.weights_sha256 = checksums::hexadecimal(&tensors::write_weights(weights));
+    effects.evidence.weights_sha256 = sha256(&tensors::write_weights(weights));
     succeed(directory, Bundle { effects: Some(effects), ..bundle })
 }
 

@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 
 use crate::domain::Domain;
 use crate::effects::{EffectsFile, EffectsFileError};
+use crate::files::sha256;
 use crate::geometry::distance::SignedDistanceGrid;
 use crate::geometry::stl::{StlError, read_stl, write_stl};
 use crate::geometry::submergence::{Samples, SamplesError};
@@ -291,7 +292,7 @@ impl Files {
         }
         self.parse(EFFECTS_FILE, |bytes| {
             let effects = EffectsFile::parse(bytes, vehicle)?;
-            let weights = self.files.get(NETWORK_FILE).map(|bytes| checksums::hexadecimal(bytes));
+            let weights = self.files.get(NETWORK_FILE).map(|bytes| sha256(bytes));
             match weights.is_some_and(|sum| sum == effects.evidence.weights_sha256) {
                 true => Ok(Some(effects)),
                 false => Err(EffectsFileError::OtherWeights),

@@ -5,13 +5,13 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
-use super::plan::{Bed, CAMPAIGN_FILE, Case, Plan, Set, write_whole};
+use super::plan::{Bed, CAMPAIGN_FILE, Case, Plan, Set};
 use super::run::{RunError, Work};
 use super::solve::{Load, Outcome, method};
 use crate::condition::GroundContact;
 use crate::dataset::{self, Dataset, DatasetError, Image, Meta, Rest, Sample, SurfaceLoad};
+use crate::files::{sha256, write_whole};
 use crate::frame::Vec3;
 use crate::vehicle::Vehicle;
 
@@ -146,7 +146,7 @@ fn net(loads: &[Load]) -> Vec3 {
 pub fn state_hash(case: &Case) -> String {
     // a case always has a JSON form; an empty one would match no other
     let text = serde_json::to_string(case).unwrap_or_default();
-    Sha256::digest(text.as_bytes()).iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+    sha256(text.as_bytes())[..32].to_owned()
 }
 
 /// Why a campaign could not be collected.

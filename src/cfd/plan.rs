@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Rotation3, UnitVector3};
@@ -11,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::case::{SECTIONS_BEFORE_S, Settings};
 use crate::condition::{Condition, GroundContact};
+use crate::files::{hexadecimal, write_whole};
 use crate::frame::{Vec3, up_from_roll_pitch};
 use crate::train::plan::Table;
 use crate::vehicle::Vehicle;
@@ -398,15 +398,7 @@ pub fn hull_hash(vehicle: &Vehicle) -> String {
     vehicle.contacts.iter().for_each(|patch| point(&(patch.center + Vec3::z() * patch.area)));
     vehicle.hull.face_surface.iter().for_each(|surface| sha.update(surface.to_le_bytes()));
     vehicle.surfaces.iter().for_each(|surface| sha.update(surface.name.as_bytes()));
-    sha.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Writes a file as a whole or not at all.
-pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = tempfile::NamedTempFile::new_in(path.parent().unwrap_or(Path::new(".")))?;
-    file.write_all(bytes)?;
-    file.persist(path)?;
-    Ok(())
+    hexadecimal(&sha.finalize())
 }
 
 fn io(path: &Path, source: std::io::Error) -> PlanError {

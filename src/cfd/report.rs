@@ -17,6 +17,7 @@ use crate::dataset::summary::Summary;
 use crate::domain::Range;
 use crate::frame::Vec3;
 use crate::page::{PlotError, preformatted};
+use crate::signal;
 use crate::validate::paper::{self, PaperDepth};
 use crate::vehicle::Vehicle;
 
@@ -386,14 +387,7 @@ fn suspicious(cases: &[(&Case, &CaseSummary)], vehicle: &Vehicle) -> Vec<Suspici
     found
 }
 
-/// The middle value, or the mean of the two in the middle; 0 of none.
+/// The median; 0 of nothing.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let half = values.len() / 2;
-    match values.get(half) {
-        Some(upper) if values.len().is_multiple_of(2) => 0.5 * (values[half - 1] + upper),
-        Some(middle) => *middle,
-        None => 0.0,
-    }
+    signal::median(&mut values.collect::<Vec<_>>()).unwrap_or(0.0)
 }

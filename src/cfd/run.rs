@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use sha2::{Digest, Sha256};
-
 use super::case::{self, Inputs, Settings};
 use super::claim::Claim;
 use super::openfoam::OpenFoam;
 use super::placement::Placement;
-use super::plan::{Campaign, Case, write_whole};
+use super::plan::{Campaign, Case};
 use super::solve::{Outcome, SolveError, method, solve};
+use crate::files::{sha256, write_whole};
 use crate::vehicle::Vehicle;
 
 /// Disk that one case takes while it runs, with room [bytes].
@@ -159,7 +158,7 @@ impl Work {
             // the solver itself replaces the fields of the start and the end of the run
             let path = folder.join(name);
             let is_ours = !name.starts_with("0/") && name != "system/controlDict";
-            if is_ours && std::fs::read(&path).is_ok_and(|bytes| hash(&bytes) != sum) {
+            if is_ours && std::fs::read(&path).is_ok_and(|bytes| sha256(&bytes) != sum) {
                 return Err(RunError::Edited { path });
             }
         }
@@ -284,7 +283,7 @@ impl Machine<'_> {
         case::write(&folder, &files).map_err(io)?;
         // last, so that it stands for whole files
         let seal: String =
-            files.iter().map(|(name, text)| format!("{}  {name}\n", hash(text.as_bytes()))).collect();
+            files.iter().map(|(name, text)| format!("{}  {name}\n", sha256(text.as_bytes()))).collect();
         std::fs::write(folder.join(SEAL), seal).map_err(io)?;
         solve(&folder, claim, self.campaign, &inputs, number)
     }
@@ -293,10 +292,6 @@ impl Machine<'_> {
 fn next<'a>(queue: &Mutex<VecDeque<&'a Case>>) -> Option<&'a Case> {
     // a poisoned queue is still a queue: the worker that panicked holds no half of it
     queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop_front()
-}
-
-fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Writes a file as a whole or not at all.

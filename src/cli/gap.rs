@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use serde_json::json;
-use sha2::{Digest, Sha256};
 use wade::bundle;
 use wade::effects::{Body, EffectsFile};
+use wade::files::{sha256, write_whole};
 use wade::forces::Forces;
 use wade::gap::{self, Config, GapError, NotApplicable, Predicted, Report, effects_file};
 use wade::model::{Model, Workspace};
@@ -16,7 +16,7 @@ use wade::trials::Trials;
 
 use super::gap_bench::GapBench;
 use super::running::Running;
-use super::{Vehicles, check_report_folder, emit, usage_error, write_whole};
+use super::{Vehicles, check_report_folder, emit, usage_error};
 
 /// The form of `--config`, with what holds without one; besides `library`, which names all effects.
 const SETTINGS: &str =
@@ -325,14 +325,14 @@ fn predictor(model: &Model) -> impl FnMut(&wade::condition::Condition) -> Predic
 fn bundle_hash(bundle: &Path) -> Result<String> {
     let path = bundle.join("SHA256SUMS");
     let sums = std::fs::read(&path).with_context(|| path.display().to_string())?;
-    Ok(Sha256::digest(&sums).iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(sha256(&sums))
 }
 
 /// Puts a file in its place as a whole, or takes it away.
 fn write(path: &Path, text: Option<&str>) -> Result<()> {
     let context = || path.display().to_string();
     match text {
-        Some(text) => write_whole(path, text),
+        Some(text) => write_whole(path, text.as_bytes()).with_context(context),
         None => match std::fs::remove_file(path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error).with_context(context),
             _ => Ok(()),

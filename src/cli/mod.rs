@@ -140,39 +140,6 @@ fn check_report_folder(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A file that takes its place once it is whole. What is there and is no file, such as a device or a folder, stays.
-struct Staged {
-    file: tempfile::NamedTempFile,
-    place: PathBuf,
-}
-
-impl Staged {
-    fn new(place: &Path) -> Result<Self> {
-        // where a link leads, so that it stays one
-        let place = place.canonicalize().unwrap_or_else(|_| place.to_owned());
-        if place.exists() && !place.is_file() {
-            bail!("{} is no file: name one to write", place.display());
-        }
-        let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let everyone = std::os::unix::fs::PermissionsExt::from_mode(0o666);
-        let file = tempfile::Builder::new().prefix(".wade-").permissions(everyone).tempfile_in(folder);
-        let file = file.with_context(|| format!("cannot write in {}", folder.display()))?;
-        Ok(Self { file, place })
-    }
-
-    fn finish(self) -> Result<()> {
-        self.file.persist(&self.place).with_context(|| self.place.display().to_string())?;
-        Ok(())
-    }
-}
-
-/// Writes a file as a whole or not at all.
-fn write_whole(place: &Path, text: &str) -> Result<()> {
-    let mut staged = Staged::new(place)?;
-    staged.file.write_all(text.as_bytes()).with_context(|| place.display().to_string())?;
-    staged.finish()
-}
-
 /// Names of the bundles in a folder, sorted.
 fn bundle_names(directory: &Path) -> Result<Vec<String>> {
     wade::bundle::names_in(directory).with_context(|| format!("cannot read {}", directory.display()))

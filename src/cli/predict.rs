@@ -6,13 +6,14 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use wade::effects::Session;
+use wade::files::StagedFile;
 use wade::frame::Vec3;
 use wade::model::Model;
 use wade::service::wire::State;
 use wade::service::{Evaluated, Evaluator};
 use wade::states::{Row, unknown_columns};
 
-use super::{Staged, Vehicles};
+use super::Vehicles;
 
 /// Forces for every row of a table of states
 ///
@@ -53,8 +54,9 @@ impl Predict {
             .with_context(|| states.to_string())?;
         let headers = reader.headers().with_context(|| states.to_string())?.clone();
         check_columns(&headers).with_context(|| states.to_string())?;
-        let mut staged = Staged::new(&self.out)?;
-        let mut writer = csv::Writer::from_writer(&mut staged.file);
+        let out = || self.out.display().to_string();
+        let mut staged = StagedFile::new(&self.out).with_context(out)?;
+        let mut writer = csv::Writer::from_writer(&mut staged);
         writer.write_record(headers.iter().map(str::to_owned).chain(self.names(vehicle.model())))?;
         let mut evaluator = Evaluator::default();
         let mut session = headers.iter().any(|header| header == "t").then(Session::default);
@@ -72,7 +74,7 @@ impl Predict {
         }
         writer.flush()?;
         drop(writer);
-        staged.finish()?;
+        staged.finish().with_context(out)?;
         Ok(ExitCode::SUCCESS)
     }
 

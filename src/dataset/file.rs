@@ -3,8 +3,7 @@
 //! (JSON, by column) and `wade.frame`.
 
 use std::cell::Cell;
-use std::fs::{File, Permissions};
-use std::os::unix::fs::PermissionsExt;
+use std::fs::File;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
@@ -15,6 +14,7 @@ use parquet::file::reader::SerializedFileReader;
 use super::decode::decode;
 use super::encode::encode;
 use super::{Dataset, Flaw, Image};
+use crate::files::StagedFile;
 
 /// Format of the files that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;
@@ -233,12 +233,7 @@ fn unless_it_panics(decode: impl FnOnce() -> Result<Dataset, Fault>) -> Result<D
 
 fn store(path: &Path, dataset: &Dataset) -> Result<(), Fault> {
     dataset.check()?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // readable as any file that a program writes, less the umask; the default of temporary files is for secrets
-    let mut staged =
-        tempfile::Builder::new().permissions(Permissions::from_mode(0o666)).tempfile_in(folder)?;
-    encode(staged.as_file_mut(), dataset)?;
-    staged.as_file().sync_all()?;
-    staged.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    let mut staged = StagedFile::new(path)?;
+    encode(&mut staged, dataset)?;
+    Ok(staged.finish()?)
 }

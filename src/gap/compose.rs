@@ -21,6 +21,7 @@ use super::verdict::{Found, STRUCTURE};
 use super::{Named, locate};
 use crate::condition::Condition;
 use crate::effects::{self, Effect, Kind, Memory, Part};
+use crate::files::hexadecimal;
 use crate::trials::{SIMULATED, Trials, WHEELS, WRENCH};
 
 fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
@@ -359,7 +360,7 @@ fn hash(trials: &Trials) -> String {
             add(name, vectors.len(), &mut vectors.iter().flat_map(|v| v.iter().copied()));
         }
     }
-    digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&digest.finalize())
 }
 
 /// Bins of the trials with the largest gap in their worst component: of those that took no part, then of the others.

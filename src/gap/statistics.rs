@@ -1,12 +1,10 @@
 //! Small numbers about numbers.
 
+use crate::signal;
+
 /// Median; 0 for none.
 pub(super) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    signal::median(values).unwrap_or(0.0)
 }
 
 /// Quantile by the nearest rank; 0 for none.

@@ -10,6 +10,7 @@ use super::generate::{Generated, inside};
 use super::hidden::Parameter;
 use super::{NoiseKind, Region};
 use crate::random::Random;
+use crate::signal;
 
 /// Two-sided 90 % of a normal distribution.
 const Z90: f64 = 1.645;
@@ -302,9 +303,7 @@ pub fn rows(judged: &[Judged]) -> Vec<Row> {
         |values| Some(values.iter().sum::<f64>() / values.len() as f64),
     ));
     let times: Vec<f64> = of(Family::Timing).map(|case| case.seconds).collect();
-    rows.push(bootstrap("65 trials of 1,000 samples [s]", Reach::AtMost(30.0), &times, |values| {
-        median(values)
-    }));
+    rows.push(bootstrap("65 trials of 1,000 samples [s]", Reach::AtMost(30.0), &times, median));
     rows
 }
 
@@ -318,14 +317,7 @@ fn relative_error(compared: &Compared) -> f64 {
 }
 
 fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    match sorted.len() {
-        0 => None,
-        odd if odd % 2 == 1 => Some(sorted[middle]),
-        _ => Some(0.5 * (sorted[middle - 1] + sorted[middle])),
-    }
+    signal::median(&mut values.to_vec())
 }
 
 /// A share with Wilson's interval.
@@ -417,9 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn medians_and_bootstraps_hold_their_values() {
-        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
+    fn bootstraps_hold_their_values() {
         let row = bootstrap("m", Reach::AtMost(0.5), &[0.4; 20], median);
         assert_eq!((row.value, row.interval, row.holds), (Some(0.4), Some([0.4, 0.4]), Some(true)));
         assert_eq!(bootstrap::<f64>("m", Reach::Open, &[], median).value, None);

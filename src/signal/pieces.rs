@@ -2,17 +2,14 @@
 
 use std::ops::Range;
 
+use super::median;
+
 /// A step of more than this many median steps is a hole.
 pub const GAP_STEPS: f64 = 5.0;
 
 /// The median step between stamps [s]; `None` below two stamps.
 pub fn median_step(times: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() {
-        return None;
-    }
-    let middle = steps.len() / 2;
-    Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+    median(&mut times.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>())
 }
 
 /// The runs of stamps between holes: nothing may be interpolated or differentiated across one.

@@ -22,6 +22,7 @@ use super::{
     slo::judge,
 };
 pub use super::{hlog::HlogError, record::Percentiles, slo::Outcome};
+use crate::files::write_whole;
 use crate::page::PlotError;
 
 /// What a soak found; serialises to `soak.json`.
@@ -273,14 +274,8 @@ pub fn write(dir: &Path, report: &Report) -> Result<(), WriteError> {
     let html = page::page(report)?;
     fs::create_dir_all(dir).map_err(|source| WriteError::Io { path: dir.to_owned(), source })?;
     for (name, bytes) in [("soak.json", json), ("soak.hlog", log), ("soak.html", html.into_bytes())] {
-        replace(dir, name, &bytes)?;
+        let path = dir.join(name);
+        write_whole(&path, &bytes).map_err(|source| WriteError::Io { path, source })?;
     }
     Ok(())
-}
-
-fn replace(dir: &Path, name: &str, bytes: &[u8]) -> Result<(), WriteError> {
-    let (path, temporary) = (dir.join(name), dir.join(format!(".{name}.tmp")));
-    fs::write(&temporary, bytes)
-        .and_then(|()| fs::rename(&temporary, &path))
-        .map_err(|source| WriteError::Io { path, source })
 }

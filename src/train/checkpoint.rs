@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
@@ -11,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::adam::{Adam, Plateau};
 use super::fit::{Epoch, State};
 use super::layers::{Layers, Sizes};
+use crate::files::write_whole;
 
 /// Why a checkpoint was refused. The message names the file.
 #[derive(Debug, thiserror::Error)]
@@ -124,12 +124,7 @@ fn write(path: &Path, state: &State, task: &str) -> Result<(), Fault> {
         })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
     let metadata = HashMap::from([(KEY.to_owned(), serde_json::to_string(&metadata)?)]);
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut staged = tempfile::NamedTempFile::new_in(folder)?;
-    staged.write_all(&safetensors::serialize(views, Some(metadata))?)?;
-    staged.as_file().sync_data()?;
-    staged.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    Ok(write_whole(path, &safetensors::serialize(views, Some(metadata))?)?)
 }
 
 fn read(path: &Path, sizes: Sizes, task: &str) -> Result<State, Fault> {

@@ -10,9 +10,9 @@ use sha2::{Digest, Sha256};
 
 use super::fit::Epoch;
 use super::score::Score;
-use super::task::hexadecimal;
 use super::{Config, Sides, Source, Trained, page};
 use crate::dataset::split::By;
+use crate::files::{hexadecimal, sha256, write_whole};
 use crate::model::network::Network;
 use crate::page::PlotError;
 
@@ -134,7 +134,7 @@ pub fn fingerprint(network: &Network) -> String {
 
 /// SHA-256 of a file.
 pub fn sha256_of(path: &Path) -> std::io::Result<String> {
-    Ok(hexadecimal(&Sha256::digest(fs::read(path)?)))
+    Ok(sha256(&fs::read(path)?))
 }
 
 impl Record {
@@ -190,13 +190,9 @@ impl Record {
         let page = page::page(self)?;
         for (name, text) in [(PAGE, page), (RECORD, record)] {
             let path = folder.join(name);
-            let staged = folder.join(format!(".{name}.new"));
-            let write = || {
-                fs::create_dir_all(folder)?;
-                fs::write(&staged, text)?;
-                fs::rename(&staged, &path)
-            };
-            write().map_err(|source| RecordError::Io { path: path.clone(), source })?;
+            fs::create_dir_all(folder)
+                .and_then(|()| write_whole(&path, text.as_bytes()))
+                .map_err(|source| RecordError::Io { path, source })?;
         }
         Ok(())
     }

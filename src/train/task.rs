@@ -9,6 +9,7 @@ use super::samples::Sample;
 use super::variant::{Objective, Rows, Variant};
 use super::{Config, TrainError};
 use crate::features::GLOBAL;
+use crate::files::hexadecimal;
 use crate::model::network::Scaling;
 
 /// A training that has not begun.
@@ -89,11 +90,6 @@ impl Task {
         hash.update(format!("{:?} {config:?} {:?}", self.sizes, self.objective));
         hexadecimal(&hash.finalize())
     }
-}
-
-/// As `sha256sum` prints it.
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Means and standard deviations over the training side.

@@ -10,7 +10,7 @@ use super::units::{check_accelerometer, check_angles, check_limits};
 use super::{Remark, TrialError, stem};
 use crate::condition::{Condition, FRESH_WATER, GroundContact};
 use crate::frame::{Vec3, up_from_roll_pitch};
-use crate::signal::{median_step, pieces};
+use crate::signal::{median, median_step, pieces};
 
 /// Components of a measured wrench.
 pub const WRENCH: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
@@ -232,10 +232,10 @@ fn outlier(values: &[f64]) -> Option<(usize, f64)> {
     if values.len() < ENOUGH {
         return None;
     }
-    let center = median(values.to_vec());
+    let center = median(&mut values.to_vec())?;
     let distances: Vec<f64> = values.iter().map(|value| (value - center).abs()).collect();
     // of a normal distribution, from its median absolute deviation
-    let deviation = 1.4826 * median(distances.clone());
+    let deviation = 1.4826 * median(&mut distances.clone())?;
     let is_alone = |at: usize| {
         let beside = [at.checked_sub(1), Some(at + 1)];
         let mut beside = beside.into_iter().flatten().filter_map(|at| distances.get(at));
@@ -244,12 +244,6 @@ fn outlier(values: &[f64]) -> Option<(usize, f64)> {
     let far = (0..values.len()).filter(|&at| deviation > 0.0 && distances[at] > FAR * deviation);
     let farthest = far.filter(|&at| is_alone(at)).max_by(|&a, &b| distances[a].total_cmp(&distances[b]))?;
     Some((farthest, distances[farthest] / deviation))
-}
-
-/// The middle one of some values, the upper of two.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn gaps(table: &Table) -> Vec<Gap> {

@@ -10,10 +10,10 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use super::Shared;
 use super::rejection::Rejection;
+use crate::files::sha256;
 use crate::served::ServedVehicle;
 use crate::service::grpc::single;
 use crate::service::wire::Refusal;
@@ -63,9 +63,12 @@ impl Cache {
             return Ok(written.clone());
         }
         let text = write(vehicle)?;
-        let etag = Sha256::digest(&text).iter().take(8).map(|byte| format!("{byte:02x}")).collect::<String>();
-        let written =
-            Written { vehicle: Arc::downgrade(vehicle), text: text.into(), etag: format!("\"{etag}\"") };
+        let digest = sha256(&text);
+        let written = Written {
+            vehicle: Arc::downgrade(vehicle),
+            text: text.into(),
+            etag: format!("\"{}\"", &digest[..16]),
+        };
         hulls.insert(name.to_owned(), written.clone());
         Ok(written)
     }

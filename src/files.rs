@@ -1,0 +1,120 @@
+//! Files that appear whole or not at all, and what names their content.
+
+use std::fs::Permissions;
+use std::io::{self, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+use tempfile::NamedTempFile;
+
+/// A file that is written beside its place and takes it once it is whole. Dropped before, nothing of it remains.
+#[derive(Debug)]
+pub struct StagedFile {
+    file: NamedTempFile,
+    place: PathBuf,
+}
+
+impl StagedFile {
+    /// Begins a file. Where a link stands it stays, and what it leads to is replaced.
+    ///
+    /// # Errors
+    ///
+    /// Where `place` is a folder or a device, or its folder cannot be written to.
+    pub fn new(place: &Path) -> io::Result<Self> {
+        let place = place.canonicalize().unwrap_or_else(|_| place.to_owned());
+        if place.exists() && !place.is_file() {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no file: name one to write"));
+        }
+        let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        // readable as any file that a program writes, less the umask; the default of temporary files is for secrets
+        let everyone = Permissions::from_mode(0o666);
+        let file = tempfile::Builder::new().prefix(".wade-").permissions(everyone).tempfile_in(folder)?;
+        Ok(Self { file, place })
+    }
+
+    /// Puts the file in its place, where it survives a power cut.
+    pub fn finish(self) -> io::Result<()> {
+        self.file.as_file().sync_all()?;
+        self.file.persist(&self.place)?;
+        Ok(())
+    }
+}
+
+impl Write for StagedFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Writes a file as a whole or not at all, as [`StagedFile`] does.
+pub fn write_whole(place: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = StagedFile::new(place)?;
+    file.write_all(bytes)?;
+    file.finish()
+}
+
+/// SHA-256 of some bytes, as `sha256sum` prints it.
+pub fn sha256(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+/// Two lower-case digits a byte.
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_not_finished_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("table.csv");
+        fs::write(&place, "old").unwrap();
+        let mut file = StagedFile::new(&place).unwrap();
+        file.write_all(b"half").unwrap();
+        drop(file);
+        assert_eq!(fs::read_to_string(&place).unwrap(), "old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        write_whole(&place, b"new").unwrap();
+        assert_eq!(fs::read_to_string(&place).unwrap(), "new");
+    }
+
+    #[test]
+    fn links_stay_and_folders_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (place, link) = (folder.path().join("table.csv"), folder.path().join("link.csv"));
+        fs::write(&place, "old").unwrap();
+        std::os::unix::fs::symlink(&place, &link).unwrap();
+        write_whole(&link, b"new").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(&place).unwrap(), "new");
+        let refused = write_whole(folder.path(), b"new").unwrap_err();
+        assert!(refused.to_string().contains("is no file"), "{refused}");
+    }
+
+    #[test]
+    fn a_new_file_is_for_everyone_whom_the_umask_lets_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let (whole, plain) = (folder.path().join("whole"), folder.path().join("plain"));
+        write_whole(&whole, b"text").unwrap();
+        fs::write(&plain, b"text").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&whole), mode(&plain));
+    }
+
+    #[test]
+    fn the_digest_is_the_standard_one() {
+        // FIPS 180-2, appendix B.1
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256(b"abc"), abc);
+    }
+}
