@@ -8,7 +8,10 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 use wade::cfd::case::Settings;
-use wade::cfd::plan::{Campaign, Case, FORMAT, Plan, Set, hull_hash};
+use wade::cfd::collect::{CASES_FILE, CaseSummary};
+use wade::cfd::openfoam::MeshKind;
+use wade::cfd::plan::{Bed, Campaign, Case, FORMAT, Plan, Set, hull_hash};
+use wade::cfd::solve::Outcome;
 use wade::condition::GroundContact;
 use wade::dataset::{self, Dataset, Image, Meta, Rest, Sample, SurfaceLoad};
 use wade::forces::Forces;
@@ -21,6 +24,8 @@ use wade::trials::{Method, Trials};
 const ADDED_KG: f64 = 80.0;
 /// Where its inertia acts [m].
 const POINT: [f64; 3] = [0.2, 0.0, -0.3];
+/// What a bed that moves does in the generated loads [N].
+const BED_N: f64 = -7.0;
 /// What the mesh displaces over what the hull does.
 const STAIRCASE: f64 = 1.04;
 
@@ -73,7 +78,8 @@ fn sample(model: &Model, case: &Case, section: u32, added: f64, flutter: f64) ->
         })
         .collect();
     let sign = if section.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let force = condition.acceleration * -added + Vec3::x() * (flutter * sign);
+    let bed = if case.bed == Bed::Driving { BED_N } else { 0.0 };
+    let force = condition.acceleration * -added + Vec3::x() * (flutter * sign + bed);
     surfaces[0].force += force;
     surfaces[0].moment = surfaces[0].moment.map(|moment| moment + Vec3::from(POINT).cross(&force));
     let start_s = 4.9 + 0.1 * f64::from(section);
@@ -108,27 +114,61 @@ fn campaign(folder: &Path, model: &Model, added: f64, flutter: f64) {
     dataset::write(&folder.join("sections.parquet"), &dataset).expect("written");
 }
 
-fn wade(campaign: &Path, sets: &[&str], out: &Path) -> Output {
+/// What is kept of steady cases beside their sections; parked ones may still have drifted.
+fn summaries(folder: &Path, model: &Model, parked_settled: bool) {
+    let mut writer = csv::Writer::from_path(folder.join(CASES_FILE)).expect("written");
+    for case in plan(model).cases.into_iter().filter(|case| !case.is_unsteady()) {
+        let outcome = Outcome {
+            settled: parked_settled || case.bed == Bed::Driving,
+            case,
+            solver: "none".into(),
+            method: 2,
+            settings: Settings::default(),
+            hull_sha256: hull_hash(model.vehicle()),
+            mesh_kind: MeshKind::Castellated,
+            cells: 1,
+            courant: 5.0,
+            attempts: 1,
+            steps: 1,
+            core_s: 1.0,
+            windows: 1,
+            drift: [0.0; 3],
+            mass_imbalance: 0.0,
+            rest: Vec::new(),
+            surfaces: Vec::new(),
+            sections: Vec::new(),
+        };
+        writer.serialize(CaseSummary::of(&outcome)).expect("written");
+    }
+}
+
+fn wade(campaign: &Path, arguments: &[&str], out: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
     command.args(["campaign", "trials"]).arg(campaign).env("WADE_VEHICLES", common::vehicles());
-    for set in sets {
-        command.args(["--set", set]);
-    }
-    command.arg("--out").arg(out).output().expect("wade runs")
+    command.args(arguments).arg("--out").arg(out).output().expect("wade runs")
+}
+
+fn wade_of(campaign: &Path, sets: &[&str], out: &Path) -> Output {
+    wade(campaign, &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>(), out)
 }
 
 fn trials(model: &Model, added: f64, flutter: f64, sets: &[&str]) -> Trials {
     let folder = TempDir::new().expect("a folder");
     let (source, out) = (folder.path().join("campaign"), folder.path().join("trials"));
     campaign(&source, model, added, flutter);
-    let output = wade(&source, sets, &out);
+    let output = wade_of(&source, sets, &out);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let manifest = out.join("trials.toml");
+    with_moments(&out)
+}
+
+/// The trials of a folder, whose manifest names the forces alone unless it is edited.
+fn with_moments(folder: &Path) -> Trials {
+    let manifest = folder.join("trials.toml");
     let text = std::fs::read_to_string(&manifest).expect("written");
     let forces = "columns = [\"fx\", \"fy\", \"fz\"]\n";
-    assert!(text.contains(forces), "forces alone unless it is edited: {text}");
+    assert!(text.contains(forces), "{text}");
     std::fs::write(&manifest, text.replace(forces, "")).expect("written");
-    Trials::read(&out).expect("sound trials")
+    Trials::read(folder).expect("sound trials")
 }
 
 #[test]
@@ -191,19 +231,51 @@ fn a_driving_vehicle_moves_over_ground_and_its_wheels_roll() {
 }
 
 #[test]
+fn a_parked_flow_predicts_its_driving_twin_and_the_gap_is_what_the_bed_does() {
+    let model = common::model("warthog");
+    let folder = TempDir::new().expect("a folder");
+    let (source, out) = (folder.path().join("campaign"), folder.path().join("trials"));
+    campaign(&source, &model, 0.0, 3.0);
+    let pairs = ["--set", "driving", "--pairs"];
+    let refused = |says: &str| {
+        let output = wade(&source, &pairs, &out);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && message.contains(says) && !out.exists(), "{message}");
+    };
+    refused("such that both have settled");
+    summaries(&source, &model, false);
+    refused("such that both have settled");
+    summaries(&source, &model, true);
+    let output = wade(&source, &pairs, &out);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let trials = with_moments(&out);
+    assert_eq!(trials.trials.len(), 1, "the driving case alone");
+    assert!(trials.manifest.generated.is_some_and(|how| how.contains("over a parked bed")));
+    let trial = &trials.trials[0];
+    let mean = |column: &Option<Vec<f64>>| {
+        let values = column.as_ref().expect("a column");
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    let gap = |c: usize| mean(&trial.measured[c]) - mean(&trial.simulated[c]);
+    assert!((gap(0) - BED_N).abs() < 0.01 && gap(1).abs() < 0.01 && gap(2).abs() < 0.01, "{}", gap(0));
+    let arm = Vec3::from(POINT) - model.vehicle().center_of_mass;
+    assert!((gap(4) - arm.z * BED_N).abs() < 0.01, "{}", gap(4));
+}
+
+#[test]
 fn what_is_not_there_or_would_be_mixed_is_refused() {
     let model = common::model("warthog");
     let folder = TempDir::new().expect("a folder");
     let (source, out) = (folder.path().join("campaign"), folder.path().join("trials"));
     campaign(&source, &model, 0.0, 0.0);
     let refused = |sets: &[&str], says: &str| {
-        let output = wade(&source, sets, &out);
+        let output = wade_of(&source, sets, &out);
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && message.contains(says), "{message}");
     };
     refused(&["wide"], "no case of wide");
     refused(&["paper", "wide"], "no case of wide");
     assert!(!out.exists());
-    assert!(wade(&source, &["paper"], &out).status.success());
+    assert!(wade_of(&source, &["paper"], &out).status.success());
     refused(&["paper"], "holds files already");
 }

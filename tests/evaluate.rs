@@ -274,6 +274,17 @@ fn the_program_judges_bundles_by_what_their_training_held_out() {
     let output = wade(&train);
     assert!(output.status.success(), "{}", stderr(&output));
 
+    // neither the data nor the record is written over by a page, and a place that is none is known before the work
+    let record = at("training").join("report.json");
+    for read in [&data, &record] {
+        let before = std::fs::read(read).expect("readable");
+        let output = eval(&data, &["--html", text(read)]);
+        assert!(!output.status.success() && stderr(&output).contains("which is read"), "{}", stderr(&output));
+        assert_eq!(std::fs::read(read).expect("readable"), before);
+    }
+    let nowhere = at("nowhere").join("eval.html");
+    let output = eval(&data, &["--html", text(&nowhere)]);
+    assert!(!output.status.success() && stderr(&output).contains("cannot write"), "{}", stderr(&output));
     let page = at("eval.html");
     let output = eval(&data, &["--ablations", "--json", "--html", text(&page)]);
     assert!(output.status.success(), "{}", stderr(&output));

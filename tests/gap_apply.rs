@@ -194,6 +194,88 @@ fn bad_trials_leave_the_bundle_as_it_was() {
     assert!(!place.path("gap").exists());
 }
 
+/// Changes a column of some trials, a value by its row from 0.
+fn edit(folder: &Path, trials: std::ops::Range<usize>, column: &str, of: impl Fn(usize, f64) -> f64) {
+    for trial in trials {
+        let path = folder.join(format!("run{trial:02}.csv"));
+        let text = std::fs::read_to_string(&path).expect("readable");
+        let mut lines = text.lines();
+        let header = lines.next().expect("a header");
+        let place = header.split(',').position(|name| name == column).expect("the column");
+        let mut edited = format!("{header}\n");
+        for (row, line) in lines.enumerate() {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            cells[place] = of(row, cells[place].parse().expect("a number")).to_string();
+            writeln!(edited, "{}", cells.join(",")).expect("a string");
+        }
+        std::fs::write(&path, edited).expect("written");
+    }
+}
+
+#[test]
+fn trials_that_cannot_be_what_they_are_said_to_be_leave_the_bundle_as_it_was() {
+    let place = Place::new();
+    let bundle = place.bundle();
+    let refused = |edit: &dyn Fn(&Path), expected: &str| {
+        let folder = place.path("trials");
+        let _ = std::fs::remove_dir_all(&folder);
+        write_trials(&folder, SURGE);
+        edit(&folder);
+        let output = place.gap("trials", &[]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains(expected), "{said}");
+        assert_eq!(place.bundle(), bundle);
+        assert!(!place.path("gap").exists());
+    };
+    refused(&|folder| edit(folder, 0..10, "fx", |_, fx| fx / 1000.0), "is it in kN? It must be in N");
+    refused(&|folder| edit(folder, 0..10, "fx", |_, _| -20.0), "column fx: -20 in every row of every trial");
+    let deep = |folder: &Path| edit(folder, 5..6, "depth", |_, depth| 20.0 * depth);
+    refused(&deep, "run05.csv, row 2, column depth: 6 m of water over the ground");
+    let copy = |folder: &Path| {
+        std::fs::copy(folder.join("run02.csv"), folder.join("run99.csv")).expect("copied");
+    };
+    refused(&copy, "run99.csv holds the same samples as run02.csv");
+    let of_another = |folder: &Path| {
+        let path = folder.join("run04.csv");
+        let text = std::fs::read_to_string(&path).expect("readable");
+        let vehicle = |row: usize| if row == 0 { "vehicle" } else { "husky" };
+        let lines = text.lines().enumerate().map(|(row, line)| format!("{line},{}\n", vehicle(row)));
+        std::fs::write(&path, lines.collect::<String>()).expect("written");
+    };
+    refused(&of_another, "run04.csv: row 2, column vehicle: \"husky\" is not the vehicle of trials.toml");
+    let empty = |folder: &Path| std::fs::write(folder.join("run10.csv"), "").expect("written");
+    refused(&empty, "run10.csv: the file is empty");
+    let twin = |folder: &Path| {
+        let path = folder.join("trials.toml");
+        let text = std::fs::read_to_string(&path).expect("readable");
+        let text = text + "[measured]\ndry_twins = { run03 = \"run04\" }\n";
+        std::fs::write(&path, text).expect("written");
+    };
+    refused(&twin, "run03.csv has a dry twin and a measured wrench");
+}
+
+#[test]
+fn one_sample_of_a_sensor_that_failed_changes_nothing() {
+    let place = Place::new();
+    write_trials(&place.path("trials"), SURGE);
+    edit(&place.path("trials"), 3..4, "fx", |row, fx| if row == 100 { 50_000.0 } else { fx });
+    let folder = place.path("trials");
+    let (folder, out) = (folder.to_string_lossy(), place.path("gap"));
+    let nobody = format!("unix:{}", place.path("nobody.sock").display());
+    let step = ["gap", "apply", "--vehicle", "warthog", "--trials", &folder, "--server", &nobody, "--out"];
+    let output = place.wade(&[&step[..], &[&out.to_string_lossy()]].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("run03: row 102, column fx: 50000 stands alone"), "{said}");
+    let query = place.query();
+    assert_eq!(query["effects"][0]["name"], "added_mass", "{query:#}");
+    // without --apply nothing is written into a bundle, and what goes with it has no meaning
+    let report = ["gap", "--vehicle", "warthog", "--trials", &folder, "--provisional", "--out"];
+    let output = place.wade(&[&report[..], &[&out.to_string_lossy()]].concat());
+    assert_eq!(output.status.code(), Some(2));
+}
+
 #[test]
 fn effects_of_other_trials_are_not_lost_unasked() {
     let place = Place::new();

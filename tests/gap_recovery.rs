@@ -269,7 +269,7 @@ fn run_with_doubts(mut trials: Trials) -> Report {
     let mut model = |condition: &Condition| {
         let [fx, fy, fz, mx, my, mz] = planted::simulate_at(condition.velocity, condition.depth);
         let wrench = Wrench { force: Vec3::new(fx, fy, fz), moment: Vec3::new(mx, my, mz) };
-        Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise) }
+        Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise), outside: false }
     };
     gap::run(&trials, &body, &mut model, &Config::default()).expect("runs")
 }
@@ -374,6 +374,17 @@ fn faults_of_sensors_are_named_as_such_and_never_applied() {
         let applied = gap::effects_file(&run(&trials), &trials, true);
         assert_eq!(applied, Err(gap::NotApplicable::NotPhysics), "{name}");
     }
+}
+
+#[test]
+fn what_makes_a_part_of_the_trials_worse_is_not_applied() {
+    let trials = with(&["added_mass"], 1.0, 11).0;
+    let mut report = run(&trials);
+    assert!(gap::effects_file(&report, &trials, false).is_ok(), "{}", report.summary);
+    let place = "depth > 0.2 m".to_owned();
+    report.gap.worse_regions.push(gap::Worse { place: place.clone(), before: 1.0, after: 2.0 });
+    let refused = gap::effects_file(&report, &trials, true);
+    assert_eq!(refused, Err(gap::NotApplicable::Worse { place, before: 1.0, after: 2.0 }));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers from the lowest to the highest.
 const LAYERS: [&[&str]; 8] = [
-    &["frame", "wrench", "condition", "domain", "forces", "page", "random", "signal"],
+    &["files", "frame", "wrench", "condition", "domain", "forces", "page", "random", "signal"],
     &["geometry", "vehicle"],
     &["features", "effects", "analytic", "anchor"],
     &["model", "served", "bundle"],

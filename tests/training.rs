@@ -343,7 +343,7 @@ fn weights_that_reward_errors_and_counts_without_end_are_refused() {
         ("[anchored]\noutside = 100001", "`anchored.outside` is 100001, which is not at most 100000"),
         ("epochs = 4000000000", "`epochs` is 4000000000, which is not at most 10000000"),
         ("batch = 1000000000000", "`batch` is 1000000000000, which is not at most 1000000"),
-        ("parts = 1000000000000", "`parts` is 1000000000000, which is not at most 10000"),
+        ("parts = 1000000000000", "`parts` is 1000000000000, which is not at most 1000"),
         ("threads = 100000", "`threads` is 100000, which is not at most 1024"),
         (
             "[analytic]\ncases = 1000000000000",

@@ -414,6 +414,13 @@ fn a_sample_that_stands_alone_is_remarked_and_an_impact_is_not() {
     let nothing: [String; 0] = [];
     let slam = |t: f64| drag(t) + 1e4 * (-((t - 1.0) / 0.02).powi(2)).exp();
     assert_eq!(remarks(&slam), nothing);
+    // one in a hundred is left out, one in twenty is no accident
+    let often = table(&[("fx", &|t| if (t * 100.0).round() % 20.0 == 7.0 { 1e4 } else { drag(t) })], 200);
+    let error = read(MANIFEST, &[("run.csv", &often)]).expect_err("refused").to_string();
+    assert!(error.contains("run.csv: 10 of 200 rows stand alone") && error.contains("row 9"), "{error}");
+    let once = table(&[("fx", &|t| if t == 0.05 { 1e4 } else { drag(t) })], 200);
+    let trial = read(MANIFEST, &[("run.csv", &once)]).expect("sound").trials.remove(0);
+    assert_eq!((trial.len(), trial.rows[4], trial.rows[5]), (199, 6, 8));
     // most of it the same: no noise to judge by
     assert_eq!(remarks(&|t| if t == 0.05 { 1e4 } else { 0.0 }), nothing);
 }

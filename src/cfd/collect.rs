@@ -247,6 +247,12 @@ impl Collected {
         Ok(Self { cases: rows.into_iter().map(|row| (row.id.clone(), row)).collect() })
     }
 
+    /// The same state over a parked bed as a case over a driving one, where both flows have settled.
+    pub fn settled_twin(&self, driving: &CaseSummary) -> Option<&CaseSummary> {
+        let parked = self.cases.get(&driving.id.replacen("-driving-", "-paper-", 1))?;
+        (driving.set == Set::Driving && driving.settled && parked.settled).then_some(parked)
+    }
+
     fn write(&self, folder: &Path) -> Result<(), CollectError> {
         let path = folder.join(CASES_FILE);
         let syntax = |message: String| CollectError::Syntax { path: path.clone(), message };

@@ -337,11 +337,7 @@ fn twins(collected: &Collected, vehicle: &Vehicle) -> Option<Twins> {
     let pairs: Vec<(&CaseSummary, &CaseSummary)> = collected
         .cases
         .values()
-        .filter(|case| case.set == Set::Driving)
-        .filter_map(|driving| {
-            let parked = collected.cases.get(&driving.id.replacen("-driving-", "-paper-", 1))?;
-            (driving.settled && parked.settled).then_some((driving, parked))
-        })
+        .filter_map(|driving| Some((driving, collected.settled_twin(driving)?)))
         .collect();
     (!pairs.is_empty()).then(|| Twins {
         pairs: pairs.len(),

@@ -12,6 +12,7 @@
 
 use std::collections::BTreeMap;
 
+use super::collect::Collected;
 use super::mesh::Channel;
 use super::placement::Placement;
 use super::plan::{Plan, Set};
@@ -20,7 +21,7 @@ use crate::dataset::{Dataset, Image, Sample};
 use crate::frame::Vec3;
 use crate::train::TrainError;
 use crate::train::label::{labels, order};
-use crate::trials::{Columns, Manifest, Measured, Method, WHEELS, WRENCH};
+use crate::trials::{Columns, Manifest, Measured, Method, SIMULATED, WHEELS, WRENCH};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
@@ -39,6 +40,11 @@ pub enum CaseTrialsError {
         /// The set.
         set: Set,
     },
+    /// No two flows to hold against each other.
+    #[error(
+        "no case of the chosen sets has a twin over a parked bed such that both have settled: choose driving, and run and collect paper too"
+    )]
+    NoTwins,
     /// Surfaces that are not the vehicle's.
     #[error(transparent)]
     Surfaces(#[from] TrainError),
@@ -50,43 +56,57 @@ pub enum CaseTrialsError {
     },
 }
 
-/// Trials of the computed cases of some sets, one a case, with what holds for all.
+/// Trials of the computed cases of some sets, one a case, with what holds for all. With `pairs`, of those that have a twin over
+/// a parked bed, whose mean wrench stands beside each as the prediction.
 pub fn trials(
     plan: &Plan,
     dataset: &Dataset,
     vehicle: &Vehicle,
     sets: &[Set],
+    pairs: Option<&Collected>,
 ) -> Result<(Manifest, Vec<Columns>), CaseTrialsError> {
     let names = sets.iter().map(Set::to_string).collect::<Vec<_>>().join(" and ");
     let mut cases: BTreeMap<&str, Vec<&Sample>> = BTreeMap::new();
-    let chosen = |sample: &&Sample| {
-        sample.image == Image::Original && sets.iter().any(|set| set.to_string() == sample.set)
-    };
-    for sample in dataset.samples.iter().filter(chosen) {
+    for sample in dataset.samples.iter().filter(|sample| sample.image == Image::Original) {
         cases.entry(&sample.case).or_default().push(sample);
     }
-    let is_there = |set: &Set| cases.values().any(|samples| samples[0].set == set.to_string());
-    if let Some(set) = sets.iter().find(|set| !is_there(set)) {
+    cases.values_mut().for_each(|samples| samples.sort_by_key(|sample| sample.section));
+    let is_of = |samples: &[&Sample], set: &Set| samples[0].set == set.to_string();
+    if let Some(set) = sets.iter().find(|set| !cases.values().any(|samples| is_of(samples, set))) {
         return Err(CaseTrialsError::Nothing { set: *set });
     }
     // a sample of a case has surfaces
     let order = order(vehicle, dataset.meta.vehicles.get(&vehicle.name).map_or(&[], Vec::as_slice))?;
     let wheels = wheels(plan, vehicle);
     let (mut trials, mut noise) = (Vec::new(), Noise::default());
-    for (case, mut samples) in cases {
-        samples.sort_by_key(|sample| sample.section);
-        let wrenches = samples.iter().map(|sample| wrench(vehicle, &order, sample));
-        let wrenches: Vec<[f64; 6]> = wrenches
-            .collect::<Option<_>>()
-            .ok_or_else(|| CaseTrialsError::NoMoments { case: case.to_owned() })?;
-        noise.hear(&samples, &wrenches);
-        trials.push((case.to_owned(), columns(&samples, &wrenches, &wheels)));
+    let heard = |samples: &[&Sample]| -> Result<Vec<[f64; 6]>, CaseTrialsError> {
+        let wrenches = samples.iter().map(|sample| wrench(vehicle, &order, sample)).collect::<Option<_>>();
+        wrenches.ok_or_else(|| CaseTrialsError::NoMoments { case: samples[0].case.clone() })
+    };
+    for (case, samples) in &cases {
+        let twin = pairs.and_then(|all| cases.get(all.settled_twin(all.cases.get(*case)?)?.id.as_str()));
+        if !sets.iter().any(|set| is_of(samples, set)) || (pairs.is_some() && twin.is_none()) {
+            continue;
+        }
+        let wrenches = heard(samples)?;
+        let mut columns = columns(samples, &wrenches, &wheels);
+        noise.hear(samples, &wrenches);
+        if let Some(parked) = twin {
+            let wrenches = heard(parked)?;
+            noise.hear(parked, &wrenches);
+            columns.extend((0..6).map(|c| (SIMULATED[c], vec![mean(&wrenches, c); samples.len()])));
+        }
+        trials.push(((*case).to_owned(), columns));
+    }
+    if trials.is_empty() {
+        return Err(CaseTrialsError::NoTwins);
     }
     let manifest = Manifest {
         vehicle: vehicle.name.clone(),
         generated: Some(format!(
-            "computed by {}, cases of {names}, means of a tenth of a second; nothing of it was measured",
-            dataset.meta.provenance
+            "computed by {}, cases of {names}, means of a tenth of a second{}; nothing of it was measured",
+            dataset.meta.provenance,
+            if pairs.is_some() { ", beside the mean of the same state over a parked bed" } else { "" }
         )),
         channel_width: plan.cases.first().map(|case| {
             let (settings, placement) = (&plan.campaign.settings.mesh, Placement::new(vehicle, case));
@@ -98,7 +118,8 @@ pub fn trials(
             ..Measured::default()
         },
         sensor_noise: noise.of_a_section(),
-        trial_offset: noise.of_a_mean(),
+        // of a pair both means are in the gap
+        trial_offset: noise.of_a_mean(if pairs.is_some() { 2.0 } else { 1.0 }),
         ..Manifest::default()
     };
     Ok((manifest, trials))
@@ -182,8 +203,6 @@ impl Noise {
         }
         let half = wrenches.len() / 2;
         if half > 0 && samples.iter().all(|sample| sample.condition == samples[0].condition) {
-            let mean =
-                |part: &[[f64; 6]], c: usize| part.iter().map(|w| w[c]).sum::<f64>() / part.len() as f64;
             for c in 0..6 {
                 self.mean[c] += (0.5 * (mean(&wrenches[half..], c) - mean(&wrenches[..half], c))).powi(2);
             }
@@ -195,9 +214,13 @@ impl Noise {
         deviations(&self.section, self.sections)
     }
 
-    fn of_a_mean(&self) -> BTreeMap<String, f64> {
-        deviations(&self.mean, self.means)
+    fn of_a_mean(&self, flows: f64) -> BTreeMap<String, f64> {
+        deviations(&self.mean.map(|squares| flows * squares), self.means)
     }
+}
+
+fn mean(wrenches: &[[f64; 6]], component: usize) -> f64 {
+    wrenches.iter().map(|wrench| wrench[component]).sum::<f64>() / wrenches.len() as f64
 }
 
 /// Standard deviations by component; none where nothing was heard.

@@ -342,7 +342,8 @@ impl Collect {
 /// Make trials of computed cases, for `wade gap`
 ///
 /// A trial a case, a row a section of 0.1 s, labelled as computed. The effects of speed that changes are in `unsteady`; those
-/// of a moving bed and turning wheels are in `driving` beside `paper`, which holds the same states over a parked bed.
+/// of a moving bed and turning wheels are in `driving` beside `paper`, which holds the same states over a parked bed; with
+/// `--pairs` a parked flow is the prediction (`sim_*`) of its driving twin, so that the gap is what the bed does and no more.
 #[derive(Debug, Args)]
 struct Trials {
     /// Folder of the campaign
@@ -352,6 +353,9 @@ struct Trials {
     /// The sets of cases; may be given several times
     #[arg(long, value_enum, required = true)]
     set: Vec<SetName>,
+    /// Only cases over a driving bed whose parked twin is computed too, both settled: the twin's mean is the prediction
+    #[arg(long)]
+    pairs: bool,
     /// Folder for the trials, which must not hold any yet
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -364,7 +368,8 @@ impl Trials {
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         let dataset = dataset::read(&self.campaign.join(collect::SECTIONS_FILE))?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
-        let (manifest, trials) = trials::trials(&plan, &dataset, &bundle.vehicle, &sets)?;
+        let collected = self.pairs.then(|| Collected::read(&self.campaign, &plan)).transpose()?;
+        let (manifest, trials) = trials::trials(&plan, &dataset, &bundle.vehicle, &sets, collected.as_ref())?;
         let holds_any = std::fs::read_dir(&self.out).is_ok_and(|mut entries| entries.next().is_some());
         if holds_any {
             bail!(
@@ -395,6 +400,9 @@ struct Report {
 
 impl Report {
     fn run(self) -> Result<ExitCode> {
+        let files = [plan::PLAN_FILE, plan::CAMPAIGN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
+        let files = files.map(|name| self.campaign.join(name));
+        let written = super::begin_page(self.html.as_deref(), &files.each_ref().map(PathBuf::as_path))?;
         let plan = Plan::read(&self.campaign)?;
         let bundle = bundle::read(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
@@ -404,9 +412,8 @@ impl Report {
         } else {
             super::emit(&report.text())?;
         }
-        if let Some(path) = &self.html {
-            let page = report.page(&self.campaign, &bundle.vehicle)?;
-            std::fs::write(path, page).with_context(|| path.display().to_string())?;
+        if let Some(written) = written {
+            written.finish(&report.page(&self.campaign, &bundle.vehicle)?)?;
         }
         Ok(ExitCode::SUCCESS)
     }

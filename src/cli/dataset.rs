@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs::Permissions;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -22,7 +22,7 @@ use wade::train::{self, Config};
 use wade::vehicle::Vehicle;
 
 use super::train::Rule;
-use super::{Vehicles, emit, usage_error};
+use super::{Vehicles, begin_page, emit, keep_inputs, usage_error};
 
 /// Most cases a vehicle: far beyond what a network of this size can learn, and well within memory.
 const MOST_CASES: u64 = 1_000_000;
@@ -236,7 +236,9 @@ impl Dataset {
                 }
                 write(&out, &data)?;
             }
-            Command::Describe { file, html, json, vehicles } => describe(&file, html, json, &vehicles)?,
+            Command::Describe { file, html, json, vehicles } => {
+                describe(&file, html.as_deref(), json, &vehicles)?
+            }
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -348,19 +350,6 @@ fn keys<T>(map: &BTreeMap<String, T>) -> String {
     map.keys().cloned().collect::<Vec<_>>().join(", ")
 }
 
-/// Refuses to write over a data set that is read, whatever the two are called.
-fn keep_inputs(out: &Path, inputs: impl IntoIterator<Item = impl AsRef<Path>>) -> Result<()> {
-    let place = |path: &Path| std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()));
-    let Some(target) = place(out) else { return Ok(()) };
-    for input in inputs {
-        let input = input.as_ref();
-        if place(input) == Some(target) {
-            bail!("{} would be written over {}, which is read: name another", out.display(), input.display());
-        }
-    }
-    Ok(())
-}
-
 /// Writes a data set and says what is in it.
 fn write(path: &Path, data: &dataset::Dataset) -> Result<()> {
     dataset::write(path, data)?;
@@ -373,10 +362,8 @@ fn write(path: &Path, data: &dataset::Dataset) -> Result<()> {
     emit(&text)
 }
 
-fn describe(file: &Path, html: Option<PathBuf>, as_json: bool, vehicles: &Vehicles) -> Result<()> {
-    if let Some(path) = &html {
-        keep_inputs(path, [file])?;
-    }
+fn describe(file: &Path, html: Option<&Path>, as_json: bool, vehicles: &Vehicles) -> Result<()> {
+    let written = begin_page(html, &[file])?;
     let data = dataset::read(file)?;
     // kinds are known where the bundle is; a data set of somebody else's vehicle is described by its surfaces
     let known: BTreeMap<_, _> = data
@@ -391,9 +378,8 @@ fn describe(file: &Path, html: Option<PathBuf>, as_json: bool, vehicles: &Vehicl
         Some(format!("{kind:?}").to_lowercase())
     };
     let summary = Summary::of(&data, &kind);
-    if let Some(path) = html {
-        let page = page::page(&format!("Data set {}", file.display()), &summary)?;
-        std::fs::write(&path, page).with_context(|| path.display().to_string())?;
+    if let Some(written) = written {
+        written.finish(&page::page(&format!("Data set {}", file.display()), &summary)?)?;
     }
     if as_json { emit(&format!("{:#}\n", json!(summary))) } else { emit(&text(&summary)?) }
 }

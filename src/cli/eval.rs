@@ -18,7 +18,7 @@ use wade::train::report::Record;
 use wade::train::{self, Config, Published, Sides, Source, Trained, Variant};
 
 use super::train::{Data, Loaded, Progress, Rule, Served};
-use super::{PROGRAM, emit, usage_error};
+use super::{PROGRAM, begin_page, emit, usage_error};
 
 /// Judge the weights of the bundles by the states that their training held out
 ///
@@ -56,14 +56,16 @@ pub struct Eval {
 impl Eval {
     /// Prints the tables and writes the page.
     pub fn run(self) -> Result<ExitCode> {
+        let record = Record::path(&self.trained);
+        let page = begin_page(self.html.as_deref(), &[&self.data.data, &record])?;
         let report = match self.split {
             Some(rule) => self.anew(rule)?,
             None => self.of_bundles()?,
         };
-        if let Some(path) = &self.html {
-            std::fs::write(path, report.page()?).with_context(|| path.display().to_string())?;
-        }
         emit(&if self.json { format!("{:#}\n", json!(report)) } else { text(&report) })?;
+        if let Some(page) = page {
+            page.finish(&report.page()?)?;
+        }
         Ok(ExitCode::SUCCESS)
     }
 

@@ -87,26 +87,27 @@ pub struct Gap {
     /// Folder for report.json and index.html; those of an earlier run are replaced
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
-    #[command(flatten)]
-    apply: Apply,
-}
-
-#[derive(Debug, Args)]
-struct Apply {
     /// Add the physical effects to the bundle, as its next version
     #[arg(long)]
     apply: bool,
+    #[command(flatten)]
+    adding: Adding,
+}
+
+/// How effects are added to a bundle.
+#[derive(Debug, Args)]
+struct Adding {
     /// Add what was seen in one condition only as well
-    #[arg(long, requires = "apply")]
+    #[arg(long)]
     provisional: bool,
     /// Take effects out that other trials gave and these do not
-    #[arg(long, requires = "apply")]
+    #[arg(long)]
     replace: bool,
     #[command(flatten)]
     running: Running,
 }
 
-/// One step of the workflow; each looks at the trials anew and writes nothing but the last.
+/// One step of the workflow; each looks at the trials anew, and only the last two write.
 #[derive(Debug, Subcommand)]
 enum Step {
     /// Where the gap is: regions of the state space
@@ -122,6 +123,16 @@ enum Step {
         /// Folder for report.json and index.html; those of an earlier run are replaced
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+    },
+    /// The same, and the physical effects into the bundle as its next version
+    Apply {
+        #[command(flatten)]
+        source: Source,
+        /// Folder for report.json and index.html; those of an earlier run are replaced
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        #[command(flatten)]
+        adding: Adding,
     },
     Bench(GapBench),
 }
@@ -153,8 +164,12 @@ impl Gap {
             (Some(Step::Name(source)), _) => source.name(),
             (Some(Step::Fit(source)), _) => source.fit(),
             (Some(Step::Report { source, out }), _) => source.report(&out, None),
+            (Some(Step::Apply { source, out, adding }), _) => source.report(&out, Some(&adding)),
             (Some(Step::Bench(bench)), _) => bench.run(),
-            (None, Some(out)) => self.source.report(&out, Some(&self.apply).filter(|apply| apply.apply)),
+            (None, Some(_)) if !self.apply && (self.adding.provisional || self.adding.replace) => {
+                usage_error("--provisional and --replace go with --apply")
+            }
+            (None, Some(out)) => self.source.report(&out, self.apply.then_some(&self.adding)),
             (None, None) => usage_error("give --vehicle, --trials and --out, or a step"),
         }
     }
@@ -175,7 +190,6 @@ impl Source {
         };
         let config = self.settings()?;
         let trials = Trials::read(folder)?;
-        trials.remarks().iter().for_each(|remark| eprintln!("{remark}"));
         if trials.manifest.vehicle != *vehicle {
             let (trials, asked) = (trials.manifest.vehicle.clone(), vehicle.clone());
             return Err(GapError::Vehicle { trials, asked }.into());
@@ -187,12 +201,18 @@ impl Source {
             gap::run(&trials, &body, &mut predictor(&model), &config)
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
+            let nothing = || format!("there is no bundle {}", bundle.display());
             if let Some(trial) = alone {
                 let (trial, vehicle) = (trial.name.clone(), vehicle.clone());
-                return Err(GapError::NoPrediction { trial, vehicle }.into());
+                return Err(GapError::NoPrediction { trial, vehicle }).with_context(nothing);
             }
-            gap::run(&trials, &gap::body_of(&trials)?, &mut |_| Predicted::default(), &config)
+            let body = gap::body_of(&trials).with_context(nothing)?;
+            gap::run(&trials, &body, &mut |_| Predicted::default(), &config)
         };
+        match &report {
+            Ok(report) => report.remarks.iter().for_each(|remark| eprintln!("{remark}")),
+            Err(_) => trials.remarks().iter().for_each(|remark| eprintln!("{remark}")),
+        }
         let mut report = report.with_context(|| folder.display().to_string())?;
         report.sources.model = if is_simulated(&trials) {
             "the sim_ columns of the trials".into()
@@ -241,7 +261,7 @@ impl Source {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn report(&self, out: &Path, apply: Option<&Apply>) -> Result<ExitCode> {
+    fn report(&self, out: &Path, apply: Option<&Adding>) -> Result<ExitCode> {
         check_report_folder(out)?;
         let (report, trials) = self.run()?;
         let json = serde_json::to_string_pretty(&report)? + "\n";
@@ -317,7 +337,11 @@ fn predictor(model: &Model) -> impl FnMut(&wade::condition::Condition) -> Predic
     move |condition| {
         model.evaluate(condition, &mut workspace, &mut forces);
         let u = forces.uncertainty;
-        Predicted { wrench: forces.wrench, uncertainty: [u.x, u.y, u.z, 0.0, 0.0, 0.0] }
+        Predicted {
+            wrench: forces.wrench,
+            uncertainty: [u.x, u.y, u.z, 0.0, 0.0, 0.0],
+            outside: !forces.outside.is_inside(),
+        }
     }
 }
 

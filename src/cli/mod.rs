@@ -17,12 +17,14 @@ mod validate;
 mod vehicle;
 
 use std::io::Write;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
 use wade::config::Config;
+use wade::files::StagedFile;
 use wade::model::Model;
 use wade::model::kernel::Isa;
 use wade::served::ServedVehicle;
@@ -138,6 +140,41 @@ fn check_report_folder(folder: &Path) -> Result<()> {
         bail!("{} holds a vehicle bundle: name another folder for the report", folder.display());
     }
     Ok(())
+}
+
+/// Refuses to write over a file that is read, whatever the two are called.
+fn keep_inputs(out: &Path, inputs: impl IntoIterator<Item = impl AsRef<Path>>) -> Result<()> {
+    let place = |path: &Path| std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()));
+    let Some(target) = place(out) else { return Ok(()) };
+    for input in inputs {
+        let input = input.as_ref();
+        if place(input) == Some(target) {
+            bail!("{} would be written over {}, which is read: name another", out.display(), input.display());
+        }
+    }
+    Ok(())
+}
+
+/// A page that is written once the work is done.
+struct Page {
+    file: StagedFile,
+    place: PathBuf,
+}
+
+/// Begins a page, so that a place that cannot be written to is known before the work, and that of a file that is read.
+fn begin_page(place: Option<&Path>, inputs: &[&Path]) -> Result<Option<Page>> {
+    let Some(place) = place else { return Ok(None) };
+    keep_inputs(place, inputs)?;
+    let file = StagedFile::new(place).with_context(|| format!("cannot write {}", place.display()))?;
+    Ok(Some(Page { file, place: place.to_owned() }))
+}
+
+impl Page {
+    fn finish(mut self, text: &str) -> Result<()> {
+        let place = || self.place.display().to_string();
+        self.file.write_all(text.as_bytes()).with_context(place)?;
+        self.file.finish().with_context(|| self.place.display().to_string())
+    }
 }
 
 /// Names of the bundles in a folder, sorted.

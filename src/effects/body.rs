@@ -82,6 +82,8 @@ pub struct Body {
     pub length: f64,
     /// Along y [m].
     pub width: f64,
+    /// Along z [m].
+    pub height: f64,
     /// Mass [kg].
     pub mass: f64,
     /// Point that moments are taken about [m].
@@ -119,6 +121,7 @@ impl Body {
             name: vehicle.name.clone(),
             length: vehicle.dimensions.length,
             width: vehicle.dimensions.width,
+            height: vehicle.dimensions.height,
             mass: vehicle.mass,
             center_of_mass: vehicle.center_of_mass,
             z0: vehicle.z0,
@@ -138,6 +141,7 @@ impl Body {
             name: name.to_owned(),
             length: block.length,
             width: block.width,
+            height,
             mass: block.mass,
             center_of_mass: Vec3::from(block.center_of_mass),
             z0: -0.5 * block.draft,

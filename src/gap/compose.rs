@@ -86,7 +86,9 @@ pub(super) fn compose(
         let effects = |set: &Vec<Member>| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
         separating(&sets.map(effects).collect::<Vec<_>>())
     });
-    let remarks = trials.remarks().iter().map(ToString::to_string).chain(remarks(&effects)).collect();
+    let mut said: Vec<String> = trials.remarks().iter().map(ToString::to_string).collect();
+    said.extend(outside(all));
+    said.extend(remarks(&effects));
     let unexplained = unexplained(judge, &found, disproof);
     let gap = GapReport {
         held_out,
@@ -115,12 +117,29 @@ pub(super) fn compose(
         trials: all.len(),
         samples: all.iter().map(|s| s.t.len()).sum(),
         bin_s: config.bin_s,
-        remarks,
+        remarks: said,
         sources: Sources { trials: hash(trials), ..Sources::default() },
         traces: traces(&named, all, &held, setting, judge.floors),
     };
     report.summary = summary(&report, found.gated);
     report
+}
+
+/// The trials in which the model answers for states that it did not learn.
+fn outside(all: &[Series]) -> Option<String> {
+    let share = |series: &Series| {
+        series.outside.iter().filter(|outside| **outside).count() as f64 / series.t.len().max(1) as f64
+    };
+    let mut far: Vec<(&Series, f64)> = all.iter().map(|series| (series, share(series))).collect();
+    far.retain(|(_, share)| *share > 0.5);
+    far.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let (worst, _) = far.first()?;
+    Some(format!(
+        "{} of {} trials, such as {}, are in states that the model did not learn: a gap in them may be its own",
+        far.len(),
+        all.len(),
+        worst.name
+    ))
 }
 
 fn names(judge: &Judge, set: &[Member]) -> Vec<&'static str> {
@@ -316,7 +335,12 @@ fn validity(all: &[Series]) -> BTreeMap<&'static str, [f64; 2]> {
         // single samples of noise do not widen what was tested
         [quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995)]
     };
-    quantities.into_iter().map(|(name, of)| (name, range(of))).collect()
+    // at rest and in steady motion an effect has less to say than anywhere, whatever the noise of rates made of that
+    let from = |name: &str, [low, high]: [f64; 2]| match name {
+        "speed_mps" | "acceleration_mps2" | "angular_speed_radps" => [0.0, high],
+        _ => [low, high],
+    };
+    quantities.into_iter().map(|(name, of)| (name, from(name, range(of)))).collect()
 }
 
 /// Hash over all numbers, whatever the order of the trials; each column with its name and length, so that no number passes for
@@ -406,6 +430,22 @@ fn trace(
     }
 }
 
+/// Says so where the gap is clearly larger than the noise and only the model's own error keeps it from counting.
+fn hidden(report: &Report) -> Option<String> {
+    const CLEARLY: f64 = 2.0;
+    let times = |(name, floor): &(&&str, &Floor)| {
+        report.gap.size.get(**name).map_or(0.0, |size| size.rms / floor.total().max(f64::MIN_POSITIVE))
+    };
+    let loud = report.gap.floors.iter().filter(|of| of.1.model > of.1.total() && times(of) > CLEARLY);
+    let (name, floor) = loud.max_by(|a, b| times(a).total_cmp(&times(b)))?;
+    Some(format!(
+        " and what the model states of itself. Of {name} the noise is {:.3} and the model's own error {:.3}: the gap of {:.3} may be either's.",
+        floor.total(),
+        floor.model,
+        report.gap.size.get(*name).map_or(0.0, |size| size.rms),
+    ))
+}
+
 fn summary(report: &Report, gated: Option<Gated>) -> String {
     let names = |effects: &[NamedEffect]| {
         effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
@@ -416,8 +456,9 @@ fn summary(report: &Report, gated: Option<Gated>) -> String {
     });
     match report.verdict {
         Verdict::NothingMissing => {
-            "Nothing is missing that these trials can show: the gap holds no structure beyond its noise."
-                .into()
+            let within =
+                "Nothing is missing that these trials can show: the gap holds no structure beyond its noise";
+            hidden(report).map_or_else(|| format!("{within}."), |why| format!("{within}{why}"))
         }
         Verdict::Named => {
             let there = gated.map_or_else(String::new, |gated| {

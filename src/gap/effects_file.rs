@@ -7,7 +7,7 @@ use crate::effects::{ActiveEffect, Effect, EffectsFile, Evidence, Kind, Paramete
 use crate::trials::{Manifest, Trials};
 
 /// Why nothing of a report may be added to a model.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NotApplicable {
     /// There is no gap.
     #[error("nothing is missing")]
@@ -23,6 +23,18 @@ pub enum NotApplicable {
     /// Sensors and drive alone.
     #[error("no named effect is one of the water")]
     NotPhysics,
+    /// A part of the trials kept back that it makes worse.
+    #[error(
+        "on trials that took no part the gap grows where {place}, from {before:.1} to {after:.1} noise floors: what was named does not hold there"
+    )]
+    Worse {
+        /// Where.
+        place: String,
+        /// Gap before, in noise floors.
+        before: f64,
+        /// Gap after.
+        after: f64,
+    },
     /// Seen in one condition only.
     #[error(
         "{effects} was seen in one condition only: record another, or take it as it is with --provisional"
@@ -51,6 +63,13 @@ pub fn effects_file(
     let physical: Vec<&NamedEffect> = report.effects.iter().filter(|e| e.kind == Kind::Physics).collect();
     if physical.is_empty() {
         return Err(NotApplicable::NotPhysics);
+    }
+    if let Some(worse) = report.gap.worse_regions.first() {
+        return Err(NotApplicable::Worse {
+            place: worse.place.clone(),
+            before: worse.before,
+            after: worse.after,
+        });
     }
     let provisional: Vec<&str> = physical.iter().filter(|e| e.provisional).map(|e| e.name).collect();
     if !provisional.is_empty() && !with_provisional {

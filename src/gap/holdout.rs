@@ -15,7 +15,7 @@ use crate::random::Random;
 use crate::trials::WRENCH;
 
 /// Fewest trials over which a bootstrap says how far a closure may be off.
-const ENOUGH: usize = 3;
+pub(super) const ENOUGH: usize = 3;
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 

@@ -38,7 +38,11 @@ pub(super) struct Motion {
 
 pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<Measurement, GapError> {
     let own = of_columns(&trial.other_forces, trial.len());
+    let twin = trials.manifest.measured.dry_twins.get(&trial.name);
     if !is_inferred_here(trials, trial) {
+        if twin.is_some() {
+            return Err(GapError::TwinOfMeasured { trial: trial.name.clone() });
+        }
         return Ok(Measurement { wrench: trial.measured.clone(), motion: None, other: own });
     }
     let mut other = own;
@@ -47,7 +51,7 @@ pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<M
         up: (0..trial.len()).map(|sample| trial.up(sample).into_inner()).collect(),
         dry_rolling: vec![0.0; trial.len()],
     };
-    if let Some(name) = trials.manifest.measured.dry_twins.get(&trial.name) {
+    if let Some(name) = twin {
         let missing = || GapError::NoTwin { trial: trial.name.clone(), twin: name.clone() };
         let twin = trials.trials.iter().find(|other| other.name == *name).ok_or_else(missing)?;
         take_off(&mut motion, &mut other, trial, twin)?;

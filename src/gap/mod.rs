@@ -3,7 +3,8 @@
 //!
 //! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
 //!
-//! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `noise` (the floor), `candidates` (the
+//! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `plausible` (what
+//! cannot be), `noise` (the floor), `candidates` (the
 //! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
 //! hold), `judge` (the gates), `select` and `rivals` (which effects), `shared` (noise of the motion in both), `nonlinear`,
 //! `general` and `lasting` (structure without a name), `features`, `gated` and `locate` (where), `verdict`, `fit`, `holdout`,
@@ -30,6 +31,7 @@ mod measurement;
 mod noise;
 mod nonlinear;
 mod page;
+mod plausible;
 mod rates;
 mod report;
 mod rivals;
@@ -63,6 +65,8 @@ pub struct Predicted {
     pub wrench: Wrench,
     /// Its standard deviation [N, N m].
     pub uncertainty: [f64; 6],
+    /// True where the state is none of those that it learnt.
+    pub outside: bool,
 }
 
 /// An effect with its numbers.
@@ -140,6 +144,64 @@ pub enum GapError {
         trial: String,
         /// Name of the one that differs.
         other: String,
+    },
+    /// A channel without a signal.
+    #[error(
+        "column {column}: {value} in every row of every trial, where a standard deviation of {spread:.3} {unit} is expected: the channel was dead or not recorded; list the other components in measured.columns"
+    )]
+    Dead {
+        /// The column.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// Standard deviation of what is expected [N or N m].
+        spread: f64,
+        /// The unit.
+        unit: &'static str,
+    },
+    /// A load in another unit.
+    #[error(
+        "column {column} of all trials is {ratio:.2e} of what is expected: is it in {other}? It must be in {unit}"
+    )]
+    Unit {
+        /// The column.
+        column: &'static str,
+        /// Measured over expected.
+        ratio: f64,
+        /// What it must be in.
+        unit: &'static str,
+        /// What it seems to be in.
+        other: &'static str,
+    },
+    /// Deeper than anything that wades.
+    #[error(
+        "{trial}.csv, row {row}, column depth: {depth} m of water over the ground, where the hull is {height:.2} m high: is it in another unit?"
+    )]
+    Deep {
+        /// Name of the trial.
+        trial: String,
+        /// Line of its file.
+        row: u64,
+        /// The depth [m].
+        depth: f64,
+        /// Height of the hull [m].
+        height: f64,
+    },
+    /// The same samples under two names.
+    #[error("{trial}.csv holds the same samples as {other}.csv: leave one of them out")]
+    SameTrial {
+        /// Name of the trial.
+        trial: String,
+        /// Name of the other.
+        other: String,
+    },
+    /// Dry twins beside a measured wrench.
+    #[error(
+        "{trial}.csv has a dry twin and a measured wrench: a twin is taken off what method = \"inverse_dynamics\" infers from the motion; leave measured.dry_twins out, or the columns of the wrench"
+    )]
+    TwinOfMeasured {
+        /// Name of the trial.
+        trial: String,
     },
     /// Too few to keep some back.
     #[error(

@@ -77,13 +77,16 @@ pub(super) fn floors(
     })
 }
 
-/// Root mean square of what the model states of itself over all samples of some trials [N or N m].
+/// Root mean square of what the model states of itself over the samples of some trials [N or N m]: those in states that it
+/// learnt, where there are any, or one trial far outside would hide what all others show.
 fn model_error(trials: &[&Series]) -> [f64; 6] {
-    let count = trials.iter().map(|series| series.t.len()).sum::<usize>().max(1) as f64;
-    std::array::from_fn(|c| {
-        let squares = trials.iter().flat_map(|series| series.uncertainty.iter().map(|u| u[c].powi(2)));
-        (squares.sum::<f64>() / count).sqrt()
-    })
+    let of = |with_outside: bool| {
+        let samples = trials.iter().flat_map(|series| series.uncertainty.iter().zip(&series.outside));
+        samples.filter(move |(_, outside)| with_outside || !**outside).map(|(uncertainty, _)| uncertainty)
+    };
+    let with_outside = of(false).next().is_none();
+    let count = of(with_outside).count().max(1) as f64;
+    std::array::from_fn(|c| (of(with_outside).map(|u| u[c].powi(2)).sum::<f64>() / count).sqrt())
 }
 
 fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {

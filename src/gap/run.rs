@@ -9,6 +9,7 @@ use super::general::General;
 use super::judge::Judge;
 use super::noise::{floors, row_noise, smoothing};
 use super::nonlinear::{refine, settle, through_sensors};
+use super::plausible;
 use super::report::Report;
 use super::series::{Series, one_clock, series};
 use super::split::hold_out;
@@ -53,6 +54,7 @@ pub fn run(
         return Err(GapError::Vehicle { trials, asked });
     }
     let (mut all, components) = series(trials, body, predict, config)?;
+    plausible::check(&all, &components, is_inferred(&trials.manifest))?;
     let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
     check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
     let floors = floors(&all, &naming, &trials.manifest, &components);

@@ -12,6 +12,9 @@ use crate::signal::pieces;
 use crate::trials::{Trial, Trials, WRENCH};
 use crate::wrench::Wrench;
 
+/// Nothing wades where the water is as many times as deep as its hull is high.
+const DEEPEST: f64 = 4.0;
+
 /// One trial; a value a sample.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
@@ -34,6 +37,8 @@ pub(super) struct Series {
     pub seen: Vec<[f64; 6]>,
     /// The model's own standard deviation.
     pub uncertainty: Vec<[f64; 6]>,
+    /// True where the state is none of those that the model learnt.
+    pub outside: Vec<bool>,
     /// Measured minus predicted and known; 0 for components that are not compared.
     pub gap: Vec<[f64; 6]>,
     /// Known other force on each component, where there is one, less that of the dry twin.
@@ -169,6 +174,7 @@ fn of_trial(
     let count = trial.len();
     let mut predicted = Vec::with_capacity(count);
     let mut uncertainty = vec![[0.0; 6]; count];
+    let mut outside = vec![false; count];
     let mut conditions = Vec::with_capacity(count);
     let mut immersions = Vec::with_capacity(count);
     for sample in 0..count {
@@ -180,6 +186,11 @@ fn of_trial(
             let wading = Condition { depth: condition.depth.max(0.0), ..condition };
             let answer = predict(&wading);
             uncertainty[sample] = answer.uncertainty;
+            outside[sample] = answer.outside;
+            if condition.depth > DEEPEST * body.height {
+                let (row, depth, height) = (trial.rows[sample], condition.depth, body.height);
+                return Err(GapError::Deep { trial: trial.name.clone(), row, depth, height });
+            }
             let (f, m) = (answer.wrench.force, answer.wrench.moment);
             [f.x, f.y, f.z, m.x, m.y, m.z]
         };
@@ -238,6 +249,7 @@ fn of_trial(
         seen,
         predicted,
         uncertainty,
+        outside,
         bins,
         runs,
     };

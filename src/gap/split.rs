@@ -3,8 +3,12 @@
 use super::Config;
 use super::design::Rows;
 use super::features::of_bins;
+use super::holdout::ENOUGH;
 use super::series::Series;
 use crate::random::Random;
+
+/// Trials of which [`ENOUGH`] can be spared.
+const MANY: usize = 10;
 
 /// Means that tell what is excited.
 fn signature(bins: &[[f64; 9]]) -> [f64; 6] {
@@ -50,7 +54,9 @@ fn by_excitation(signatures: &[[f64; 6]]) -> Vec<(usize, usize)> {
 pub(super) fn hold_out(all: &[Series], repeats: &[Vec<String>], config: &Config) -> (Vec<usize>, Vec<usize>) {
     let signatures: Vec<[f64; 6]> = all.iter().map(|s| signature(&of_bins(s))).collect();
     let order = by_excitation(&signatures);
-    let wanted = ((all.len() as f64 * config.held_out).round() as usize).clamp(1, all.len() - 2);
+    // as many as an interval of the closure takes, where enough are left to name by
+    let least = if all.len() >= MANY { ENOUGH } else { 1 };
+    let wanted = ((all.len() as f64 * config.held_out).round() as usize).clamp(least, all.len() - 2);
     let together = |trial: usize| -> Vec<usize> {
         let name = |trial: usize| &all[trial].name;
         let groups: Vec<&Vec<String>> = repeats.iter().filter(|group| group.contains(name(trial))).collect();

@@ -335,6 +335,7 @@ impl Scene<'_> {
             other_forces: drive.map(|drive| (DRIVE.to_owned(), drive)).into_iter().collect(),
             known_loads: known_loads.into_iter().map(|(name, load)| (name.to_owned(), load)).collect(),
             unknown_columns: Vec::new(),
+            glitches: Vec::new(),
             rows,
             t,
         }

@@ -8,6 +8,7 @@ use super::TrainError;
 use super::anchored::loss::AnchoredLoss;
 use super::loss::LossConfig;
 use super::plan::Table;
+use crate::dataset::split::MOST_PARTS;
 
 /// How to train; the defaults are the source paper's where it states them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -165,7 +166,7 @@ impl Config {
             ("analytic.cases", self.analytic.cases as f64, 1e6, "at most 1000000"),
             ("anchored.between", self.anchored.between as f64, 1e5, "at most 100000"),
             ("anchored.outside", self.anchored.outside as f64, 1e5, "at most 100000"),
-            ("parts", self.parts as f64, 1e4, "at most 10000"),
+            ("parts", self.parts as f64, MOST_PARTS as f64, "at most 1000"),
             ("batch", self.batch as f64, 1e6, "at most 1000000"),
             ("held_out_batch", self.held_out_batch as f64, 1e6, "at most 1000000"),
             ("epochs", f64::from(self.epochs), 1e7, "at most 10000000"),

@@ -197,9 +197,14 @@ impl Record {
         Ok(())
     }
 
+    /// Where the record of a folder lies.
+    pub fn path(folder: &Path) -> PathBuf {
+        folder.join(RECORD)
+    }
+
     /// Reads the record of a folder.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
-        let path = folder.join(RECORD);
+        let path = Self::path(folder);
         let text =
             fs::read_to_string(&path).map_err(|source| RecordError::Io { path: path.clone(), source })?;
         serde_json::from_str(&text).map_err(|source| RecordError::Json { path, source })

@@ -83,6 +83,11 @@ pub struct Measured {
 }
 
 impl Measured {
+    /// True for a component of the wrench that is held against the prediction where a trial has it.
+    pub fn is_compared(&self, name: &str) -> bool {
+        self.columns.as_ref().is_none_or(|columns| columns.iter().any(|column| column == name))
+    }
+
     fn is_default(&self) -> bool {
         *self == Self::default()
     }

@@ -4,9 +4,10 @@
 //! are finite, time increases, angles are radians and accelerations m/s2 without gravity, as far as that can be told.
 //!
 //! Reading order: `manifest` (`trials.toml`), `table` (a CSV file), `units` (limits, and columns that contradict each
-//! other), `acceleration` (where none was measured), `trial`, `write`.
+//! other), `glitch` (samples that stand alone), `acceleration` (where none was measured), `trial`, `write`.
 
 mod acceleration;
+mod glitch;
 mod manifest;
 mod table;
 mod trial;
@@ -16,6 +17,7 @@ mod write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+pub use glitch::Glitch;
 pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method, component_of};
 pub use table::{Table, csv_text};
 pub use trial::{Gap, SIMULATED, Trial, WHEELS, WRENCH};
@@ -57,6 +59,18 @@ pub enum Fault {
         /// Those in the file.
         present: String,
     },
+    /// Another vehicle than the folder's.
+    #[error(
+        "row {row}, column vehicle: \"{found}\" is not the vehicle of trials.toml, \"{expected}\": put the trials of each vehicle into a folder of their own"
+    )]
+    Vehicle {
+        /// The row.
+        row: u64,
+        /// In the row.
+        found: String,
+        /// In the manifest.
+        expected: String,
+    },
     /// Two columns of one name.
     #[error(
         "column \"{column}\" is there twice, as number {first} and {second}: leave one out or name it otherwise"
@@ -93,6 +107,22 @@ pub enum Fault {
         /// The time of the row before [s].
         before: f64,
     },
+    /// Samples that stand alone, too many to leave them out.
+    #[error(
+        "{count} of {rows} rows stand alone among those around them, the first in row {}, column {} ({}): the recording is damaged; mend it, or take the column out of measured.columns",
+        .first.row, .first.column, .first.value
+    )]
+    Glitches {
+        /// How many.
+        count: usize,
+        /// Rows in the file.
+        rows: usize,
+        /// One of them.
+        first: Glitch,
+    },
+    /// No header.
+    #[error("the file is empty: its first line names the columns")]
+    Empty,
     /// Too few rows.
     #[error("{rows} rows are too few, at least {least} are needed")]
     TooShort {
@@ -279,21 +309,16 @@ pub enum Remark {
         /// Its length [s].
         seconds: f64,
     },
-    /// A measured sample that is far from all others, alone.
+    /// A measured sample that is far from those around it, alone.
     #[error(
-        "{trial}: row {row}, column {column}: {value} stands alone, {ratio:.0} standard deviations from the others: mend it or leave the row out if it is none of a measurement"
+        "{trial}: row {}, column {}: {} stands alone, {:.0} standard deviations from the samples around it, and is left out",
+        .glitch.row, .glitch.column, .glitch.value, .glitch.ratio
     )]
-    Outlier {
+    Glitch {
         /// The trial.
         trial: String,
-        /// The row.
-        row: u64,
-        /// The column.
-        column: &'static str,
-        /// The value.
-        value: f64,
-        /// Its distance from the median over the robust standard deviation.
-        ratio: f64,
+        /// The sample.
+        glitch: Glitch,
     },
     /// Steps that look like another unit of time.
     #[error("{trial}: a step of {step} is long for seconds; is t in another unit?")]

@@ -17,7 +17,12 @@ pub struct Table {
     pub columns: BTreeMap<String, Vec<f64>>,
     /// The columns that nobody asked for.
     pub unknown_columns: Vec<String>,
+    /// What a column `vehicle` says, the only one that holds no numbers; empty without one.
+    pub vehicles: Vec<String>,
 }
+
+/// The column that names the vehicle.
+const VEHICLE: &str = "vehicle";
 
 impl Table {
     /// Reads the columns of a file by name; lines that start with # are comments.
@@ -29,8 +34,13 @@ impl Table {
         let file = std::fs::File::open(path)?;
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
         let headers = reader.headers()?.clone();
+        if headers.is_empty() {
+            return Err(Fault::Empty);
+        }
         check_names(&headers, required)?;
         let known = |name: &str| required.contains(&name) || optional.contains(&name);
+        let vehicle = headers.iter().position(|name| name == VEHICLE);
+        let mut vehicles = Vec::new();
         let (used, unknown): (Vec<_>, Vec<_>) = headers.iter().enumerate().partition(|(_, n)| known(n));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); used.len()];
         let mut rows = Vec::new();
@@ -40,11 +50,13 @@ impl Table {
             for ((index, name), values) in used.iter().zip(&mut values) {
                 values.push(number(row, name, &record[*index])?);
             }
+            vehicles.extend(vehicle.map(|index| record[index].to_owned()));
             rows.push(row);
         }
         let columns = used.into_iter().map(|(_, name)| name.to_owned()).zip(values).collect();
-        let unknown_columns = unknown.into_iter().map(|(_, name)| name.to_owned()).collect();
-        Ok(Self { path: path.to_owned(), rows, columns, unknown_columns })
+        let unknown = unknown.into_iter().map(|(_, name)| name.to_owned());
+        let unknown_columns = unknown.filter(|name| name != VEHICLE).collect();
+        Ok(Self { path: path.to_owned(), rows, columns, unknown_columns, vehicles })
     }
 
     /// A column; empty where the file has none of that name.
@@ -55,6 +67,17 @@ impl Table {
     /// True where the file has the column.
     pub fn has(&self, name: &str) -> bool {
         self.columns.contains_key(name)
+    }
+
+    /// Takes out rows by their places.
+    pub(super) fn leave_out(&mut self, places: &[usize]) {
+        let stays = |at: usize| !places.contains(&at);
+        let mut at = 0..;
+        self.rows.retain(|_| at.next().is_none_or(stays));
+        for values in self.columns.values_mut() {
+            let mut at = 0..;
+            values.retain(|_| at.next().is_none_or(stays));
+        }
     }
 
     /// Refuses a table with fewer rows, or whose column `t` does not increase from row to row.

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::acceleration::{acceleration, derivative};
+use super::glitch::{Glitch, glitches};
 use super::manifest::{Manifest, Measured};
 use super::table::Table;
 use super::units::{check_accelerometer, check_angles, check_limits};
-use super::{Remark, TrialError, stem};
+use super::{Fault, Remark, TrialError, at, stem};
 use crate::condition::{Condition, FRESH_WATER, GroundContact};
 use crate::frame::{Vec3, up_from_roll_pitch};
-use crate::signal::{median, median_step, pieces};
+use crate::signal::{median_step, pieces};
 
 /// Components of a measured wrench.
 pub const WRENCH: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
@@ -26,13 +27,6 @@ const OPTIONAL: [&str; 13] =
 
 /// A median step above this is no second's fraction any more [s].
 const LONG_STEP: f64 = 1.0;
-
-/// A sample stands alone that lies further than this from the median, in robust standard deviations, ...
-const FAR: f64 = 1000.0;
-/// ... while those beside it lie nearer than this share of that: the water's loads last longer than a sample.
-const NEAR: f64 = 0.01;
-/// Fewest samples of which there is a median to speak of.
-const ENOUGH: usize = 20;
 
 /// A hole in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,6 +83,8 @@ pub struct Trial {
     pub unknown_columns: Vec<String>,
     /// Holes in time.
     pub gaps: Vec<Gap>,
+    /// Samples that were left out, since they are none of the water's.
+    pub glitches: Vec<Glitch>,
 }
 
 impl Trial {
@@ -98,13 +94,15 @@ impl Trial {
         let stated = other_forces.iter().chain(known_loads).map(String::as_str);
         let optional: Vec<&str> =
             OPTIONAL.into_iter().chain(WHEELS).chain(WRENCH).chain(SIMULATED).chain(stated).collect();
-        let table = Table::read(path, &REQUIRED, &optional)?;
+        let mut table = Table::read(path, &REQUIRED, &optional)?;
+        check_vehicle(&table, manifest)?;
         check_presence(&table, manifest)?;
         table.check_time(2)?;
         // what contradicts another column is told more precisely than what lies beyond a limit
         check_angles(&table)?;
         check_limits(&table)?;
-        let trial = Self::from_table(&table, manifest);
+        let glitches = without_glitches(&mut table, manifest)?;
+        let trial = Self { glitches, ..Self::from_table(&table, manifest) };
         match vectors(&table, ["ax", "ay", "az"]) {
             Some(measured) => {
                 check_accelerometer(&table, &trial.acceleration)?;
@@ -119,10 +117,6 @@ impl Trial {
         let t = table.column("t").to_vec();
         let column = |name: &str| table.columns.get(name).cloned();
         let or_constant = |name: &str, value: f64| column(name).unwrap_or_else(|| vec![value; t.len()]);
-        let listed = |name: &str| {
-            let columns = manifest.measured.columns.as_ref();
-            columns.is_none_or(|columns| columns.iter().any(|column| column == name))
-        };
         let velocity = vectors(table, ["vx", "vy", "vz"]).unwrap_or_default();
         let angular_velocity = vectors(table, ["wx", "wy", "wz"]).unwrap_or_default();
         let angular_acceleration = vectors(table, ["alx", "aly", "alz"]);
@@ -144,12 +138,13 @@ impl Trial {
             depth: table.column("depth").to_vec(),
             density: or_constant("rho", manifest.fluid_density.unwrap_or(FRESH_WATER)),
             wheel_speeds: WHEELS.map(column),
-            measured: WRENCH.map(|name| column(name).filter(|_| listed(name))),
+            measured: WRENCH.map(|name| column(name).filter(|_| manifest.measured.is_compared(name))),
             simulated: SIMULATED.map(column),
             other_forces: named(&manifest.measured.other_forces),
             known_loads: named(&manifest.measured.known_loads),
             unknown_columns: table.unknown_columns.clone(),
             gaps: gaps(table),
+            glitches: Vec::new(),
             rows: table.rows.clone(),
             t,
         }
@@ -192,15 +187,20 @@ impl Trial {
         let gaps = self.gaps.iter();
         let gaps = gaps.map(|gap| Remark::Gap { trial: trial(), row: gap.row, seconds: gap.seconds });
         let step = median_step(&self.t).filter(|&step| step > LONG_STEP);
-        let outliers = WRENCH.into_iter().zip(&self.measured).filter_map(|(column, values)| {
-            let values = values.as_ref()?;
-            let (sample, ratio) = outlier(values)?;
-            let (row, value) = (*self.rows.get(sample)?, values[sample]);
-            Some(Remark::Outlier { trial: trial(), row, column, value, ratio })
-        });
+        let glitches = self.glitches.iter();
+        let glitches = glitches.map(|glitch| Remark::Glitch { trial: trial(), glitch: *glitch });
         let clock = step.map(|step| Remark::Clock { trial: trial(), step });
-        unknown.chain(gaps).chain(outliers).chain(clock).collect()
+        unknown.chain(gaps).chain(glitches).chain(clock).collect()
     }
+}
+
+/// Refuses rows of another vehicle than the manifest's.
+fn check_vehicle(table: &Table, manifest: &Manifest) -> Result<(), TrialError> {
+    let other = table.vehicles.iter().zip(&table.rows).find(|(name, _)| **name != manifest.vehicle);
+    other.map_or(Ok(()), |(name, row)| {
+        let (row, found, expected) = (*row, name.clone(), manifest.vehicle.clone());
+        Err(at(&table.path)(Fault::Vehicle { row, found, expected }))
+    })
 }
 
 /// Columns that come together, or that the manifest promises.
@@ -226,24 +226,29 @@ fn vectors(table: &Table, names: [&str; 3]) -> Option<Vec<Vec3>> {
     Some(x.iter().zip(y).zip(z).map(|((x, y), z)| Vec3::new(*x, *y, *z)).collect())
 }
 
-/// The sample that lies farthest from the median of those that stand alone, and how many robust standard deviations; `None`
-/// also where most values are the same.
-fn outlier(values: &[f64]) -> Option<(usize, f64)> {
-    if values.len() < ENOUGH {
-        return None;
+/// Leaves out the rows in which a measured component stands alone.
+fn without_glitches(table: &mut Table, manifest: &Manifest) -> Result<Vec<Glitch>, TrialError> {
+    /// Largest share of rows that are left out: where there are more, the recording is at fault, and not a sample.
+    const MOST: f64 = 0.01;
+    let compared = WRENCH.into_iter().filter(|name| table.has(name) && manifest.measured.is_compared(name));
+    let found: Vec<(usize, Glitch)> = compared
+        .flat_map(|column| {
+            let of = |(at, ratio)| {
+                (at, Glitch { row: table.rows[at], column, value: table.column(column)[at], ratio })
+            };
+            glitches(table.column(column)).into_iter().map(of).collect::<Vec<_>>()
+        })
+        .collect();
+    let rows = table.rows.len();
+    match found.first() {
+        Some((_, first)) if found.len() as f64 > f64::max(MOST * rows as f64, 1.0) => {
+            Err(at(&table.path)(Fault::Glitches { count: found.len(), rows, first: *first }))
+        }
+        _ => {
+            table.leave_out(&found.iter().map(|(at, _)| *at).collect::<Vec<_>>());
+            Ok(found.into_iter().map(|(_, glitch)| glitch).collect())
+        }
     }
-    let center = median(&mut values.to_vec())?;
-    let distances: Vec<f64> = values.iter().map(|value| (value - center).abs()).collect();
-    // of a normal distribution, from its median absolute deviation
-    let deviation = 1.4826 * median(&mut distances.clone())?;
-    let is_alone = |at: usize| {
-        let beside = [at.checked_sub(1), Some(at + 1)];
-        let mut beside = beside.into_iter().flatten().filter_map(|at| distances.get(at));
-        beside.all(|distance| *distance < NEAR * distances[at])
-    };
-    let far = (0..values.len()).filter(|&at| deviation > 0.0 && distances[at] > FAR * deviation);
-    let farthest = far.filter(|&at| is_alone(at)).max_by(|&a, &b| distances[a].total_cmp(&distances[b]))?;
-    Some((farthest, distances[farthest] / deviation))
 }
 
 fn gaps(table: &Table) -> Vec<Gap> {

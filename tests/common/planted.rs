@@ -226,6 +226,7 @@ fn trial(name: &str, motion: &[State], added: &[[f64; 6]], noise: &Noise, random
         other_forces: BTreeMap::new(),
         known_loads: BTreeMap::new(),
         unknown_columns: Vec::new(),
+        glitches: Vec::new(),
         gaps: Vec::new(),
     }
 }
