@@ -309,6 +309,7 @@ fn a_run_that_is_too_short_is_named() {
     let expected =
         "surface `wheel_fr`: 3.4000 s to 3.5000 s is wanted and the history covers 1.9000 s to 3.4000 s";
     assert!(error.contains("warthog-head-on") && error.contains(expected), "{error}");
+    assert!(error.contains(FORCE.rsplit_once('/').expect("a file").1), "the file that ends there: {error}");
 }
 
 #[test]

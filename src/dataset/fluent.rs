@@ -116,8 +116,9 @@ impl Reports {
         Ok(Self { folder: folder.to_owned(), columns })
     }
 
-    /// The history of a column; where several files hold it, the one that begins later counts from there on.
-    pub fn column(&self, name: &str) -> Result<History<1>, FluentError> {
+    /// The history of a column and the file with its end; where several files hold it, the one that begins later counts from there
+    /// on.
+    pub fn column(&self, name: &str) -> Result<(History<1>, &Path), FluentError> {
         let Some([first, later @ ..]) = self.columns.get(name).map(Vec::as_slice) else {
             let (path, found) = (self.folder.clone(), self.columns.keys().cloned().collect());
             return Err(FluentError::MissingColumn { path, column: name.to_owned(), found });
@@ -131,7 +132,7 @@ impl Reports {
             }
             history.overlay(part.history.clone(), start);
         }
-        Ok(history)
+        Ok((history, &later.last().unwrap_or(first).path))
     }
 }
 
@@ -206,7 +207,7 @@ mod tests {
     fn columns_are_found_by_name_across_files() {
         let found =
             reports(&[&file("front drag", "1 -5 0.1\n2 -6 0.2\n"), &file("lift", "1 7 0.1\n")]).unwrap();
-        let drag = found.column("front drag").unwrap();
+        let (drag, _) = found.column("front drag").unwrap();
         assert_eq!((drag.times(), drag.values()), (&[0.1, 0.2][..], &[[-5.0], [-6.0]][..]));
         let error = found.column("side").unwrap_err().to_string();
         assert!(error.contains("column side") && error.contains("front drag, lift"), "{error}");
@@ -215,16 +216,16 @@ mod tests {
     #[test]
     fn a_run_started_again_goes_on_in_the_same_file_or_in_another() {
         let again = file("drag", "1 1 0.1\n2 2 0.2\n3 3 0.3\n2 20 0.2\n3 30 0.3\n");
-        assert_eq!(reports(&[&again]).unwrap().column("drag").unwrap().values(), [[1.0], [20.0], [30.0]]);
+        assert_eq!(reports(&[&again]).unwrap().column("drag").unwrap().0.values(), [[1.0], [20.0], [30.0]]);
         let (first, second) = (file("drag", "2 20 0.2\n3 30 0.3\n"), file("drag", "1 1 0.1\n2 2 0.2\n"));
         let joined = reports(&[&first, &second]).unwrap();
-        assert_eq!(joined.column("drag").unwrap().values(), [[1.0], [20.0], [30.0]]);
+        assert_eq!(joined.column("drag").unwrap().0.values(), [[1.0], [20.0], [30.0]]);
     }
 
     #[test]
     fn two_files_that_contradict_each_other_are_refused() {
         let (one, other) = (file("drag", "1 1 0.1\n"), file("drag", "1 2 0.1\n"));
-        let drag = |files: &[&str]| reports(files).unwrap().column("drag");
+        let drag = |files: &[&str]| reports(files).unwrap().column("drag").map(|(history, _)| history);
         assert!(drag(&[&one, &one]).is_ok(), "the same column in two report files");
         assert!(matches!(drag(&[&one, &other]), Err(FluentError::Ambiguous { .. })));
     }

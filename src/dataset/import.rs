@@ -134,7 +134,7 @@ pub enum ImportError {
     /// A history without the sections asked for.
     #[error("{}, surface `{surface}`: {fault}", .path.display())]
     Sections {
-        /// The folder of the case.
+        /// The file that holds the end of the history.
         path: PathBuf,
         /// The surface.
         surface: String,
@@ -322,14 +322,15 @@ impl Import {
         if history.moment.is_some() && history.about.is_none() {
             return Err(ImportError::MomentCenter { path: output, surface: surface.to_owned() });
         }
-        let means = |history: &History<3>| {
-            let means = take.from(history).map_err(|fault| sections_error(folder, surface, fault))?;
+        let means = |history: &History<3>, file: &Path| {
+            let means = take.from(history).map_err(|fault| sections_error(file, surface, fault))?;
             Ok::<_, ImportError>(means.into_iter().map(Vec3::from).collect::<Vec<_>>())
         };
+        let moments = history.moment.as_ref().zip(history.moment_file.as_ref());
         Ok(Taken {
-            force: means(&history.force)?,
-            viscous: Some(means(&history.viscous)?),
-            moment: history.moment.as_ref().map(means).transpose()?,
+            force: means(&history.force, &history.force_file)?,
+            viscous: Some(means(&history.viscous, &history.force_file)?),
+            moment: moments.map(|(moment, file)| means(moment, file)).transpose()?,
             about: history.about.unwrap_or_else(Vec3::zeros),
         })
     }
@@ -359,8 +360,8 @@ fn fluent(
         let pattern = pattern.replace("{surface}", case.name_in_solver(surface));
         let mut components = Vec::new();
         for axis in ["x", "y", "z"] {
-            let history = reports.column(&pattern.replace("{axis}", axis))?;
-            components.push(take.from(&history).map_err(|fault| sections_error(folder, surface, fault))?);
+            let (history, file) = reports.column(&pattern.replace("{axis}", axis))?;
+            components.push(take.from(&history).map_err(|fault| sections_error(file, surface, fault))?);
         }
         let vector = |i: usize| Vec3::new(components[0][i][0], components[1][i][0], components[2][i][0]);
         Ok::<_, ImportError>((0..components[0].len()).map(vector).collect::<Vec<_>>())
@@ -373,8 +374,8 @@ fn fluent(
     })
 }
 
-fn sections_error(folder: &Path, surface: &str, fault: HistoryError) -> ImportError {
-    ImportError::Sections { path: folder.to_owned(), surface: surface.to_owned(), fault }
+fn sections_error(file: &Path, surface: &str, fault: HistoryError) -> ImportError {
+    ImportError::Sections { path: file.to_owned(), surface: surface.to_owned(), fault }
 }
 
 /// The sub-folders by name; files and hidden folders beside them are no cases.

@@ -24,6 +24,10 @@ pub struct SurfaceHistory {
     pub moment: Option<History<3>>,
     /// The point that the moment is taken about [m]; `None` where no header states it.
     pub about: Option<Vec3>,
+    /// The file with the last forces.
+    pub force_file: PathBuf,
+    /// The file with the last moments.
+    pub moment_file: Option<PathBuf>,
 }
 
 /// Why the output of a function object was refused.
@@ -112,8 +116,10 @@ pub fn read(folder: &Path, cut_off: CutOff) -> Result<SurfaceHistory, OpenFoamEr
     Ok(SurfaceHistory {
         // one function object writes both, about one point
         about: moments.as_ref().and_then(|moments| moments.about).or(forces.about),
+        force_file: forces.path,
         force: forces.total,
         viscous: forces.viscous,
+        moment_file: moments.as_ref().map(|moments| moments.path.clone()),
         moment: moments.map(|moments| moments.total),
     })
 }
@@ -134,6 +140,7 @@ fn join(to: &mut Option<Loads>, later: Loads, since: f64) -> Result<(), OpenFoam
             return Err(OpenFoamError::MomentCenter { path: later.path });
         }
         Some(loads) => {
+            loads.path = later.path;
             loads.total.overlay(later.total, since);
             loads.viscous.overlay(later.viscous, since);
         }

@@ -89,6 +89,7 @@ pub(super) fn compose(
     let mut said: Vec<String> = trials.remarks().iter().map(ToString::to_string).collect();
     said.extend(outside(all));
     said.extend(remarks(&effects));
+    said.extend(unpublished(&effects));
     let unexplained = unexplained(judge, &found, disproof);
     let gap = GapReport {
         held_out,
@@ -123,6 +124,20 @@ pub(super) fn compose(
     };
     report.summary = summary(&report, found.gated);
     report
+}
+
+/// Values of which not even the interval reaches into the band of what is published.
+fn unpublished(effects: &[NamedEffect]) -> Vec<String> {
+    let all = effects.iter().flat_map(|effect| effect.parameters.iter().map(move |of| (effect, of)));
+    let beyond = all.filter_map(|(effect, (name, p))| {
+        let [low, high] = p.literature.filter(|[low, high]| p.interval[0] > *high || p.interval[1] < *low)?;
+        let of = effect.name.replace('_', " ");
+        Some(format!(
+            "{name} of {of} is {:.3} ({:.3} to {:.3}), beyond what is published of it, {low} to {high}: another law may be at work",
+            p.value, p.interval[0], p.interval[1]
+        ))
+    });
+    beyond.collect()
 }
 
 /// The trials in which the model answers for states that it did not learn.
