@@ -3,10 +3,10 @@
 /// The median, the mean of the middle two of an even count; `None` of nothing. Sorts no more of the values than it must.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
-    let is_even = values.len().is_multiple_of(2);
     if values.is_empty() {
         return None;
     }
+    let is_even = values.len().is_multiple_of(2);
     let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| is_even);
     Some(lower.map_or(*upper, |lower| 0.5 * (lower + *upper)))
