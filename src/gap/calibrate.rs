@@ -2,7 +2,7 @@
 //!
 //! A law in proportion to a rate that was differentiated from a noisy motion comes out too small, since part of the rate is
 //! noise, and trials that hold noise alone weigh as much as those that move. Each rate of each trial is therefore scaled by
-//! `E[true x recorded] / E[recorded^2]` of what goes into the regression, means of bins after its passes of smoothing
+//! `E[true x recorded] / E[recorded^2]` of what goes into the regression, means of smoothed bins
 //! (regression calibration; Carroll, Ruppert, Stefanski, Crainiceanu, Measurement Error in Nonlinear Models, chapter 4), so
 //! that what is left is as large as the true rate where that can be said, and 0 where it cannot.
 //!
@@ -12,9 +12,9 @@
 use std::cell::OnceCell;
 use std::ops::Range;
 
-use super::design::smooth as passes;
 use super::rates::{Autocovariance, mean_square, mean_step, set_rate, smooth, window};
 use super::series::Series;
+use super::smoothing::{LENGTHS, Smoothing, bins, half, running_mean, samples_of_bin};
 use super::statistics::median;
 use crate::signal::SavitzkyGolay;
 
@@ -30,20 +30,28 @@ const AS_MUCH: f64 = 0.95;
 const MORE: f64 = 1.2;
 /// Most that smoothing can have taken off.
 const MOST: f64 = 1.5;
-/// Length of a stretch that may be quiet [s], and as much more for a pass, which makes noise last longer.
-const STRETCH: [f64; 2] = [0.5, 0.17];
+/// Length of a stretch that may be quiet [s], and as many lengths of a running mean more, which makes noise last longer.
+const STRETCH: [f64; 2] = [0.5, 2.0];
+/// Share of noise in a rate, where trials move, that rows may have.
+const SMALL: f64 = 0.2;
 /// Mean square of the bins at the ends over that of the others from which on filters have made the ends.
 const ENDS: f64 = 4.0;
 
-/// Calibrates the rates of all trials for a regression that smooths its rows by so many passes.
-pub(super) fn calibrate(all: &mut [Series], times: usize) {
+/// Calibrates the rates of all trials and says by how much rows are smoothed: each component as little as leaves a small share
+/// of noise in its rate.
+pub(super) fn calibrate(all: &mut [Series]) -> Smoothing {
     all.iter_mut().for_each(|series| series.calibrated.clone_from(&series.conditions));
+    let mut smoothing = Smoothing::default();
     for rate in 0..6 {
         let ends = !ends_are_noise(all, rate);
-        let form = |series: &Series| WINDOWS.map(|window| Form::new(series, rate, window, times, ends));
-        let forms: Vec<[Form; 3]> = all.iter().map(form).collect();
-        let signals = vec![OnceCell::new(); all.len()];
-        let noise = [0, 1, 2].map(|form| noise(all, &forms, &signals, form, times));
+        let tried = |&length: &f64| Tried::new(all, rate, length, ends);
+        let mut tried: Vec<Tried> = LENGTHS.iter().map(tried).collect();
+        let chosen = tried.iter().position(|tried| tried.share < SMALL).unwrap_or_else(|| {
+            let least = |a: &usize, b: &usize| tried[*a].share.total_cmp(&tried[*b].share);
+            (0..tried.len()).min_by(least).unwrap_or_default()
+        });
+        let Tried { length, forms, noise, .. } = tried.swap_remove(chosen);
+        smoothing.0[rate] = length;
         for (series, forms) in all.iter_mut().zip(&forms) {
             let factors = forms.iter().zip(noise).map(|(form, noise)| (form, form.factor(noise)));
             let kept = |(form, factor): &(&Form, f64)| factor * factor * form.square;
@@ -54,12 +62,36 @@ pub(super) fn calibrate(all: &mut [Series], times: usize) {
             };
             let mut values: Vec<f64> = form.values.iter().map(|value| value * factor).collect();
             let bursts = bursts(series, &forms[0], noise[0]);
-            if mean_square(&bins_of(series, &bursts, times)) > MORE * kept(&(form, factor)) {
+            if mean_square(&bins(series, length, |i| bursts[i])) > MORE * kept(&(form, factor)) {
                 values = bursts;
             }
             let conditions = series.calibrated.iter_mut().zip(values);
             conditions.for_each(|(condition, value)| set_rate(condition, rate, value));
         }
+    }
+    smoothing
+}
+
+/// A rate of all trials for rows that are smoothed over some length.
+struct Tried {
+    length: f64,
+    forms: Vec<[Form; 3]>,
+    /// Mean product of noise alone, by form.
+    noise: [f64; 3],
+    /// Share of noise in the record of the trials that move; without end where none does.
+    share: f64,
+}
+
+impl Tried {
+    fn new(all: &[Series], rate: usize, length: f64, ends: bool) -> Self {
+        let form = |series: &Series| WINDOWS.map(|window| Form::new(series, rate, window, length, ends));
+        let forms: Vec<[Form; 3]> = all.iter().map(form).collect();
+        let signals = vec![OnceCell::new(); all.len()];
+        let noise = [0, 1, 2].map(|form| noise(all, &forms, &signals, form, length));
+        let records = forms.iter().map(|forms| forms[0].product);
+        let moving: Vec<f64> = records.filter(|product| *product > MOVING * noise[0]).collect();
+        let share = noise[0] * moving.len() as f64 / moving.iter().sum::<f64>();
+        Self { length, forms, noise, share: if moving.is_empty() { f64::INFINITY } else { share } }
     }
 }
 
@@ -78,19 +110,19 @@ struct Form {
 }
 
 impl Form {
-    fn new(series: &Series, rate: usize, length: Option<f64>, times: usize, ends: bool) -> Self {
+    fn new(series: &Series, rate: usize, window: Option<f64>, length: f64, ends: bool) -> Self {
         let mut recorded: Vec<f64> = series.recorded_rates.iter().map(|rates| rates[rate]).collect();
         for bin in series.runs.iter().flat_map(|run| [run.start, run.end - 1]).filter(|_| !ends) {
             recorded[series.bins[bin].clone()].fill(0.0);
         }
         let mut values = recorded.clone();
-        if let Some(length) = length {
-            series.pieces().for_each(|piece| smooth(&series.t, &mut values, piece, length));
+        if let Some(window) = window {
+            series.pieces().for_each(|piece| smooth(&series.t, &mut values, piece, window));
         }
-        let (bins, own) = (bins_of(series, &recorded, times), bins_of(series, &values, times));
+        let (bins, own) = (bins(series, length, |i| recorded[i]), bins(series, length, |i| values[i]));
         let products: Vec<f64> = bins.iter().zip(&own).map(|(a, b)| a * b).collect();
         let step = series.bin_step();
-        let stretch = STRETCH[0] + STRETCH[1] * times as f64;
+        let stretch = STRETCH[0] + STRETCH[1] * length;
         let stretch = (stretch / step.max(1e-6)).round().max(3.0) as usize;
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         let runs = series.runs.iter().flat_map(|run| products[run.clone()].chunks_exact(stretch));
@@ -132,7 +164,7 @@ fn noise(
     forms: &[[Form; 3]],
     signals: &[OnceCell<Autocovariance>],
     form: usize,
-    times: usize,
+    length: f64,
 ) -> f64 {
     /// Share of the median trial's product below which a stretch is quiet.
     const QUIET: f64 = 0.25;
@@ -143,8 +175,8 @@ fn noise(
     }
     let of = |(trial, series): (usize, &Series)| {
         let recorded = &forms[trial][0].values;
-        let signal = signals[trial].get_or_init(|| signal(series, recorded, times));
-        forms[trial][form].product - lasting(series, signal, WINDOWS[form], times)
+        let signal = signals[trial].get_or_init(|| signal(series, recorded, length));
+        forms[trial][form].product - lasting(series, signal, WINDOWS[form], length)
     };
     quiet.min(at_most(all.iter().enumerate().map(of).collect()))
 }
@@ -190,53 +222,35 @@ fn bursts(series: &Series, record: &Form, noise: f64) -> Vec<f64> {
     scaled
 }
 
-/// Means of bins after the passes.
-fn bins_of(series: &Series, values: &[f64], times: usize) -> Vec<f64> {
-    let mut bins = series.binned(|i| values[i]);
-    series.runs.iter().for_each(|run| passes(&mut bins[run.clone()], times));
-    bins
-}
-
 /// The signal in a record, as far as any of the forms reaches.
-fn signal(series: &Series, recorded: &[f64], times: usize) -> Autocovariance {
+fn signal(series: &Series, recorded: &[f64], length: f64) -> Autocovariance {
     let pieces: Vec<Range<usize>> = series.pieces().collect();
-    let longest = WINDOWS.map(|length| both_ways(series, length, times)).into_iter().max();
+    let longest = WINDOWS.map(|window| both_ways(series, window, length)).into_iter().max();
     Autocovariance::new(mean_step(&series.t), &pieces, recorded, longest.unwrap_or_default())
 }
 
-/// Samples of a bin.
-fn samples_of(series: &Series) -> usize {
-    (series.bin_step() / mean_step(&series.t).max(1e-6)).round().max(1.0) as usize
-}
-
 /// Samples of a window over which a record is smoothed.
-fn window_of(series: &Series, length: Option<f64>) -> usize {
-    length.map_or(1, |length| window(length, mean_step(&series.t)))
+fn window_of(series: &Series, window_s: Option<f64>) -> usize {
+    window_s.map_or(1, |window_s| window(window_s, mean_step(&series.t)))
 }
 
-/// Samples that bins after their passes reach to either side, and the window beyond.
-fn both_ways(series: &Series, length: Option<f64>, times: usize) -> usize {
-    samples_of(series) * (2 * times + 1) + window_of(series, length) / 2
+/// Samples that the product of two smoothed bins reaches to either side, and the window beyond.
+fn both_ways(series: &Series, window: Option<f64>, length: f64) -> usize {
+    samples_of_bin(series) + 4 * half(length, mean_step(&series.t)) + window_of(series, window) / 2
 }
 
 /// Mean product of what the signal and the signal smoothed over a window become.
-fn lasting(series: &Series, signal: &Autocovariance, length: Option<f64>, times: usize) -> f64 {
-    let (samples, window) = (samples_of(series), window_of(series, length));
-    let both_ways = both_ways(series, length, times);
-    let mut covariances: Vec<f64> = (0..=2 * both_ways).map(|i| signal.at(i.abs_diff(both_ways))).collect();
-    if let Ok(smoothed) = SavitzkyGolay::new(window, 2).and_then(|filter| filter.smooth(&covariances)) {
+fn lasting(series: &Series, signal: &Autocovariance, window: Option<f64>, length: f64) -> f64 {
+    let samples = samples_of_bin(series);
+    let middle = both_ways(series, window, length);
+    let mut covariances: Vec<f64> = (0..=2 * middle).map(|i| signal.at(i.abs_diff(middle))).collect();
+    let filter = SavitzkyGolay::new(window_of(series, window), 2);
+    if let Ok(smoothed) = filter.and_then(|filter| filter.smooth(&covariances)) {
         covariances = smoothed;
     }
-    // of the means of two bins, so many bins apart
-    let of_bins = |apart: usize| -> f64 {
-        let pair = |(i, j): (usize, usize)| covariances[both_ways + apart * samples + i - j];
-        let pairs = (0..samples).flat_map(|i| (0..samples).map(move |j| (i, j)));
-        pairs.map(pair).sum::<f64>() / (samples * samples) as f64
-    };
-    // passes over both are twice the passes over one, and a pass is a binomial distribution over bins
-    let mut weights = vec![0.0; 4 * times + 3];
-    let middle = weights.len() / 2;
-    weights[middle] = 1.0;
-    passes(&mut weights, 2 * times);
-    weights.iter().enumerate().map(|(i, weight)| weight * of_bins(i.abs_diff(middle).min(2 * times))).sum()
+    // two running means over both are four over one
+    let half = half(length, mean_step(&series.t));
+    (0..4).for_each(|_| running_mean(&mut covariances, half));
+    let pairs = (0..samples).flat_map(|i| (0..samples).map(move |j| (i, j)));
+    pairs.map(|(i, j)| covariances[middle + i - j]).sum::<f64>() / (samples * samples) as f64
 }

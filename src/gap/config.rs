@@ -57,7 +57,7 @@ impl Default for Config {
             least_trials: 4,
             significance: 1e-6,
             share_of_remaining: 0.1,
-            share_of_gap: 0.02,
+            share_of_gap: 0.01,
             relevance: 0.08,
             most_effects: 4,
             placebos: 20,

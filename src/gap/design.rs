@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use super::Config;
 use super::candidates::{Column, Setting, columns};
 use super::series::Series;
+use super::smoothing::Smoothing;
 use super::split::folds;
 use crate::effects::{Effect, Shape};
 
@@ -33,8 +34,8 @@ pub(super) struct RowNoise {
     pub offset: [f64; 6],
     /// Standard deviation that the model states of itself, by trial and component; 0 where it states none.
     pub model: Vec<[f64; 6]>,
-    /// Half width of the smoothing over bins; 0 for none.
-    pub smoothing: usize,
+    /// Smoothing of the rows.
+    pub smoothing: Smoothing,
 }
 
 /// Where a row stands.
@@ -118,14 +119,11 @@ pub(super) fn to_rows(
     for &trial in trials {
         let series = &all[trial];
         let column = of(trial);
-        let pace = noise.model[trial].iter().any(|std| *std > 0.0).then(|| pace(series, noise.smoothing));
+        let pace = noise.model[trial].iter().any(|std| *std > 0.0).then(|| pace(series));
         let by_component: Vec<Vec<f64>> = components
             .iter()
             .map(|&component| {
-                let mut values = series.binned(|sample| column[sample][component]);
-                for run in &series.runs {
-                    smooth(&mut values[run.clone()], noise.smoothing);
-                }
+                let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
                 let bin = noise.bin[component];
                 let model = noise.model[trial][component] / bin;
                 let zero = (noise.offset[component] / bin).hypot(model);
@@ -166,32 +164,11 @@ fn whiten(values: &mut [f64], pace: &[f64], [zero, paced]: [f64; 2]) {
 }
 
 /// The square of the speed through the water of each bin, of mean square 1.
-fn pace(series: &Series, smoothing: usize) -> Vec<f64> {
+fn pace(series: &Series) -> Vec<f64> {
     let mut pace = series.binned(|i| series.conditions[i].velocity.norm_squared());
-    for run in &series.runs {
-        smooth(&mut pace[run.clone()], smoothing);
-    }
     let size = (pace.iter().map(|p| p * p).sum::<f64>() / pace.len().max(1) as f64).sqrt();
     pace.iter_mut().for_each(|p| *p /= size.max(f64::MIN_POSITIVE));
     pace
-}
-
-/// `[1 2 1] / 4`, `times` times; the ends stay.
-pub(super) fn smooth(values: &mut [f64], times: usize) {
-    let count = values.len();
-    for _ in 0..times {
-        let mut before = values[0];
-        for i in 1..count.saturating_sub(1) {
-            let here = values[i];
-            values[i] = 0.25 * (before + 2.0 * here + values[i + 1]);
-            before = here;
-        }
-    }
-}
-
-/// Share of its variance that white noise keeps: `C(4m, 2m) / 16^m` after `m` passes, about `1 / sqrt(2 pi m)`.
-pub(super) fn white_kept(times: usize) -> f64 {
-    if times == 0 { 1.0 } else { (std::f64::consts::TAU * times as f64).sqrt().recip() }
 }
 
 /// Sums of products over the rows of one fold.
@@ -214,6 +191,8 @@ pub(super) struct Design {
     pub scale: Vec<f64>,
     pub candidates: Vec<Candidate>,
     pub block_fold: Vec<usize>,
+    /// Bins beyond which the noise of a row has forgotten itself, by component.
+    pub reach: [usize; 6],
     folds: Vec<Fold>,
     total: Fold,
 }
@@ -249,6 +228,7 @@ impl Design {
         let block_fold = folds(all, &rows, config);
         let mut this = Self {
             x: DMatrix::zeros(rows.rows.len(), 0),
+            reach: noise.smoothing.reach(config.bin_s),
             trials,
             noise,
             y,
@@ -321,7 +301,7 @@ impl Design {
         setting: &Setting,
         of: &dyn Fn(usize) -> Column,
     ) -> DVector<f64> {
-        let noise = RowNoise { smoothing: 0, ..self.noise.clone() };
+        let noise = RowNoise { smoothing: Smoothing::default(), ..self.noise.clone() };
         DVector::from_vec(to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of))
     }
 

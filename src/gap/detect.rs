@@ -7,8 +7,10 @@ use serde::Serialize;
 
 use super::candidates::{Column, Setting, columns, unavailable};
 use super::design::Design;
+use super::rates::mean_square;
 use super::robust::errors;
 use super::series::Series;
+use super::smoothing::bins;
 use super::statistics::{median, quantile, white_variance};
 use super::{Config, Named, noise::Floor};
 use crate::effects::Effect;
@@ -180,6 +182,9 @@ fn mean_bin(design: &Design, setting: &Setting) -> f64 {
     median(&mut sizes)
 }
 
+/// Length of the running means after which a column is looked at trial by trial [s].
+const EVEN: f64 = 0.25;
+
 /// Share of signal, not noise of the kinematics, in the bins of a column, and the number of trials that excite it.
 fn signal(
     raw: &[Vec<Column>],
@@ -192,15 +197,14 @@ fn signal(
     let mut by_trial = vec![0.0; all.len()];
     for (trial, series) in all.iter().enumerate() {
         for &component in &setting.components {
-            let values = series.binned(|sample| raw[trial][coefficient][sample][component]);
+            let value = |sample: usize| raw[trial][coefficient][sample][component];
+            let (values, smooth) = (series.binned(value), bins(series, EVEN, value));
             let weight = design.noise.bin[component].powi(-2);
             for run in series.runs.iter().filter(|run| run.len() >= 6) {
-                let mut values = values[run.clone()].to_vec();
-                noise += weight * white_variance(&values) * values.len() as f64;
-                let energy = weight * values.iter().map(|v| v * v).sum::<f64>();
-                total += energy;
-                super::design::smooth(&mut values, 2);
-                by_trial[trial] += weight * values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
+                let values = &values[run.clone()];
+                noise += weight * white_variance(values) * values.len() as f64;
+                total += weight * values.iter().map(|v| v * v).sum::<f64>();
+                by_trial[trial] += weight * mean_square(&smooth[run.clone()]);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::design::{Design, white_kept};
+use super::design::Design;
 use super::rates::mean_square;
 use super::series::Series;
 use super::statistics::white_variance;
@@ -96,12 +96,15 @@ pub(super) fn energy(
         smooth.push(target[row]);
         rough.push(unsmoothed[row]);
     }
-    let kept = white_kept(design.noise.smoothing);
-    let of = |[smooth, rough]: &[Vec<f64>; 2]| (mean_square(smooth) - kept * white_variance(rough)).min(1e6);
-    let excess: Vec<f64> = series
-        .iter()
-        .map(|components| components.iter().filter(|[values, _]| values.len() >= 6).map(of).sum())
-        .collect();
+    let kept: [f64; 6] =
+        std::array::from_fn(|component| design.noise.smoothing.white_kept(&all[design.trials[0]], component));
+    let of = |([smooth, rough], kept): (&[Vec<f64>; 2], f64)| {
+        (mean_square(smooth) - kept * white_variance(rough)).min(1e6)
+    };
+    let of_block = |components: &[[Vec<f64>; 2]; 6]| {
+        components.iter().zip(kept).filter(|([values, _], _)| values.len() >= 6).map(of).sum()
+    };
+    let excess: Vec<f64> = series.iter().map(of_block).collect();
     let features: Vec<Vec<Features>> = all.iter().map(of_bins).collect();
     let of_feature = |index: usize| {
         let values: Vec<f64> = (0..blocks)

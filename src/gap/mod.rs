@@ -40,6 +40,7 @@ mod run;
 mod select;
 mod series;
 mod shared;
+mod smoothing;
 mod split;
 mod statistics;
 mod verdict;

@@ -3,9 +3,10 @@
 //! From repeats, where there are any; else from the part of the gap that changes within a tenth of a second; never below the
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
-use super::design::{RowNoise, smooth, white_kept};
+use super::design::RowNoise;
 use super::rates::mean_step;
 use super::series::Series;
+use super::smoothing::Smoothing;
 use super::statistics::{median, noise_variance, white_variance};
 use crate::signal::interpolate;
 use crate::trials::{Manifest, WRENCH};
@@ -155,7 +156,7 @@ pub(super) fn row_noise(
     trials: &[usize],
     components: &[usize],
     floors: &[Floor; 6],
-    smoothing: usize,
+    smoothing: Smoothing,
 ) -> RowNoise {
     let model = all.iter().map(|series| model_error(std::slice::from_ref(&series))).collect();
     let mut noise = RowNoise { bin: [1.0; 6], offset: [0.0; 6], model, smoothing };
@@ -186,29 +187,4 @@ fn rms(all: &[Series], trials: &[usize], component: usize) -> f64 {
     let squares = trials.iter().flat_map(|&t| all[t].gap.iter().map(|gap| gap[component].powi(2)));
     let count = trials.iter().map(|&t| all[t].t.len()).sum::<usize>().max(1);
     (squares.sum::<f64>() / count as f64).sqrt()
-}
-
-/// Passes of smoothing over bins after which the noise of the acceleration is a small share of it; the same smoothing goes
-/// over the gap and every column, so that none is favored.
-pub(super) fn smoothing(all: &[Series], trials: &[usize]) -> usize {
-    const MOST: usize = 6;
-    const SMALL: f64 = 0.03;
-    (0..MOST).find(|&passes| acceleration_noise(all, trials, passes) < SMALL).unwrap_or(MOST)
-}
-
-/// Share of noise in the variance of the forward acceleration's bins after some passes.
-fn acceleration_noise(all: &[Series], trials: &[usize], passes: usize) -> f64 {
-    let (mut noise, mut total) = (0.0, 0.0);
-    for &trial in trials {
-        let series = &all[trial];
-        let values = series.binned(|sample| series.calibrated[sample].acceleration.x);
-        for run in series.runs.iter().filter(|run| run.len() >= 8) {
-            let raw = white_variance(&values[run.clone()]);
-            let mut smoothed = values[run.clone()].to_vec();
-            smooth(&mut smoothed, passes);
-            noise += raw * white_kept(passes) * run.len() as f64;
-            total += smoothed.iter().map(|v| v * v).sum::<f64>();
-        }
-    }
-    if total > 0.0 { noise / total } else { 0.0 }
 }

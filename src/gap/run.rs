@@ -7,7 +7,7 @@ use super::compose::compose;
 use super::design::{Design, Rows};
 use super::general::General;
 use super::judge::Judge;
-use super::noise::{floors, row_noise, smoothing};
+use super::noise::{floors, row_noise};
 use super::nonlinear::{refine, settle, through_sensors};
 use super::plausible;
 use super::report::Report;
@@ -80,11 +80,8 @@ pub fn run(
         let (blocks, block_s, folds) = (rows.blocks, config.block_s, config.folds);
         return Err(GapError::TooShort { blocks, block_s, folds });
     }
-    // how much is noise is asked of trials that move
-    calibrate(&mut all, 0);
-    let passes = smoothing(&all, &naming);
-    calibrate(&mut all, passes);
-    let noise = row_noise(&all, &naming, &setting.components, &floors, passes);
+    let smoothing = calibrate(&mut all);
+    let noise = row_noise(&all, &naming, &setting.components, &floors, smoothing);
     let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
     settle(&mut design, &all, &setting);
     let general = General::new(&all, &design, &setting.components);

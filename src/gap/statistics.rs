@@ -26,6 +26,17 @@ pub(super) fn white_variance(values: &[f64]) -> f64 {
     squares.sum::<f64>() / (20.0 * (values.len() - 3) as f64)
 }
 
+/// The same from the median of the squares, which bursts of the signal do not reach as long as they are seldom.
+pub(super) fn quiet_white_variance(values: &[f64]) -> f64 {
+    /// Median of the square of a normal variable.
+    const MEDIAN: f64 = 0.454_936;
+    if values.len() < 4 {
+        return 0.0;
+    }
+    let squares = values.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).powi(2));
+    median(&mut squares.collect::<Vec<_>>()) / (20.0 * MEDIAN)
+}
+
 /// Variance of noise on an otherwise smooth signal, be it colored down to `2^scales` samples: motion that is filtered before
 /// something is predicted from it leaves noise in which neighbors agree, and [`white_variance`] hardly sees that.
 ///
@@ -112,6 +123,19 @@ mod tests {
             .collect();
         assert!((white_variance(&values).sqrt() - 2.0).abs() < 0.1);
         assert!((noise_variance(&values, 3).sqrt() - 2.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn seldom_bursts_are_no_noise() {
+        let mut random = crate::random::Random::new(4);
+        let burst = |i: usize| if i % 50 < 2 { 20.0 } else { 0.0 };
+        let values: Vec<f64> = (0..4000).map(|i| burst(i) + 12_f64.sqrt() * (random.unit() - 0.5)).collect();
+        assert!(
+            (quiet_white_variance(&values).sqrt() - 1.0).abs() < 0.2,
+            "{}",
+            quiet_white_variance(&values)
+        );
+        assert!(white_variance(&values).sqrt() > 3.0);
     }
 
     #[test]
