@@ -9,7 +9,8 @@
 //!
 //! `A_s` is the share of the surface's area that its height has below the head of the stream, `U^2 / 2g` above still water:
 //! a fast bow wave climbs a front that stands in the water by a centimeter, and would be a remainder without bound on
-//! the wet area alone. It rises from zero over the first centimeters of still water on the surface.
+//! the wet area alone. It rises from zero over the first centimeters of still water on the surface. What the network is told
+//! of the wet part is of the soaked area, which does not step where the water reaches a level underside.
 //!
 //! Left and right: what is told of a surface on one side is told in terms of that side (toward it is positive), and of a
 //! surface on the plane of symmetry only what does not change under reflection, with lateral answers multiplied by
@@ -27,7 +28,7 @@ use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
 /// What the network's answer is a remainder of: weights that were taught beside another are of no use here.
-pub const BASE: &str = "archimedes + windward drag";
+pub const BASE: &str = "archimedes + windward drag of the soaked part";
 
 /// Names of what is told of a state, in order.
 pub const GLOBAL_NAMES: [&str; 11] = [
@@ -153,7 +154,7 @@ pub struct Reading {
 pub struct SurfaceReading {
     /// Share under water.
     pub wet_fraction: f64,
-    /// Centroid of the wet part [m]; of the whole surface where it is dry.
+    /// Centroid of the soaked part [m]; of the whole surface where it is dry.
     pub center: Vec3,
     /// Load of still water about the body origin [N, N m].
     pub hydrostatic: Wrench,
@@ -313,11 +314,14 @@ impl Anchor {
             (vehicle.dimensions.length, vehicle.dimensions.width, vehicle.dimensions.height);
         let plane = condition.water_plane(vehicle.z0);
         let Bounds { min, max } = surface.bounds;
+        // of next to nothing it is the quotient of two roundings
+        let center = center.sup(&min).inf(&max);
         // the water level in the body frame where the surface is; a vehicle on its side has none
         let level = center.z + plane.depth_below(&center) / plane.normal.z.max(0.1);
         let top = max.z.min(level.max(min.z));
         let wet = Vec3::new(max.x - min.x, max.y - min.y, top - min.z);
-        let fraction = (wetting.area / surface.area).min(1.0);
+        let wet_fraction = (wetting.area / surface.area).min(1.0);
+        let fraction = (wetting.soaked_area / surface.area).min(1.0);
         let weight = density_times_gravity(condition);
         let hydrostatic =
             Wrench { force: wetting.pressure.force * weight, moment: wetting.pressure.moment * weight };
@@ -344,11 +348,11 @@ impl Anchor {
             off_track / width,
             ((level - min.z) / height).clamp(0.0, 2.0),
             ((level - max.z) / height).clamp(-1.0, 1.0),
-            wetting.area / (length * width),
+            wetting.soaked_area / (length * width),
             ((min.z - vehicle.z0) / condition.depth.max(LEAST_DEPTH)).clamp(0.0, 4.0),
         ];
         SurfaceReading {
-            wet_fraction: fraction,
+            wet_fraction,
             center,
             hydrostatic,
             drag: front * -(CD0 * shelter * pressure),

@@ -63,6 +63,11 @@ pub fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
+/// The same of a file.
+pub fn sha256_of(path: &Path) -> io::Result<String> {
+    Ok(sha256(&std::fs::read(path)?))
+}
+
 /// Two lower-case digits a byte.
 pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()

@@ -46,9 +46,10 @@ fn answer(global: &[f64; GLOBAL], fixed: &[f32; STATIC], dynamic: &[f32; DYNAMIC
     })
 }
 
-fn loads(vehicle: &Vehicle, condition: &Condition) -> Vec<(Vec3, Vec3)> {
-    let fixed = Anchor::new(vehicle).static_rows(vehicle);
-    let reading = read(vehicle, condition);
+fn loads(vehicle: &Vehicle, anchor: &Anchor, condition: &Condition) -> Vec<(Vec3, Vec3)> {
+    let fixed = anchor.static_rows(vehicle);
+    let mut reading = Reading::default();
+    anchor.read(vehicle, condition, &mut reading);
     let load = |(surface, fixed): (&SurfaceReading, &[f32; STATIC])| {
         let output = answer(&reading.global, fixed, &surface.dynamic);
         (surface.force(&output), surface.center_of_pressure(&output))
@@ -61,11 +62,12 @@ fn a_mirror_image_of_the_state_gets_the_mirror_image_of_any_answer() {
     let reflect = |v: Vec3| Vec3::new(v.x, -v.y, v.z);
     for name in common::VEHICLES {
         let vehicle = vehicle(name);
+        let anchor = Anchor::new(&vehicle);
         for state in states() {
             let velocity = reflect(state.velocity);
             let up = UnitVector3::new_unchecked(reflect(state.up.into_inner()));
             let mirrored = Condition { velocity, ground_velocity: velocity, up, ..state };
-            let (here, there) = (loads(&vehicle, &state), loads(&vehicle, &mirrored));
+            let (here, there) = (loads(&vehicle, &anchor, &state), loads(&vehicle, &anchor, &mirrored));
             let scale: f64 = here.iter().map(|(force, _)| force.norm()).sum();
             for (index, surface) in vehicle.surfaces.iter().enumerate() {
                 let partner = there[surface.mirror_left_right];
@@ -126,11 +128,37 @@ fn a_dry_surface_has_nothing_and_gets_wet_without_a_jump() {
 }
 
 #[test]
+fn no_load_steps_where_the_water_reaches_a_level_face() {
+    const NEAR: f64 = 1e-7;
+    for name in common::VEHICLES {
+        let vehicle = vehicle(name);
+        let anchor = Anchor::new(&vehicle);
+        let mesh = &vehicle.hull.mesh;
+        let mut levels: Vec<f64> = mesh.vertices.iter().map(|vertex| vertex.z - vehicle.z0).collect();
+        levels.sort_by(f64::total_cmp);
+        levels.dedup_by(|next, kept| *next - *kept < 1e-5);
+        for velocity in [Vec3::new(3.0, 0.8, 0.0), Vec3::new(-0.7, 0.2, 0.0), Vec3::new(0.0, 1.0, 0.0)] {
+            let at = |depth: f64| loads(&vehicle, &anchor, &Condition::level(velocity, depth));
+            for &level in levels.iter().filter(|level| **level > 1e-3) {
+                let (below, above) = (at(level - NEAR), at(level + NEAR));
+                let scale: f64 = above.iter().map(|(force, _)| force.norm()).sum();
+                for (index, surface) in vehicle.surfaces.iter().enumerate() {
+                    let step = (above[index].0 - below[index].0).norm();
+                    assert!(step < 1e-4 * scale, "{name} {} at {level} m: {step} of {scale} N", surface.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn forces_act_inside_the_box_around_the_wet_part() {
     for name in common::VEHICLES {
         let vehicle = vehicle(name);
+        let anchor = Anchor::new(&vehicle);
         for state in states() {
-            for (surface, (_, point)) in read(&vehicle, &state).surfaces.iter().zip(loads(&vehicle, &state)) {
+            let loads = loads(&vehicle, &anchor, &state);
+            for (surface, (_, point)) in read(&vehicle, &state).surfaces.iter().zip(loads) {
                 let [low, high] = surface.wet_box;
                 let inside = (0..3).all(|i| point[i] >= low[i] - 1e-9 && point[i] <= high[i] + 1e-9);
                 assert!(surface.wet_fraction == 0.0 || inside, "{name}: {point} in {low} {high}");

@@ -129,7 +129,7 @@ fn faults_behind_a_good_checksum_are_named() {
         (
             "network.safetensors",
             Box::new(header("windward drag", "standing drag")),
-            "what is left of archimedes + standing drag, not of archimedes + windward drag: train them anew",
+            "what is left of archimedes + standing drag of the soaked part, not of archimedes + windward drag",
         ),
         ("vehicle.toml", Box::new(text(|t| t.replacen("format = 1", "format = 2", 1))), "newer"),
         (
@@ -171,6 +171,19 @@ fn faults_behind_a_good_checksum_are_named() {
         let message = refusal(&folder);
         assert!(message.contains(expected), "{file}, expected {expected}: {message}");
     }
+}
+
+#[test]
+fn weights_of_another_release_do_not_stand_in_the_way_of_new_ones() {
+    let copy = copy_of_vehicles();
+    let folder = copy.path().join("husky");
+    replace(&folder, "network.safetensors", header("windward drag", "standing drag"));
+    let refused = bundle::read(&folder).expect_err("refused").to_string();
+    assert!(refused.contains("train them anew"), "{refused}");
+    let bundle = bundle::read_without_weights(&folder).expect("the vehicle is as it was");
+    assert!(bundle.trained.is_none() && bundle.distance.is_some());
+    replace(&folder, "hull.stl", |_| Vec::new());
+    bundle::read_without_weights(&folder).expect_err("another fault");
 }
 
 #[test]

@@ -12,8 +12,8 @@ use std::process::Command;
 use common::{VEHICLES, copy_folder, copy_of_vehicles, model, paper_bundle, paper_on, vehicles};
 use serde_json::Value;
 use tempfile::TempDir;
+use wade::files::sha256_of;
 use wade::model::kernel::Isa;
-use wade::train::report::sha256_of;
 
 fn campaigns() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("campaigns")

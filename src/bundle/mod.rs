@@ -269,6 +269,22 @@ impl Files {
         })
     }
 
+    fn bundle(
+        &self,
+        vehicle_file: &VehicleFile,
+        trained: Option<(Weights, Domain)>,
+    ) -> Result<Bundle, BundleError> {
+        let vehicle = self.vehicle(vehicle_file)?;
+        Ok(Bundle {
+            effects: self.effects(&vehicle.name)?,
+            vehicle,
+            version: vehicle_file.version,
+            trained,
+            distance: self.parse(SDF_FILE, tensors::read_distance)?,
+            spec: self.files.get(SPEC_FILE).map(|bytes| String::from_utf8_lossy(bytes).into_owned()),
+        })
+    }
+
     fn trained(&self, file: &VehicleFile) -> Result<Option<(Weights, Domain)>, BundleError> {
         if !self.files.contains_key(NETWORK_FILE) {
             return self.parse(VEHICLE_FILE, |_| match file.training()? {
@@ -340,16 +356,14 @@ fn load_parts(directory: &Path, isa: Isa) -> Result<(Model, Option<EffectsFile>)
 /// Reads everything.
 pub fn read(directory: &Path) -> Result<Bundle, BundleError> {
     let (files, vehicle_file) = Files::read(directory)?;
-    let spec = files.files.get(SPEC_FILE).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
-    let vehicle = files.vehicle(&vehicle_file)?;
-    Ok(Bundle {
-        effects: files.effects(&vehicle.name)?,
-        vehicle,
-        version: vehicle_file.version,
-        trained: files.trained(&vehicle_file)?,
-        distance: files.parse(SDF_FILE, tensors::read_distance)?,
-        spec,
-    })
+    files.bundle(&vehicle_file, files.trained(&vehicle_file)?)
+}
+
+/// Reads everything but the weights, for work that needs none or brings new ones: those in place may be of an older
+/// release, which this one cannot read.
+pub fn read_without_weights(directory: &Path) -> Result<Bundle, BundleError> {
+    let (files, vehicle_file) = Files::read(directory)?;
+    files.bundle(&vehicle_file, None)
 }
 
 /// Refuses a place that a bundle of this name may not take: another name's folder, or one with other files in it.

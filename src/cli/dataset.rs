@@ -343,7 +343,9 @@ fn read_vehicles<'a>(
     vehicles: &Vehicles,
     names: impl Iterator<Item = &'a String>,
 ) -> Result<BTreeMap<String, Vehicle>> {
-    names.map(|name| Ok((name.clone(), bundle::read(&vehicles.bundle(name))?.vehicle))).collect()
+    names
+        .map(|name| Ok((name.clone(), bundle::read_without_weights(&vehicles.bundle(name))?.vehicle)))
+        .collect()
 }
 
 fn keys<T>(map: &BTreeMap<String, T>) -> String {
@@ -363,14 +365,14 @@ fn write(path: &Path, data: &dataset::Dataset) -> Result<()> {
 }
 
 fn describe(file: &Path, html: Option<&Path>, as_json: bool, vehicles: &Vehicles) -> Result<()> {
-    let written = begin_page(html, &[file])?;
+    let written = begin_page(html, [file])?;
     let data = dataset::read(file)?;
     // kinds are known where the bundle is; a data set of somebody else's vehicle is described by its surfaces
     let known: BTreeMap<_, _> = data
         .meta
         .vehicles
         .keys()
-        .filter_map(|name| Some((name, bundle::read(&vehicles.bundle(name)).ok()?.vehicle)))
+        .filter_map(|name| Some((name, bundle::read_without_weights(&vehicles.bundle(name)).ok()?.vehicle)))
         .collect();
     let kind = |vehicle: &str, surface: &str| {
         let vehicle = known.get(&vehicle.to_owned())?;

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
+use wade::bundle;
 use wade::dataset::split;
 use wade::evaluate::contest::{Contest, Contestants, enter};
 use wade::evaluate::report::{About, Report, VehicleReport};
@@ -57,7 +58,7 @@ impl Eval {
     /// Prints the tables and writes the page.
     pub fn run(self) -> Result<ExitCode> {
         let record = Record::path(&self.trained);
-        let page = begin_page(self.html.as_deref(), &[&self.data.data, &record])?;
+        let page = begin_page(self.html.as_deref(), [&self.data.data, &record])?;
         let report = match self.split {
             Some(rule) => self.anew(rule)?,
             None => self.of_bundles()?,
@@ -80,13 +81,11 @@ impl Eval {
         let source = loaded.source(&record.config)?;
         let split = held_out::of(&record, &loaded.file, &source)?;
         let mut models = BTreeMap::new();
-        for (name, bundle) in &loaded.bundles {
-            let Some((weights, domain)) = bundle.trained.clone() else {
-                bail!("{name}: the bundle has no weights")
-            };
+        for name in loaded.bundles.keys() {
+            let bundle = bundle::read(&self.data.vehicles.bundle(name))?;
+            let Some((weights, domain)) = bundle.trained else { bail!("{name}: the bundle has no weights") };
             held_out::check_weights(&record, name, &weights)?;
-            let model =
-                Model::new(bundle.vehicle.clone(), bundle.version, domain, weights, Isa::available()[0]);
+            let model = Model::new(bundle.vehicle, bundle.version, domain, weights, Isa::available()[0]);
             models.insert(name.clone(), vec![model]);
         }
         let rule = if record.split.by_sample { Rule::Sample } else { Rule::Case };

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use wade::bundle;
 use wade::effects::{Body, EffectsFile};
-use wade::files::{sha256, write_whole};
+use wade::files::{sha256_of, write_whole};
 use wade::forces::Forces;
 use wade::gap::{self, Config, GapError, NotApplicable, Predicted, Report, effects_file};
 use wade::model::{Model, Workspace};
@@ -30,7 +30,7 @@ const SETTINGS: &str =
   least_trials = 4
   significance = 1e-6          # probability of a false alarm of one effect
   share_of_remaining = 0.1     # of the gap above the floor that an effect must explain
-  share_of_gap = 0.02          # of all that is explained that one of several must
+  share_of_gap = 0.01          # of all that is explained that one of several must
   relevance = 0.08             # least size over the noise of a sample
   most_effects = 4             # named together
   placebos = 20                # phase-shifted copies that an effect must beat
@@ -348,8 +348,7 @@ fn predictor(model: &Model) -> impl FnMut(&wade::condition::Condition) -> Predic
 /// The hash of a bundle's own list of hashes.
 fn bundle_hash(bundle: &Path) -> Result<String> {
     let path = bundle.join("SHA256SUMS");
-    let sums = std::fs::read(&path).with_context(|| path.display().to_string())?;
-    Ok(sha256(&sums))
+    sha256_of(&path).with_context(|| path.display().to_string())
 }
 
 /// Puts a file in its place as a whole, or takes it away.

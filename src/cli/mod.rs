@@ -162,7 +162,10 @@ struct Page {
 }
 
 /// Begins a page, so that a place that cannot be written to is known before the work, and that of a file that is read.
-fn begin_page(place: Option<&Path>, inputs: &[&Path]) -> Result<Option<Page>> {
+fn begin_page(
+    place: Option<&Path>,
+    inputs: impl IntoIterator<Item = impl AsRef<Path>>,
+) -> Result<Option<Page>> {
     let Some(place) = place else { return Ok(None) };
     keep_inputs(place, inputs)?;
     let file = StagedFile::new(place).with_context(|| format!("cannot write {}", place.display()))?;
@@ -170,10 +173,10 @@ fn begin_page(place: Option<&Path>, inputs: &[&Path]) -> Result<Option<Page>> {
 }
 
 impl Page {
-    fn finish(mut self, text: &str) -> Result<()> {
-        let place = || self.place.display().to_string();
-        self.file.write_all(text.as_bytes()).with_context(place)?;
-        self.file.finish().with_context(|| self.place.display().to_string())
+    fn finish(self, text: &str) -> Result<()> {
+        let Self { mut file, place } = self;
+        let written = file.write_all(text.as_bytes()).and_then(|()| file.finish());
+        written.with_context(|| place.display().to_string())
     }
 }
 

@@ -14,10 +14,11 @@ use wade::bundle::{self, Bundle};
 use wade::dataset::split::{self, By};
 use wade::dataset::{self, Dataset};
 use wade::domain::Domain;
+use wade::files::sha256_of;
 use wade::model::Weights;
 use wade::train::checkpoint::Checkpoint;
 use wade::train::fit::Epoch;
-use wade::train::report::{DataFile, Record, VehicleRecord, sha256_of};
+use wade::train::report::{DataFile, Record, VehicleRecord};
 use wade::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant, anchored};
 
 use super::running::Running;
@@ -200,7 +201,7 @@ impl Rule {
 pub struct Loaded {
     /// What it is.
     pub file: DataFile,
-    /// The bundles of its vehicles, by name.
+    /// The bundles of its vehicles, by name, without the weights in place.
     pub bundles: BTreeMap<String, Bundle>,
     /// Its samples.
     pub data: Dataset,
@@ -226,7 +227,7 @@ impl Data {
         whole.try_into().with_context(|| path.display().to_string())
     }
 
-    /// Reads or generates the data set, and reads the bundles of its vehicles.
+    /// Reads or generates the data set, and reads the bundles of its vehicles but for their weights.
     pub fn load(&self, config: &Config) -> Result<Loaded> {
         config.validate()?;
         if self.is_analytic() { self.generate(config) } else { self.read() }
@@ -259,7 +260,9 @@ impl Data {
     }
 
     fn bundles<'a>(&self, names: impl Iterator<Item = &'a String>) -> Result<BTreeMap<String, Bundle>> {
-        names.map(|name| Ok((name.clone(), bundle::read(&self.vehicles.bundle(name))?))).collect()
+        names
+            .map(|name| Ok((name.clone(), bundle::read_without_weights(&self.vehicles.bundle(name))?)))
+            .collect()
     }
 }
 

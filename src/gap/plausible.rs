@@ -36,11 +36,10 @@ pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Res
 fn check_channel(all: &[Series], component: usize) -> Result<(), GapError> {
     let column = WRENCH[component];
     let (unit, larger, smaller) = if component < 3 { ("N", "mN", "kN") } else { ("N m", "N mm", "kN m") };
-    let pairs = |series: &'_ Series| -> Vec<(f64, f64)> {
-        let expected = series.seen.iter().map(|seen| seen[component]);
-        expected.zip(&series.gap).map(|(expected, gap)| (gap[component] + expected, expected)).collect()
-    };
-    let pairs: Vec<(f64, f64)> = all.iter().flat_map(pairs).collect();
+    // measured and expected
+    let samples = all.iter().flat_map(|series| series.seen.iter().zip(&series.gap));
+    let pairs: Vec<(f64, f64)> =
+        samples.map(|(seen, gap)| (gap[component] + seen[component], seen[component])).collect();
     let sum = |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|&(m, p)| of(m, p)).sum::<f64>();
     let (mm, mp, pp) = (sum(&|m, _| m * m), sum(&|m, p| m * p), sum(&|_, p| p * p));
     let (first, count) = (pairs[0].0, pairs.len() as f64);
@@ -53,13 +52,10 @@ fn check_channel(all: &[Series], component: usize) -> Result<(), GapError> {
     }
     let ratio = mp.abs() / pp.max(f64::MIN_POSITIVE);
     let is_near = |factor: f64| (1.0 / OFF..OFF).contains(&(ratio / factor));
-    let other = match () {
-        () if is_near(THOUSAND) => larger,
-        () if is_near(1.0 / THOUSAND) => smaller,
-        () => return Ok(()),
-    };
-    match mp.abs() > SAME * (mm * pp).sqrt() {
-        true => Err(GapError::Unit { column, ratio, unit, other }),
-        false => Ok(()),
+    let other =
+        [(THOUSAND, larger), (1.0 / THOUSAND, smaller)].into_iter().find(|(factor, _)| is_near(*factor));
+    match other.filter(|_| mp.abs() > SAME * (mm * pp).sqrt()) {
+        Some((_, other)) => Err(GapError::Unit { column, ratio, unit, other }),
+        None => Ok(()),
     }
 }

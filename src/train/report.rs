@@ -12,7 +12,7 @@ use super::fit::Epoch;
 use super::score::Score;
 use super::{Config, Sides, Source, Trained, page};
 use crate::dataset::split::By;
-use crate::files::{hexadecimal, sha256, write_whole};
+use crate::files::{hexadecimal, write_whole};
 use crate::model::network::Network;
 use crate::page::PlotError;
 
@@ -130,11 +130,6 @@ pub fn fingerprint(network: &Network) -> String {
         values.iter().for_each(|x| hash.update(x.to_le_bytes()));
     }
     hexadecimal(&hash.finalize())
-}
-
-/// SHA-256 of a file.
-pub fn sha256_of(path: &Path) -> std::io::Result<String> {
-    Ok(sha256(&fs::read(path)?))
 }
 
 impl Record {
