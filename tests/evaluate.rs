@@ -22,6 +22,7 @@ use wade::evaluate::states::{State, states};
 use wade::evaluate::{EvaluateError, held_out};
 use wade::frame::{GRAVITY, Vec3};
 use wade::geometry::hydrostatics::hydrostatics;
+use wade::train::fit::Epoch;
 use wade::train::report::{DataFile, Record};
 use wade::train::{self, Analytic, Config, Sides, Source, Variant};
 use wade::vehicle::Vehicle;
@@ -154,7 +155,10 @@ fn the_figures_are_those_of_planted_errors() {
         (0..source.data.samples.len()).filter(|&n| source.data.samples[n].vehicle == "husky").collect();
     let states = states(&source, &numbers).unwrap();
     let surface = Vec3::new(0.5, -1.0, 2.0);
-    let shallow = states.iter().map(|state| state.condition.depth).fold(f64::INFINITY, f64::min);
+    let least = |of: &dyn Fn(&State) -> f64| states.iter().map(of).fold(f64::INFINITY, f64::min);
+    let most = |of: &dyn Fn(&State) -> f64| -least(&|state| -of(state));
+    let shallow = least(&|state| state.condition.depth);
+    let (fastest, steepest) = (most(&State::speed), most(&State::obliqueness));
     let predict = |state: &State| {
         // at the least depth three times the error
         let factor = if state.condition.depth == shallow { 3.0 } else { 1.0 };
@@ -168,7 +172,17 @@ fn the_figures_are_those_of_planted_errors() {
     let entry = Entry { name: "paper".into(), predictions: states.iter().map(predict).collect() };
     let contest: Contest = [("husky".to_owned(), Heat { states, entries: vec![entry] })].into();
     let file = DataFile { name: "analytic".into(), sha256: None, provenance: "analytic".into() };
-    let about = About { data: file, splits: vec!["all".into()], by_sample: false, settings: BTreeMap::new() };
+    let epoch = |number: u32| {
+        let loss = f64::from(number).recip();
+        Epoch { number, training_loss: loss, validation_loss: loss, learning_rate: 1e-3 }
+    };
+    let about = About {
+        data: file,
+        splits: vec!["all".into()],
+        by_sample: false,
+        settings: BTreeMap::new(),
+        history: (1..4).map(epoch).collect(),
+    };
     let report = Report::new(&contest, &source.vehicles, about, "test").unwrap();
     let husky = &report.vehicles[0];
     assert_eq!((husky.cases, husky.samples), (20, 80));
@@ -187,6 +201,15 @@ fn the_figures_are_those_of_planted_errors() {
     let slice = husky.slices.iter().find(|slice| slice.name == "depth low").unwrap();
     assert_eq!(slice.samples, 4);
     near(slice.mae_n[2], 78.0);
+    // what lies at the upper ends is what was drawn there
+    let end = |name: &str| husky.slices.iter().find(|slice| slice.name == name).unwrap();
+    for (name, most) in [("speed high", fastest), ("obliqueness high", steepest)] {
+        assert!(end(name).bound <= most && end(name).samples >= 4, "{name}");
+        assert!(end(name).bound > end(&name.replace("high", "low")).bound, "{name}");
+    }
+    let worst = husky.flows.iter().map(|flow| flow.error.z).fold(0.0, f64::max);
+    near(worst, 78.0);
+    assert_eq!(husky.flows.iter().filter(|flow| flow.place[0] == shallow).count(), 4);
     let calibration = husky.calibration.unwrap();
     near(calibration.within_one[1], 0.95);
     near(calibration.within_two[2], 0.95);
@@ -194,6 +217,11 @@ fn the_figures_are_those_of_planted_errors() {
     assert_eq!(husky.paper.unwrap().mae, [1.25, 3.42, 4.38]);
     let page = report.page().unwrap();
     assert!(page.contains("paper, other data") && page.contains("<svg") && page.contains("12.96"));
+    for title in ["obliqueness [1]", "share of the errors within", "epoch"] {
+        assert!(page.contains(title), "{title}");
+    }
+    // parity, errors over the state, deviations, loss and learning rate
+    assert_eq!(page.matches("<svg").count(), 3 + 3 + 1 + 2);
 }
 
 /// A record of one short training.

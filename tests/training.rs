@@ -477,6 +477,9 @@ fn bad_input_names_the_file_and_leaves_everything_as_it_was() {
     std::fs::write(&settings, "held_out_share = 1.0").unwrap();
     let error = refused(&data, &["--config", text(&settings)]);
     assert!(error.contains("data.parquet") && error.contains("a share of 1 is held out"), "{error}");
+    // before the first epoch, of which a line would tell
+    let error = refused(&data, &["--checkpoint", text(&folder.path().join("absent/state"))]);
+    assert!(error.contains("absent/state") && !error.contains("held out:"), "{error}");
 }
 
 #[test]

@@ -108,6 +108,7 @@ impl Eval {
             splits: vec![split.name.clone()],
             by_sample: record.split.by_sample,
             settings,
+            history: record.history,
         };
         Ok(Report::new(&contest, &source.vehicles, about, PROGRAM)?)
     }
@@ -140,7 +141,13 @@ impl Eval {
             self.enter(&mut contest, &source, sides, &of_paper, (&loaded, &models))?;
         }
         let splits = splits.iter().map(|split| split.name.clone()).collect();
-        let about = About { data: loaded.file, splits, by_sample: rule == Rule::Sample, settings };
+        let about = About {
+            data: loaded.file,
+            splits,
+            by_sample: rule == Rule::Sample,
+            settings,
+            history: Vec::new(),
+        };
         Ok(Report::new(&contest, &source.vehicles, about, PROGRAM)?)
     }
 

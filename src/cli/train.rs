@@ -14,7 +14,7 @@ use wade::bundle::{self, Bundle};
 use wade::dataset::split::{self, By};
 use wade::dataset::{self, Dataset};
 use wade::domain::Domain;
-use wade::files::sha256_of;
+use wade::files::{StagedFile, sha256_of};
 use wade::model::Weights;
 use wade::train::checkpoint::Checkpoint;
 use wade::train::fit::Epoch;
@@ -253,7 +253,9 @@ impl Data {
     fn read(&self) -> Result<Loaded> {
         let data = dataset::read(&self.data)?;
         let sha256 = Some(sha256_of(&self.data).with_context(|| self.data.display().to_string())?);
-        let (name, provenance) = (self.data.display().to_string(), data.meta.provenance.clone());
+        // its folder is of this machine alone
+        let name = self.data.file_name().unwrap_or(self.data.as_os_str());
+        let (name, provenance) = (name.to_string_lossy().into_owned(), data.meta.provenance.clone());
         let bundles = self.bundles(data.meta.vehicles.keys())?;
         let file = DataFile { name, sha256, provenance };
         Ok(Loaded { file, bundles, data, domains: BTreeMap::new() })
@@ -325,6 +327,9 @@ impl Train {
         std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
         for name in loaded.bundles.keys() {
             bundle::check_place(&self.data.vehicles.bundle(name), name)?;
+        }
+        if let Some(path) = &self.checkpoint {
+            StagedFile::new(path).with_context(|| path.display().to_string())?;
         }
         let sides = Sides { split, by };
         eprintln!("held out: {}; {} samples to learn from", split.name, split.training.len());

@@ -3,9 +3,10 @@
 use std::fmt::Write;
 
 use super::paper::{LABEL, Paper, entry};
-use super::report::{ModelReport, Report, VehicleReport};
-use crate::page::plot::{Series, parity};
-use crate::page::{PlotError, document, escape, table};
+use super::report::{ModelReport, QUANTITIES, Report, VehicleReport};
+use crate::page::plot::{Series, parity, scatter};
+use crate::page::{PlotError, document, escape, preformatted, table};
+use crate::train::page::losses;
 
 const AXES: [&str; 3] = ["F<sub>x</sub>", "F<sub>y</sub>", "F<sub>z</sub>"];
 
@@ -26,6 +27,7 @@ pub(super) fn page(report: &Report) -> Result<String, PlotError> {
     for vehicle in &report.vehicles {
         text.push_str(&section(vehicle)?);
     }
+    text.push_str(&trainings(report)?);
     let _ = writeln!(text, "<p class=\"small\">{}</p>", escape(&report.program));
     Ok(document(&format!("wade eval: {}", report.about.data.name), &text))
 }
@@ -34,7 +36,8 @@ fn section(vehicle: &VehicleReport) -> Result<String, PlotError> {
     let paper = vehicle.paper;
     Ok(format!(
         "<h2>{}</h2>\n<p>{} held-out cases, {} states with their mirror images. Mean magnitude of the net force: {} N.</p>\n\
-         <h3>Net force</h3>\n{}{}\n<h3>Parity</h3>\n{}\n<h3>Force on a surface</h3>\n{}{}\n\
+         <h3>Net force</h3>\n{}{}\n<h3>Parity</h3>\n{}\n\
+         <h3>Error of the mean flow over the state</h3>\n{}\n<h3>Force on a surface</h3>\n{}{}\n\
          <h3>Ends of the ranges</h3>\n{}\n<h3>Stated uncertainty</h3>\n{}",
         escape(&vehicle.name),
         vehicle.cases,
@@ -43,10 +46,11 @@ fn section(vehicle: &VehicleReport) -> Result<String, PlotError> {
         net_table(vehicle, paper),
         moment_table(vehicle),
         parity_figures(vehicle)?,
+        error_figures(vehicle)?,
         kind_table(vehicle, paper),
         surface_table(vehicle),
         slice_table(vehicle, paper),
-        calibration(vehicle),
+        calibration(vehicle)?,
     ))
 }
 
@@ -130,6 +134,36 @@ fn parity_figures(vehicle: &VehicleReport) -> Result<String, PlotError> {
     Ok(text)
 }
 
+/// Points of each component of the force.
+fn by_component(of: impl Fn(usize) -> Vec<(f64, f64)>) -> Vec<Series> {
+    let component = |(c, axis): (usize, &str)| Series { name: axis.to_owned(), points: of(c) };
+    ["Fx", "Fy", "Fz"].into_iter().enumerate().map(component).collect()
+}
+
+fn error_figures(vehicle: &VehicleReport) -> Result<String, PlotError> {
+    let mut text = String::new();
+    for (index, (name, unit, _)) in QUANTITIES.into_iter().enumerate() {
+        let series = by_component(|c| {
+            vehicle.flows.iter().map(|flow| (flow.place[index], flow.error[c].abs())).collect()
+        });
+        text.push_str(&scatter(&format!("{name} [{unit}]"), "magnitude of the error [N]", &series)?);
+    }
+    Ok(text)
+}
+
+/// How the model under evaluation was trained, and the settings of all that were.
+fn trainings(report: &Report) -> Result<String, PlotError> {
+    let mut text = String::from("<h2>Training</h2>\n");
+    if !report.about.history.is_empty() {
+        text.push_str(&losses(&report.about.history)?);
+    }
+    for (name, settings) in &report.about.settings {
+        let settings = toml::to_string(settings).unwrap_or_default();
+        let _ = writeln!(text, "<h3>{}</h3>\n{}", escape(name), preformatted(&settings));
+    }
+    Ok(text)
+}
+
 fn kind_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
     let mut heads = heads("kind", &["MAE [N]"]);
     heads.push("share of the force".to_owned());
@@ -178,9 +212,9 @@ fn slice_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
         + "<p class=\"small\">Depth [m], speed [m/s], obliqueness |v<sub>y</sub>| / |v|; net force.</p>\n"
 }
 
-fn calibration(vehicle: &VehicleReport) -> String {
+fn calibration(vehicle: &VehicleReport) -> Result<String, PlotError> {
     let Some(calibration) = &vehicle.calibration else {
-        return "<p class=\"small\">No uncertainty is stated.</p>\n".to_owned();
+        return Ok("<p class=\"small\">No uncertainty is stated.</p>\n".to_owned());
     };
     let heads = heads("net force", &[""]);
     let row =
@@ -199,5 +233,25 @@ fn calibration(vehicle: &VehicleReport) -> String {
          sections of a case, of {} cases.</p>\n",
         calibration.cases,
     );
-    table(&heads, usize::MAX, rows) + &note
+    Ok(table(&heads, usize::MAX, rows) + &note + &reliability(vehicle)?)
+}
+
+/// Share of the mean flows whose error is within so many stated deviations.
+fn reliability(vehicle: &VehicleReport) -> Result<String, PlotError> {
+    /// Of a normal error.
+    const NORMAL: [(f64, f64); 6] =
+        [(0.5, 0.383), (1.0, 0.683), (1.5, 0.866), (2.0, 0.954), (2.5, 0.988), (3.0, 0.997)];
+    let ratios = |c: usize| {
+        let stated = vehicle.flows.iter().filter_map(|flow| Some((flow, flow.stated?)));
+        let known = stated.filter(|(_, stated)| stated.min() > 0.0);
+        known.map(|(flow, stated)| flow.error[c].abs() / stated[c]).collect::<Vec<f64>>()
+    };
+    let mut series = by_component(|c| {
+        let ratios = ratios(c);
+        let within = |bound: f64| ratios.iter().filter(|ratio| **ratio <= bound).count() as f64;
+        let at = |step: u32| 0.1 * f64::from(step);
+        (0..=30).map(|step| (at(step), within(at(step)) / ratios.len().max(1) as f64)).collect()
+    });
+    series.push(Series { name: "normal".to_owned(), points: NORMAL.to_vec() });
+    scatter("stated deviations", "share of the errors within", &series)
 }

@@ -13,6 +13,7 @@ use crate::dataset::flows;
 use crate::frame::Vec3;
 use crate::page::PlotError;
 use crate::train::Config;
+use crate::train::fit::Epoch;
 use crate::train::report::DataFile;
 use crate::vehicle::Vehicle;
 
@@ -44,6 +45,9 @@ pub struct About {
     pub by_sample: bool,
     /// Settings of each network's training, by its name.
     pub settings: BTreeMap<String, Config>,
+    /// Epochs of the training of the model under evaluation, where it was one.
+    #[serde(skip)]
+    pub history: Vec<Epoch>,
 }
 
 /// Figures of one vehicle.
@@ -74,6 +78,20 @@ pub struct VehicleReport {
     /// Truth and prediction of each component of the net force [N], thinned out.
     #[serde(skip)]
     pub parity: Vec<(Vec3, Vec3)>,
+    /// Mean flows, each mirror image its own.
+    #[serde(skip)]
+    pub flows: Vec<MeanFlow>,
+}
+
+/// What the model under evaluation makes of a mean flow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeanFlow {
+    /// Where it lies: the quantities of [`QUANTITIES`].
+    pub place: [f64; 3],
+    /// Error of the mean net force [N].
+    pub error: Vec3,
+    /// The deviation stated of it [N]; `None` where nothing is.
+    pub stated: Option<Vec3>,
 }
 
 /// Errors of one model.
@@ -160,6 +178,7 @@ impl VehicleReport {
             calibration: calibration(under_evaluation, &heat.states),
             paper: paper::of(&vehicle.name),
             parity: parity(under_evaluation, &forces),
+            flows: mean_flows(under_evaluation, &heat.states),
         }
     }
 }
@@ -206,16 +225,18 @@ fn groups(vehicle: &Vehicle, heat: &Heat, name: impl Fn(usize) -> String) -> Vec
 }
 
 /// A number that states are ordered by.
-type Quantity = fn(&State) -> f64;
+pub type Quantity = fn(&State) -> f64;
+
+/// What errors are told apart by: name, unit, value.
+pub const QUANTITIES: [(&str, &str, Quantity); 3] = [
+    ("depth", "m", |state| state.condition.depth),
+    ("speed", "m/s", State::speed),
+    ("obliqueness", "1", State::obliqueness),
+];
 
 fn slices(heat: &Heat, forces: &[Vec3]) -> Vec<SliceReport> {
-    let quantities: [(&str, Quantity); 3] = [
-        ("depth", |state| state.condition.depth),
-        ("speed", State::speed),
-        ("obliqueness", State::obliqueness),
-    ];
     let mut slices = Vec::new();
-    for (quantity, of) in quantities {
+    for (quantity, _, of) in QUANTITIES {
         let values: Vec<f64> = heat.states.iter().map(of).collect();
         for (end, share) in [("low", 0.05), ("high", 0.95)] {
             let Some(bound) = percentile(&values, share) else { continue };
@@ -238,16 +259,32 @@ fn cases(states: &[State]) -> usize {
     states.iter().map(|state| state.case.as_str()).collect::<BTreeSet<_>>().len()
 }
 
+/// Places of the sections of each flow among the states.
+fn sections(states: &[State]) -> Vec<Vec<usize>> {
+    flows(states.iter().map(|state| (state.case.as_str(), state.image, &state.condition)))
+}
+
+fn error(entry: &Entry, states: &[State], place: usize) -> Vec3 {
+    entry.predictions[place].force - states[place].force()
+}
+
 /// What is stated is how far the mean flow may be off: errors are averaged over the sections of a case first.
 fn calibration(entry: &Entry, states: &[State]) -> Option<Calibration> {
-    let sections = states.iter().map(|state| (state.case.as_str(), state.image, &state.condition));
-    let error = |place: &usize| entry.predictions[*place].force - states[*place].force();
     let flow = |places: &Vec<usize>| {
         let stated = entry.predictions[places[0]].uncertainty?;
-        Some(Flow { errors: places.iter().map(error).collect(), stated })
+        Some(Flow { errors: places.iter().map(|&place| error(entry, states, place)).collect(), stated })
     };
-    let flows: Option<Vec<Flow>> = flows(sections).iter().map(flow).collect();
+    let flows: Option<Vec<Flow>> = sections(states).iter().map(flow).collect();
     Calibration::of(&flows?, cases(states))
+}
+
+fn mean_flows(entry: &Entry, states: &[State]) -> Vec<MeanFlow> {
+    let flow = |places: &Vec<usize>| MeanFlow {
+        place: QUANTITIES.map(|(_, _, of)| of(&states[places[0]])),
+        error: places.iter().map(|&place| error(entry, states, place)).sum::<Vec3>() / places.len() as f64,
+        stated: entry.predictions[places[0]].uncertainty,
+    };
+    sections(states).iter().map(flow).collect()
 }
 
 fn parity(entry: &Entry, forces: &[Vec3]) -> Vec<(Vec3, Vec3)> {

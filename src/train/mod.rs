@@ -16,7 +16,7 @@ pub mod fit;
 pub mod label;
 pub mod layers;
 pub mod loss;
-mod page;
+pub(crate) mod page;
 pub mod plan;
 pub mod report;
 pub mod samples;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::fit::Epoch;
 use super::report::Record;
 use crate::page::plot::{Series, curves};
 use crate::page::{PlotError, document, escape};
@@ -9,24 +10,28 @@ use crate::page::{PlotError, document, escape};
 /// The page.
 pub(super) fn page(record: &Record) -> Result<String, PlotError> {
     let title = format!("wade train: {} on {}", record.variant, record.data.name);
-    let curve = |name: &str, of: fn(&super::fit::Epoch) -> f64| Series {
-        name: name.to_owned(),
-        points: record.history.iter().map(|epoch| (f64::from(epoch.number), of(epoch))).collect(),
-    };
-    let losses = [curve("training", |e| e.training_loss), curve("validation", |e| e.validation_loss)];
-    let rate = [curve("learning rate", |e| e.learning_rate)];
     let body = format!(
-        "{}{}<h2>Loss</h2>{}<h2>Learning rate</h2>{}<h2>Held-out cases</h2><p class=\"small\">{}</p>\
+        "{}{}<h2>Loss and learning rate</h2>{}<h2>Held-out cases</h2><p class=\"small\">{}</p>\
          <h2>Settings</h2><pre>{}</pre><p class=\"small\">{}</p>",
         summary(record),
         table(record),
-        curves("epoch", "loss", &losses)?,
-        curves("epoch", "learning rate", &rate)?,
+        losses(&record.history)?,
         escape(&record.split.held_out_cases.iter().cloned().collect::<Vec<_>>().join(", ")),
         escape(&toml::to_string(&record.config).unwrap_or_default()),
         escape(&record.program),
     );
     Ok(document(&title, &body))
+}
+
+/// Loss and learning rate, epoch by epoch.
+pub(crate) fn losses(history: &[Epoch]) -> Result<String, PlotError> {
+    let curve = |name: &str, of: fn(&Epoch) -> f64| Series {
+        name: name.to_owned(),
+        points: history.iter().map(|epoch| (f64::from(epoch.number), of(epoch))).collect(),
+    };
+    let losses = [curve("training", |e| e.training_loss), curve("validation", |e| e.validation_loss)];
+    let rate = [curve("learning rate", |e| e.learning_rate)];
+    Ok(curves("epoch", "loss", &losses)? + &curves("epoch", "learning rate", &rate)?)
 }
 
 fn summary(record: &Record) -> String {
