@@ -40,15 +40,15 @@ struct Lesson {
 impl Lesson {
     /// Loads by formula, of which the hydrostatic part is exactly what the model knows beforehand.
     fn new() -> Self {
-        Self::of(|_| true)
+        Self::of(20, |_| true)
     }
 
-    /// Of some of the samples.
-    fn of(wanted: impl Fn(&Sample) -> bool) -> Self {
+    /// Of so many cases of each vehicle, and some of their samples.
+    fn of(cases: usize, wanted: impl Fn(&Sample) -> bool) -> Self {
         let vehicle = |name: &str| common::model(name).vehicle().clone();
         let vehicles: BTreeMap<String, Vehicle> =
             common::VEHICLES.map(|name| (name.to_owned(), vehicle(name))).into();
-        let settings = Analytic { cases: 20, ..Analytic::default() };
+        let settings = Analytic { cases, ..Analytic::default() };
         let mut data = train::analytic::dataset(&vehicles, &settings, 1).unwrap();
         data.samples.retain(wanted);
         let source = Source::new(data, &vehicles, false).unwrap();
@@ -233,7 +233,7 @@ fn far_from_what_was_learnt_the_known_physics_is_left_and_marked() {
 #[test]
 fn a_vehicle_is_far_from_what_only_another_did() {
     // the Husky is symmetric, so its cases have images astern; of the Warthog none is learnt
-    let lesson = Lesson::of(|sample| sample.vehicle == "husky" || sample.condition.velocity.x > 0.0);
+    let lesson = Lesson::of(20, |sample| sample.vehicle == "husky" || sample.condition.velocity.x > 0.0);
     let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
     let distance = |name: &str, speed: f64| {
         let astern = Condition::level(Vec3::new(speed, 0.1, 0.0), 0.19);
@@ -273,7 +273,8 @@ fn a_surface_that_no_case_wetted_has_nothing_learnt_however_near_the_state() {
 
 #[test]
 fn a_network_that_learnt_little_states_how_far_it_is_off() {
-    let lesson = Lesson::new();
+    // of 20 cases the factors would be those of the worst one
+    let lesson = Lesson::of(40, |_| true);
     let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
     let names: Vec<&String> = models.keys().collect();
     let (mut stated, mut missed) = (0.0, 0.0);

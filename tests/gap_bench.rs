@@ -228,17 +228,20 @@ fn a_load_that_no_function_of_the_state_predicts_is_not_called_nothing() {
 
 #[test]
 fn the_trials_that_the_tool_asks_for_tell_a_pair_apart() {
-    let report = |name: &str| report_at_full_size(Family::Confounded, 8, 1, &format!("confounded-00{name}"));
     // a basin, steady speeds and weights for a drag, weights for a density
-    for (open, asked, told, named) in [
+    for (seed, open, asked, told, named) in [
         (
-            "0-drag_coefficient_error",
+            // with seed 1 the blockage would have to be less than any that was published, and is no candidate
+            23,
+            "0-linear_damping",
             &["channel of another width", "known weights", "Froude number below 0.1"][..],
             "1-linear_damping-resolved",
             "linear_damping",
         ),
-        ("6-density_error", &["known weights"], "7-density_error-resolved", "density_error"),
+        (1, "6-density_error", &["known weights"], "7-density_error-resolved", "density_error"),
     ] {
+        let report =
+            |name: &str| report_at_full_size(Family::Confounded, 8, seed, &format!("confounded-00{name}"));
         let open = report(open);
         assert_eq!(open.verdict, gap::Verdict::Ambiguous, "{}", open.summary);
         let asks = open.separating_experiment.unwrap_or_default();

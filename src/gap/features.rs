@@ -4,7 +4,9 @@ use nalgebra::DVector;
 
 use super::design::Design;
 use super::rates::mean_square;
+use super::robust::strided;
 use super::series::Series;
+use super::smoothing::{running_mean, white_kept};
 use super::statistics::white_variance;
 use crate::frame::GRAVITY;
 
@@ -78,33 +80,37 @@ pub(super) fn without_zeros(design: &Design, target: &DVector<f64>) -> DVector<f
     })
 }
 
+/// Bins to either side of the running means over which energy is looked for.
+const NEAR: usize = 1;
+
 /// How the energy of rows that no trend explains grows with the state: the deviate of the strongest quantity, and the root of
 /// the energy in its upper third, in noises of a bin. White noise of any size is taken off block by block, so that noise that
-/// grows with speed is no structure: as large as it is in the rows before they were smoothed, as far as smoothing leaves it.
-pub(super) fn energy(
-    all: &[Series],
-    design: &Design,
-    target: &DVector<f64>,
-    unsmoothed: &DVector<f64>,
-) -> (f64, f64) {
-    let blocks = design.rows.blocks;
+/// grows with speed is no structure: as large as it is in the rows, which were not smoothed, as far as two running means leave
+/// it.
+pub(super) fn energy(all: &[Series], design: &Design, unsmoothed: &DVector<f64>) -> (f64, f64) {
+    let (blocks, width) = (design.rows.blocks, design.rows.width);
     // the zero of a trial is no force that comes and goes
-    let (target, unsmoothed) = (without_zeros(design, target), without_zeros(design, unsmoothed));
+    let unsmoothed = without_zeros(design, unsmoothed);
     let mut series: Vec<[[Vec<f64>; 2]; 6]> = vec![Default::default(); blocks];
-    for (row, place) in design.rows.rows.iter().enumerate() {
-        let [smooth, rough] = &mut series[place.block][place.component];
-        smooth.push(target[row]);
-        rough.push(unsmoothed[row]);
+    for trial in &design.rows.of_trial {
+        for first in 0..width {
+            let rough = strided(&unsmoothed.as_slice()[trial.clone()], first, width);
+            let mut smooth = rough.clone();
+            (0..2).for_each(|_| running_mean(&mut smooth, NEAR));
+            let places = design.rows.rows[trial.clone()].iter().skip(first).step_by(width);
+            for ((place, rough), smooth) in places.zip(rough).zip(smooth) {
+                let [of_smooth, of_rough] = &mut series[place.block][place.component];
+                of_smooth.push(smooth);
+                of_rough.push(rough);
+            }
+        }
     }
-    let kept: [f64; 6] =
-        std::array::from_fn(|component| design.noise.smoothing.white_kept(&all[design.trials[0]], component));
-    let of = |([smooth, rough], kept): (&[Vec<f64>; 2], f64)| {
-        (mean_square(smooth) - kept * white_variance(rough)).min(1e6)
-    };
-    let of_block = |components: &[[Vec<f64>; 2]; 6]| {
-        components.iter().zip(kept).filter(|([values, _], _)| values.len() >= 6).map(of).sum()
-    };
-    let excess: Vec<f64> = series.iter().map(of_block).collect();
+    let kept = white_kept(NEAR, 1);
+    let of = |[smooth, rough]: &[Vec<f64>; 2]| (mean_square(smooth) - kept * white_variance(rough)).min(1e6);
+    let excess: Vec<f64> = series
+        .iter()
+        .map(|components| components.iter().filter(|[values, _]| values.len() >= 6).map(of).sum())
+        .collect();
     let features: Vec<Vec<Features>> = all.iter().map(of_bins).collect();
     let of_feature = |index: usize| {
         let values: Vec<f64> = (0..blocks)

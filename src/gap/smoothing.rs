@@ -20,11 +20,6 @@ impl Smoothing {
         bins(series, self.0[component], value)
     }
 
-    /// Share of its variance that white noise of a bin keeps.
-    pub fn white_kept(&self, series: &Series, component: usize) -> f64 {
-        white_kept(half(self.0[component], mean_step(&series.t)), samples_of_bin(series))
-    }
-
     /// Bins beyond which noise that was white, and smoothed, has forgotten itself, by component.
     pub fn reach(&self, bin: f64) -> [usize; 6] {
         // two running means have a sixth of the square of their length for a variance, and their autocovariance twice that
@@ -38,7 +33,7 @@ pub(super) fn samples_of_bin(series: &Series) -> usize {
 }
 
 /// Share that the variance of a mean of some samples of white noise keeps after two running means.
-fn white_kept(half: usize, samples: usize) -> f64 {
+pub(super) fn white_kept(half: usize, samples: usize) -> f64 {
     let mut weights = vec![0.0; samples + 8 * half];
     weights[4 * half..4 * half + samples].fill(1.0);
     running_mean(&mut weights, half);

@@ -135,7 +135,7 @@ mod tests {
             "{}",
             quiet_white_variance(&values)
         );
-        assert!(white_variance(&values).sqrt() > 3.0);
+        assert!(white_variance(&values).sqrt() > 2.0);
     }
 
     #[test]

@@ -116,7 +116,7 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     let size = (structure.gain / rows).sqrt();
     // a force that comes and goes with no phase of its own shows in its energy alone
     let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
-    let (deviate, energy) = energy(all, design, &design.y, &unsmoothed);
+    let (deviate, energy) = energy(all, design, &unsmoothed);
     let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
     let kept = lasting(design, &design.y);
     let moving = lasting(design, &without_zeros(design, &design.y));
