@@ -273,7 +273,8 @@ fn a_surface_that_no_case_wetted_has_nothing_learnt_however_near_the_state() {
 
 #[test]
 fn a_network_that_learnt_little_states_how_far_it_is_off() {
-    // of 20 cases the factors would be those of the worst one
+    // the share goes by the seed of the training, from 0.20 to 0.32 over three of them, with 20 cases as with 40: what so little
+    // teaching states is three to five times too wide, and this seed lies above the bar
     let lesson = Lesson::of(40, |_| true);
     let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
     let names: Vec<&String> = models.keys().collect();
