@@ -89,6 +89,11 @@ fn gaussian(random: &mut Random) -> f64 {
 /// Trials of the Warthog that speed up and slow down straight ahead in three depths: the model's force, the planted
 /// effect by a formula of its own, and noise.
 fn write_trials(folder: &Path, surge: f64) {
+    write_trials_of(folder, surge, |_| true);
+}
+
+/// The same, of which only some change their speed.
+fn write_trials_of(folder: &Path, surge: f64, changes_speed: impl Fn(u32) -> bool) {
     std::fs::create_dir_all(folder).expect("made");
     let manifest = "vehicle = \"warthog\"\ngenerated = \"for a test\"\n[sensor_noise]\nfx = 8.0\nfz = 8.0\n";
     std::fs::write(folder.join("trials.toml"), manifest).expect("written");
@@ -99,13 +104,14 @@ fn write_trials(folder: &Path, surge: f64) {
         let mut random = Random::new(u64::from(trial) + 1);
         let depth = [0.15, 0.22, 0.3][trial as usize % 3];
         let (top, rate) = (0.8 + 0.15 * f64::from(trial), 0.9 + 0.1 * f64::from(trial % 4));
+        let swing = f64::from(u8::from(changes_speed(trial)));
         let plane = Condition::level(Vec3::zeros(), depth).water_plane(vehicle.z0);
         let volume = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &Vec3::zeros()).displaced_volume;
         let mut text = String::from("t,vx,vy,vz,wx,wy,wz,depth,ax,ay,az,fx,fz\n");
         for sample in 0..400 {
             let t = 0.02 * f64::from(sample);
-            let v = 0.5 * top * (1.0 - (rate * t).cos());
-            let a = 0.5 * top * rate * (rate * t).sin();
+            let v = 0.5 * top * (1.0 - swing * (rate * t).cos());
+            let a = 0.5 * top * swing * rate * (rate * t).sin();
             let state = Condition::level(Vec3::new(v, 0.0, 0.0), depth);
             model.evaluate(&state, &mut workspace, &mut forces);
             let fx = forces.wrench.force.x - surge * 1000.0 * volume * a + NOISE * gaussian(&mut random);
@@ -162,6 +168,26 @@ fn what_is_named_is_added_and_taken_back() {
     assert_eq!(place.query()["wrench"], before["wrench"]);
     let output = place.wade(&["vehicle", "rollback", "warthog", "--server", &nobody]);
     assert_eq!(output.status.code(), Some(1));
+}
+
+#[test]
+fn what_one_condition_shows_is_added_where_that_is_asked_for() {
+    let place = Place::new();
+    write_trials_of(&place.path("trials"), SURGE, |trial| [3, 7].contains(&trial));
+    let bundle = place.bundle();
+    let refused = place.gap("trials", &[]);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(said.contains("added_mass was seen in one condition only"), "{said}{:?}", refused.stdout);
+    assert!(said.contains("--provisional"), "{said}");
+    assert_eq!(place.bundle(), bundle);
+    assert!(!place.path("gap/effects.toml").exists());
+    let output = place.gap("trials", &["--provisional"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("(provisional: one condition only)"));
+    assert_eq!(place.query()["effects"][0]["name"], "added_mass");
+    let file = std::fs::read_to_string(place.path("gap/effects.toml")).expect("written");
+    assert!(file.contains("provisional = true"), "{file}");
 }
 
 #[test]

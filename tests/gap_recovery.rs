@@ -496,6 +496,91 @@ fn a_placebo_of_several_columns_counts_though_one_of_them_hardly_changes() {
     assert!(placebo > 0.0 && placebo < real, "{:?}", gain.placebo);
 }
 
+/// Why an effect was not named.
+fn why(report: &Report, name: &str) -> Option<gap::Refusal> {
+    report.rejected.iter().find(|rejected| rejected.name == name)?.why
+}
+
+/// What one effect of the library is said to be, of loads on runs that push again and again.
+fn judged(effect: Effect, count: usize, load: impl Fn(usize, &[State]) -> Vec<[f64; 6]>) -> Report {
+    let motions = pushes(count, SAMPLES, 26);
+    let loads: Vec<Vec<[f64; 6]>> = motions.iter().enumerate().map(|(i, motion)| load(i, motion)).collect();
+    let trials = trials(&motions, &loads, &Noise::white(NOISE), 26);
+    run_with(&trials, &Config { library: vec![effect], ..Config::default() })
+}
+
+#[test]
+fn a_fault_that_half_of_the_trials_have_is_none_of_the_sensor_and_not_called_nothing() {
+    let gain = |of: &dyn Fn(usize) -> f64| {
+        judged(Effect::SensorGain, TRIALS, |trial, motion| {
+            motion.iter().map(|s| [of(trial) * planted::simulate(s)[0], 0.0, 0.0, 0.0, 0.0, 0.0]).collect()
+        })
+    };
+    let steady = gain(&|_| 0.3);
+    assert_eq!(names(&steady), ["sensor_gain"], "{} {:?}", steady.summary, steady.rejected);
+    // the gap is twelve times the noise, but neither the gain nor a smooth function holds in all of the trials
+    let erratic = gain(&|trial| if trial % 2 == 0 { 0.6 } else { 0.0 });
+    assert_eq!(erratic.verdict, Verdict::NoCandidateFits, "{}", erratic.summary);
+    assert!(erratic.gap.size["fx"].rms > 10.0 * erratic.gap.floors["fx"].sample, "{:?}", erratic.gap.size);
+
+    let zero = judged(Effect::SensorBias, 3 * TRIALS, |trial, motion| {
+        vec![[if trial % 2 == 0 { 3.0 * NOISE[0] } else { 0.0 }, 0.0, 0.0, 0.0, 0.0, 0.0]; motion.len()]
+    });
+    assert_eq!(zero.verdict, Verdict::NoCandidateFits, "{}", zero.summary);
+    assert_eq!(why(&zero, "sensor_bias"), Some(gap::Refusal::Unstable), "{:?}", zero.rejected);
+}
+
+#[test]
+fn a_force_that_a_shifted_drag_explains_as_well_is_not_called_drag() {
+    // it goes with how hard a trial was driven, not with when
+    let report = judged(Effect::DragCoefficientError, TRIALS, |_, motion| {
+        let drag = plant("drag_coefficient_error", motion);
+        let mean = drag.iter().map(|w| w[0]).sum::<f64>() / drag.len() as f64;
+        vec![[mean, 0.0, 0.0, 0.0, 0.0, 0.0]; motion.len()]
+    });
+    assert_eq!(report.verdict, Verdict::NoCandidateFits, "{} {:?}", report.summary, report.rejected);
+    assert_eq!(why(&report, "drag_coefficient_error"), Some(gap::Refusal::Placebo), "{:?}", report.rejected);
+}
+
+#[test]
+fn what_many_samples_show_far_below_the_noise_of_one_is_not_named() {
+    const MANY: usize = 60;
+    let of = |times: f64| {
+        judged(Effect::DragCoefficientError, MANY, move |_, motion| {
+            let drag = plant("drag_coefficient_error", motion);
+            drag.into_iter().map(|w| [times * w[0], 0.0, 0.0, 0.0, 0.0, 0.0]).collect()
+        })
+    };
+    let size = rms(&pushes(MANY, SAMPLES, 26)
+        .iter()
+        .map(|motion| plant("drag_coefficient_error", motion))
+        .collect::<Vec<_>>())[0];
+    let faint = of(0.06 * NOISE[0] / size);
+    assert_eq!(why(&faint, "drag_coefficient_error"), Some(gap::Refusal::Irrelevant), "{:?}", faint.rejected);
+    assert_eq!(faint.verdict, Verdict::NothingMissing, "{}", faint.summary);
+    assert_eq!(names(&of(0.3 * NOISE[0] / size)), ["drag_coefficient_error"]);
+}
+
+#[test]
+fn trials_that_repeat_each_other_tell_a_noise_that_is_slow() {
+    let mut motions = pushes(TRIALS, SAMPLES, 27);
+    for pair in motions.chunks_mut(2) {
+        pair[1] = pair[0].clone();
+    }
+    let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| vec![[0.0; 6]; motion.len()]).collect();
+    let slow = Noise { colored: 0.5, velocity: 0.0, depth: 0.0, acceleration: 0.0, ..Noise::white(NOISE) };
+    let mut trials = trials(&motions, &nothing, &slow, 27);
+    let alone = run(&trials).gap.floors["fx"];
+    trials.manifest.measured.repeats =
+        (0..TRIALS).step_by(2).map(|i| [i, i + 1].map(|i| format!("run{i:02}")).into()).collect();
+    let repeated = run(&trials).gap.floors["fx"];
+    assert_eq!((alone.source, repeated.source), (gap::FloorSource::HighFrequency, gap::FloorSource::Repeats));
+    // the means of two trials take some of a slow noise with them: 1 s of it in 8 s is an eighth of its variance
+    let expected = NOISE[0] * (1.0_f64 - 2.0 * 0.5 / 8.0).sqrt();
+    assert!((repeated.sample / expected - 1.0).abs() < 0.1, "{repeated:?}, planted {expected}");
+    assert!(alone.sample < 0.6 * expected, "{alone:?}");
+}
+
 #[test]
 fn trials_that_repeat_each_other_are_kept_back_together_and_two_have_no_interval() {
     let (mut trials, _) = with(&["squat"], 3.0, 18);

@@ -286,9 +286,9 @@ pub enum PlanError {
         /// What it must be.
         expected: &'static str,
     },
-    /// Driving twins need the paper set.
+    /// Driving twins need steady cases over a parked bed.
     #[error(
-        "there are {available} cases of the paper set without a driving twin, {wanted} are asked for: plan more of the paper set first"
+        "there are {available} steady cases without a driving twin, {wanted} are asked for: plan more of the paper set first"
     )]
     NoTwin {
         /// Cases to take a twin of.

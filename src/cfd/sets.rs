@@ -63,19 +63,26 @@ impl Plan {
             .collect()
     }
 
-    /// The paper cases that move most nearly straight ahead, once more with a driving bed.
+    /// The steady cases that move most nearly straight ahead, as vehicles drive, once more with a driving bed.
     fn twins(&self, count: usize) -> Result<Vec<Case>, PlanError> {
-        let twin_id = |case: &Case| case.id.replacen("-paper-", "-driving-", 1);
-        let known: BTreeSet<&str> = self.cases.iter().map(|case| case.id.as_str()).collect();
-        let mut free: Vec<&Case> =
-            self.of(Set::Paper).filter(|c| !known.contains(twin_id(c).as_str())).collect();
+        let twin = |case: &Case| {
+            let origin = match case.set {
+                Set::Paper => String::new(),
+                set => format!("{set}-"),
+            };
+            let id = case.id.replacen(&format!("-{}-", case.set), &format!("-{}-{origin}", Set::Driving), 1);
+            Case { id, set: Set::Driving, bed: Bed::Driving, ..case.clone() }
+        };
+        let known = |twin: &Case| self.cases.iter().any(|case| case.is_same_state(twin));
+        let moves = |case: &&Case| case.speed_mps > 0.0 && case.cell_scale == 1.0;
+        let steady = [Set::Paper, Set::Check, Set::Ahead].into_iter().flat_map(|set| self.of(set));
+        let mut free: Vec<Case> = steady.filter(moves).map(twin).filter(|twin| !known(twin)).collect();
         if free.len() < count {
             return Err(PlanError::NoTwin { available: free.len(), wanted: count });
         }
         free.sort_by(|a, b| a.heading_deg.abs().total_cmp(&b.heading_deg.abs()));
-        let twin =
-            |case: &Case| Case { id: twin_id(case), set: Set::Driving, bed: Bed::Driving, ..case.clone() };
-        Ok(free.into_iter().take(count).map(twin).collect())
+        free.truncate(count);
+        Ok(free)
     }
 
     /// Ramps of the speed at three depths, up and down, gentle and hard; head-on, and one broadside. And from rest, where
@@ -229,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn driving_twins_are_the_straightest_paper_cases_and_never_twice() {
+    fn driving_twins_are_the_straightest_steady_cases_and_never_twice() {
         let mut plan = empty();
         plan.extend(Set::Paper, 10, 1, 0.378).unwrap();
         plan.extend(Set::Driving, 4, 1, 0.378).unwrap();
@@ -238,6 +245,17 @@ mod tests {
         assert_eq!(twins.len(), 8);
         assert!(twins.iter().all(|c| c.bed == Bed::Driving));
         assert!(plan.extend(Set::Driving, 4, 1, 0.378).is_err());
+        plan.extend(Set::Check, 0, 1, 0.378).unwrap();
+        plan.extend(Set::Ahead, 0, 1, 0.378).unwrap();
+        plan.extend(Set::Driving, 24, 1, 0.378).unwrap();
+        let ahead: Vec<&Case> = plan.of(Set::Driving).skip(8).collect();
+        assert!(ahead.iter().all(|c| c.heading_deg == 0.0 && c.speed_mps > 0.0 && c.cell_scale == 1.0));
+        let ids: BTreeSet<&str> = plan.cases.iter().map(|case| case.id.as_str()).collect();
+        assert_eq!(ids.len(), plan.cases.len());
+        assert!(
+            ids.contains("husky-driving-ahead-0003") && ids.contains("husky-driving-check-0001"),
+            "{ids:?}"
+        );
     }
 
     #[test]

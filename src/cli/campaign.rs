@@ -132,7 +132,7 @@ struct PlanCommand {
     vehicle: String,
     #[command(flatten)]
     vehicles: Vehicles,
-    /// What to add: `paper` and `wide` are Latin hypercubes, `driving` the straightest paper cases with a moving bed,
+    /// What to add: `paper` and `wide` are Latin hypercubes, `driving` the straightest steady cases with a moving bed,
     /// `unsteady`, `check`, `mesh` and `ahead` fixed lists, which take no `--cases`
     #[arg(long, value_enum)]
     set: SetName,

@@ -20,12 +20,21 @@ const LAST: usize = WINDOWS[2][1];
 /// What lasts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lasting {
-    /// Deviate of the trial in which it stands out most.
-    pub deviate: f64,
-    /// Its root mean square in that trial, in noises of a bin.
-    pub size: f64,
+    /// In the trial in which it stands out most.
+    pub most: Size,
+    /// In all trials together, in the window in which it stands out most.
+    pub together: Size,
     /// Its sum of squares over all trials, a row each, in the window where it is largest: what swings is against itself in some.
     pub energy: f64,
+}
+
+/// How large what lasts is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Size {
+    /// Deviate.
+    pub deviate: f64,
+    /// Root mean square, in noises of a bin.
+    pub rms: f64,
 }
 
 /// Sums of products of one component of one trial, by lag.
@@ -47,33 +56,63 @@ pub(super) fn lasting(design: &Design, target: &DVector<f64>) -> Lasting {
         })
         .collect();
     let memory = memory(&trials);
-    let mut found = Lasting { deviate: 0.0, size: 0.0, energy: 0.0 };
-    let mut energies = [0.0; WINDOWS.len()];
-    for trial in &trials {
-        for ([first, last], energy) in WINDOWS.into_iter().zip(&mut energies) {
-            let of = in_window(trial, first, last, memory);
-            *energy += of.energy;
-            if of.deviate > found.deviate {
-                found = of;
-            }
-        }
+    let mut most = Size { deviate: 0.0, rms: 0.0 };
+    let (mut together, mut energy) = (most, 0.0_f64);
+    let larger = |a: Size, b: Size| if b.deviate > a.deviate { b } else { a };
+    for [first, last] in WINDOWS {
+        let sums: Vec<Window> = trials.iter().map(|trial| in_window(trial, first, last, memory)).collect();
+        most = sums.iter().map(Window::size).fold(most, larger);
+        together = larger(together, sums.iter().fold(Window::default(), Window::and).size());
+        energy = energy.max(sums.iter().map(Window::energy).sum::<f64>().abs());
     }
-    Lasting { energy: energies.into_iter().map(f64::abs).fold(0.0, f64::max), ..found }
+    Lasting { most, together, energy }
 }
 
-/// What lasts of a trial over a window of lags.
-fn in_window(trial: &[Products], first: usize, last: usize, memory: f64) -> Lasting {
-    let (mut sum, mut variance, mut pairs, mut rows) = (0.0, 0.0, 0.0, 0.0);
+/// Sums of products over a window of lags: their sum and its variance where they are noise, pairs, rows.
+#[derive(Debug, Default)]
+struct Window {
+    sum: f64,
+    variance: f64,
+    pairs: f64,
+    rows: f64,
+}
+
+impl Window {
+    fn and(self, other: &Self) -> Self {
+        Self {
+            sum: self.sum + other.sum,
+            variance: self.variance + other.variance,
+            pairs: self.pairs + other.pairs,
+            rows: self.rows + other.rows,
+        }
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / f64::max(self.pairs, 1.0)
+    }
+
+    fn size(&self) -> Size {
+        let deviate = self.sum.abs() / self.variance.sqrt().max(f64::MIN_POSITIVE);
+        Size { deviate, rms: self.mean().abs().sqrt() }
+    }
+
+    fn energy(&self) -> f64 {
+        self.mean() * self.rows
+    }
+}
+
+/// What a trial holds in a window of lags.
+fn in_window(trial: &[Products], first: usize, last: usize, memory: f64) -> Window {
+    let mut window = Window::default();
     for products in trial {
         let own: f64 = (first..=last).map(|lag| (products.count - lag as f64).max(0.0)).sum();
         let power = products.lags[0] / products.count.max(1.0);
-        sum += products.lags[first..=last].iter().sum::<f64>();
-        variance += own * (power * memory).powi(2);
-        (pairs, rows) = (pairs + own, rows + products.count);
+        window.sum += products.lags[first..=last].iter().sum::<f64>();
+        window.variance += own * (power * memory).powi(2);
+        window.pairs += own;
+        window.rows += products.count;
     }
-    let mean = sum / f64::max(pairs, 1.0);
-    let deviate = sum.abs() / variance.sqrt().max(f64::MIN_POSITIVE);
-    Lasting { deviate, size: mean.abs().sqrt(), energy: mean * rows }
+    window
 }
 
 fn products(rows: &[f64], component: usize, width: usize) -> Products {

@@ -26,6 +26,9 @@ const LASTS: f64 = 7.0;
 /// trials reaches by chance: noise that hangs together is no larger than all of the noise. Deviates, and root mean square
 /// in noises of a bin.
 const LOUD: [f64; 2] = [3.5, 1.2];
+/// Noises of a bin beyond which what lasts in all trials together is no noise that hangs together: one that has forgotten itself
+/// after half a second reaches 2.
+const HUGE: f64 = 4.0;
 
 /// Least share of the structure that must be explained where a fault of the sensor is named. Laws of the water hold in
 /// outline; a zero, a gain or a turned axis is exact, and where one leaves more it stands in for another thing.
@@ -99,7 +102,7 @@ impl Found {
 /// True where much of what lasts of the gap is still there after the named effects.
 fn leaves_much(design: &Design, residual: &DVector<f64>) -> bool {
     let (before, after) = (lasting(design, &design.y), lasting(design, residual));
-    f64::min(before.deviate, after.deviate) > LASTS && after.energy > MUCH * before.energy
+    f64::min(before.most.deviate, after.most.deviate) > LASTS && after.energy > MUCH * before.energy
 }
 
 /// Predictable from the state, or lasting in a trial, and large enough to matter.
@@ -127,8 +130,9 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     setting.computed && above()
         || structure.deviate > STRUCTURE && size > least
         || deviate > bar && energy > 2.0 * least.max(0.5)
-        || kept.deviate > LASTS && kept.size > least
-        || moving.deviate > LOUD[0] && moving.size > LOUD[1].max(least)
+        || kept.most.deviate > LASTS && kept.most.rms > least
+        || moving.most.deviate > LOUD[0] && moving.most.rms > LOUD[1].max(least)
+        || moving.together.deviate > LOUD[0] && moving.together.rms > HUGE.max(least)
 }
 
 /// Loss that nothing explains: the whole library at once, or the general model, whichever leaves less.

@@ -26,6 +26,8 @@ pub struct Estimate {
     pub value: f64,
     /// Standard error; absent where the tool knows none.
     pub std: Option<f64>,
+    /// 90 % interval; absent where the tool states none.
+    pub interval: Option<[f64; 2]>,
     /// Unit.
     #[serde(default)]
     pub unit: String,
@@ -142,7 +144,7 @@ mod tests {
         let report = serde_json::json!({
             "verdict": "ambiguous",
             "effects": [{"name": "added_mass", "kind": "physics", "share_of_gap": 0.7, "provisional": false,
-                "parameters": {"surge": {"value": 31.0, "std": 2.0, "unit": "kg"}}}],
+                "parameters": {"surge": {"value": 31.0, "std": 2.0, "interval": [27.5, 34.0], "unit": "kg"}}}],
             "alternatives": [["mass_error"], {"names": ["sensor_delay", "sensor_gain"]}],
             "separating_experiment": "the same on dry ground",
             "not_testable": [{"name": "rotation", "why": "no yaw", "minimum_detectable": null}],
@@ -155,7 +157,8 @@ mod tests {
         assert!(answer.possible().contains("sensor_gain") && !answer.names().contains("mass_error"));
         assert!(answer.says_not_testable("rotation") && !answer.says_not_testable("squat"));
         assert_eq!(answer.closure(), Some(0.91));
-        assert_eq!(answer.effects[0].parameters["surge"].std, Some(2.0));
+        let surge = &answer.effects[0].parameters["surge"];
+        assert_eq!((surge.std, surge.interval), (Some(2.0), Some([27.5, 34.0])));
         assert!(Answer::from_report(&serde_json::json!({"verdict": "perhaps"})).is_err());
     }
 }

@@ -26,8 +26,16 @@ pub struct Compared {
     pub planted: f64,
     /// As estimated.
     pub estimated: f64,
-    /// Its standard error.
-    pub std: Option<f64>,
+    /// Its 90 % interval as stated; of a tool that states a standard error alone, that of a normal variable.
+    pub interval: Option<[f64; 2]>,
+    /// True of the one of an effect that was planted largest.
+    pub is_largest: bool,
+}
+
+impl Compared {
+    fn is_covered(&self) -> Option<bool> {
+        self.interval.map(|[low, high]| (low..=high).contains(&self.planted))
+    }
 }
 
 /// One case as it was answered.
@@ -57,7 +65,8 @@ pub struct Judged {
     pub named: BTreeSet<String>,
     /// What was held possible.
     pub possible: BTreeSet<String>,
-    /// Planted parameters that were estimated, of effects that were rightly named.
+    /// Planted parameters that were estimated, of effects that were rightly named. Each tells of its interval; error and
+    /// sign go by the largest of an effect, since those of one that is next to nothing say nothing.
     pub parameters: Vec<Compared>,
     /// Effects rightly named of whose parameters none has a known name.
     pub not_compared: Vec<String>,
@@ -119,10 +128,11 @@ impl Judged {
         for (hidden, planted) in generated.truth.effects.iter().zip(&generated.truth.parameters) {
             let name = hidden.effect.name();
             let Some(effect) = answer.effects.iter().find(|effect| effect.name == name) else { continue };
-            match compare(&name, planted, effect) {
-                Some(compared) => self.parameters.push(compared),
-                None => self.not_compared.push(name),
+            let compared = compare(&name, planted, effect);
+            if compared.is_empty() {
+                self.not_compared.push(name);
             }
+            self.parameters.extend(compared);
         }
     }
 
@@ -141,8 +151,8 @@ impl Judged {
     }
 }
 
-/// The largest planted parameter that the tool states under a known name, in the same unit where it states one.
-fn compare(effect: &str, planted: &[Parameter], named: &super::answer::NamedEffect) -> Option<Compared> {
+/// The planted parameters that the tool states under a known name, in the same unit where it states one.
+fn compare(effect: &str, planted: &[Parameter], named: &super::answer::NamedEffect) -> Vec<Compared> {
     let found = |parameter: &Parameter| {
         let estimates = parameter.names.iter().filter_map(|name| named.parameters.get_key_value(*name));
         let same_unit = |unit: &str| {
@@ -156,14 +166,22 @@ fn compare(effect: &str, planted: &[Parameter], named: &super::answer::NamedEffe
             .map(|(name, e)| (name.clone(), e.clone()))
             .next()
     };
-    let all = planted.iter().filter_map(|parameter| Some((parameter, found(parameter)?)));
-    let largest = all.max_by(|(a, _), (b, _)| a.value.abs().total_cmp(&b.value.abs()));
-    largest.map(|(parameter, (name, estimate))| Compared {
-        name: format!("{effect}.{name}"),
-        planted: parameter.value,
-        estimated: estimate.value,
-        std: estimate.std,
-    })
+    let of = |parameter: &Parameter| {
+        let (name, estimate) = found(parameter)?;
+        let normal = |std: f64| [estimate.value - Z90 * std, estimate.value + Z90 * std];
+        Some(Compared {
+            name: format!("{effect}.{name}"),
+            planted: parameter.value,
+            estimated: estimate.value,
+            interval: estimate.interval.or_else(|| estimate.std.map(normal)),
+            is_largest: false,
+        })
+    };
+    let mut all: Vec<Compared> = planted.iter().filter_map(of).collect();
+    if let Some(largest) = all.iter_mut().max_by(|a, b| a.planted.abs().total_cmp(&b.planted.abs())) {
+        largest.is_largest = true;
+    }
+    all
 }
 
 fn overlap(gate: &Region, generated: &Generated, answer: &Answer) -> Option<f64> {
@@ -247,15 +265,18 @@ pub fn rows(judged: &[Judged]) -> Vec<Row> {
         }),
     ];
     for (strength, reach) in [(3.0, 0.05), (1.0, 0.15)] {
-        let errors: Vec<f64> =
-            single(strength).flat_map(|case| &case.parameters).map(relative_error).collect();
+        let errors: Vec<f64> = single(strength)
+            .flat_map(|case| &case.parameters)
+            .filter(|p| p.is_largest)
+            .map(relative_error)
+            .collect();
         let measure = format!("parameter error, median, {strength} x the floor");
         rows.push(bootstrap(&measure, Reach::AtMost(reach), &errors, median));
     }
     let parameters = || judged.iter().flat_map(|case| &case.parameters);
-    let signs = parameters().map(|p| p.planted * p.estimated < 0.0);
+    let signs = parameters().filter(|p| p.is_largest).map(|p| p.planted * p.estimated < 0.0);
     rows.push(share("parameters with the wrong sign", Reach::AtMost(0.0), signs));
-    let covered = parameters().filter_map(|p| Some((p.estimated - p.planted).abs() <= Z90 * p.std?));
+    let covered = parameters().filter_map(Compared::is_covered);
     rows.push(share("stated 90 % interval covers", Reach::Within([0.85, 0.95]), covered));
     for (strength, reach) in [(3.0, 0.9), (1.0, 0.7)] {
         let closures: Vec<f64> = single(strength).map(|case| case.closure.unwrap_or(0.0)).collect();
@@ -406,6 +427,27 @@ mod tests {
         let [low, high] = wilson(9, 10);
         assert!((low - 0.6523).abs() < 2e-3 && (high - 0.9773).abs() < 2e-3, "{low} {high}");
         assert!(wilson(0, 300)[1] < 0.01 && wilson(0, 300)[0] == 0.0);
+    }
+
+    #[test]
+    fn an_interval_is_scored_as_it_is_stated() {
+        let stated = serde_json::json!({"name": "current", "parameters": {
+            "east": {"value": 0.5, "std": 0.001, "interval": [0.45, 0.52], "unit": "m/s"},
+            "north": {"value": 0.1, "std": 0.02, "unit": "m/s"}}});
+        let named = serde_json::from_value(stated).unwrap();
+        let planted = |name, value| Parameter { names: name, unit: "m/s", value };
+        let compared = |east, north| {
+            compare("current", &[planted(&["east"], east), planted(&["u", "north"], north)], &named)
+        };
+        // the ends that are stated, not those of the standard error; and of both parameters, that of a standard error alone
+        let covered =
+            |east, north| compared(east, north).iter().map(Compared::is_covered).collect::<Vec<_>>();
+        assert_eq!(covered(0.46, 0.13), [Some(true), Some(true)]);
+        assert_eq!(covered(0.53, 0.06), [Some(false), Some(false)]);
+        let largest = |east, north| compared(east, north).iter().map(|p| p.is_largest).collect::<Vec<_>>();
+        assert_eq!((largest(0.5, 0.1), largest(0.1, -0.5)), (vec![true, false], vec![false, true]));
+        let other_unit = Parameter { names: &["east"], unit: "km/h", value: 1.8 };
+        assert!(compare("current", &[other_unit], &named).is_empty());
     }
 
     #[test]
