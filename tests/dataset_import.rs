@@ -313,6 +313,23 @@ fn a_run_that_is_too_short_is_named() {
 }
 
 #[test]
+fn cases_without_moments_are_told() {
+    let cases = copy("openfoam");
+    let said = |cases: &Path| {
+        let folder = TempDir::new().unwrap();
+        let output = import("openfoam", "warthog", cases, &folder.path().join("data.parquet"), &[]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        said
+    };
+    let whole = said(cases.path());
+    assert!(!whole.contains("moments"), "{whole}");
+    fs::remove_file(cases.path().join("warthog-oblique/postProcessing/hull_front/0/moment.dat")).unwrap();
+    let less = said(cases.path());
+    assert!(less.contains("warning: 1 of the cases, `warthog-oblique` the first, have no moments"), "{less}");
+}
+
+#[test]
 fn cases_of_two_conventions_are_kept_apart() {
     let error = refused("openfoam", "warthog", |cases| {
         edit(&cases.join("warthog-oblique/case.toml"), |text| text.replace("\"dry\"", "\"wetted\""));

@@ -271,6 +271,14 @@ impl ImportCases {
             bar.set_position(done as u64);
         })?;
         bar.finish_and_clear();
+        let without = data.without_moments();
+        if let Some(first) = without.first() {
+            let count = without.len();
+            eprintln!(
+                "warning: {count} of the cases, `{first}` the first, have no moments: where their forces act can neither \
+                 be learnt from them nor judged on them"
+            );
+        }
         write(&self.out, &data)
     }
 }

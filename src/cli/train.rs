@@ -387,9 +387,7 @@ impl Progress {
 
     /// Takes note of an epoch.
     pub fn epoch(&self, epoch: &Epoch) {
-        let (loss, rate) = (epoch.validation_loss, epoch.learning_rate);
-        let text =
-            format!("loss {:.3e}, validation {loss:.3e}, learning rate {rate:.1e}", epoch.training_loss);
+        let text = said(epoch);
         // a run that goes on from a checkpoint has not spent the time of the epochs before
         let first = self.first.get().unwrap_or_else(|| {
             self.bar.set_position(u64::from(epoch.number - 1));
@@ -402,11 +400,21 @@ impl Progress {
         if !std::io::stderr().is_terminal() && elapsed - self.spoken.get() >= Duration::from_secs(LINE_S) {
             self.spoken.set(elapsed);
             let each = elapsed.as_secs_f64() / f64::from(epoch.number - first + 1);
-            let left = each * f64::from(self.epochs - epoch.number);
-            eprintln!("epoch {} of {}, {left:.0} s left at most, {text}", epoch.number, self.epochs);
+            eprintln!("{}", line(epoch, self.epochs, each));
         }
         self.bar.set_message(text);
     }
+}
+
+fn said(epoch: &Epoch) -> String {
+    let Epoch { training_loss, validation_loss, learning_rate, .. } = epoch;
+    format!("loss {training_loss:.3e}, validation {validation_loss:.3e}, learning rate {learning_rate:.1e}")
+}
+
+/// The line of an epoch, one of which takes so many seconds.
+fn line(epoch: &Epoch, epochs: u32, each: f64) -> String {
+    let left = each * f64::from(epochs - epoch.number);
+    format!("epoch {} of {epochs}, {left:.0} s left at most, {}", epoch.number, said(epoch))
 }
 
 fn report(trained: &VehicleRecord, judged: &str, version: u32) {
@@ -419,5 +427,18 @@ fn report(trained: &VehicleRecord, judged: &str, version: u32) {
     for (c, axis) in ["Fx", "Fy", "Fz"].into_iter().enumerate() {
         let (mae, rms, spread) = (score.mae[c], score.rms[c], score.spread[c]);
         println!("  {axis}: MAE {mae:.2} N, RMSE {rms:.2} N, spread of the target {spread:.1} N");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_tells_the_losses_the_rate_and_the_time_left() {
+        let epoch = Epoch { number: 30, training_loss: 0.0123, validation_loss: 0.0456, learning_rate: 5e-4 };
+        let expected =
+            "epoch 30 of 100, 105 s left at most, loss 1.230e-2, validation 4.560e-2, learning rate 5.0e-4";
+        assert_eq!(line(&epoch, 100, 1.5), expected);
     }
 }

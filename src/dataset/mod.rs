@@ -25,7 +25,7 @@ pub mod split;
 pub mod summary;
 mod table;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -185,5 +185,11 @@ impl Dataset {
     /// The samples of these numbers, in that order, with the same meta data.
     pub fn subset(&self, samples: &[usize]) -> Self {
         Self { meta: self.meta.clone(), samples: samples.iter().map(|&i| self.samples[i].clone()).collect() }
+    }
+
+    /// Cases of which some surface has no moment, by name.
+    pub fn without_moments(&self) -> BTreeSet<&str> {
+        let lacks = |sample: &&Sample| sample.surfaces.iter().any(|surface| surface.moment.is_none());
+        self.samples.iter().filter(lacks).map(|sample| sample.case.as_str()).collect()
     }
 }

@@ -210,6 +210,8 @@ fn plate_row(sample: &Sample, plate: &[usize]) -> SurfaceRow {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     fn row(kind: SurfaceKind, area: f32, fraction: f32, depth: f32) -> SurfaceRow {
@@ -232,6 +234,16 @@ mod tests {
             ],
             targets: vec![[1.0, 2.0, 3.0], [10.0, 20.0, 30.0], [100.0, 200.0, 300.0]],
             fractions: vec![1.0, 0.5, 0.5],
+        }
+    }
+
+    #[test]
+    fn the_husky_s_thirteen_surfaces_become_nine_as_in_the_paper_and_the_warthog_s_stay() {
+        for (name, expected) in [("husky", [13, 9]), ("warthog", [10, 10])] {
+            let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("vehicles").join(name);
+            let vehicle = crate::bundle::read_without_weights(&folder).unwrap().vehicle;
+            let rows: Vec<_> = vehicle.surfaces.iter().map(|s| row(s.kind, 1.0, 1.0, 0.1)).collect();
+            assert_eq!([rows.len(), plates(&rows).len()], expected, "{name}");
         }
     }
 
