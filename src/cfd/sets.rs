@@ -253,7 +253,7 @@ mod tests {
         let ids: BTreeSet<&str> = plan.cases.iter().map(|case| case.id.as_str()).collect();
         assert_eq!(ids.len(), plan.cases.len());
         assert!(
-            ids.contains("husky-driving-ahead-0003") && ids.contains("husky-driving-check-0001"),
+            ids.contains("warthog-driving-ahead-0003") && ids.contains("warthog-driving-check-0001"),
             "{ids:?}"
         );
     }
