@@ -440,3 +440,17 @@ fn a_plan_for_another_hull_a_twisted_table_and_a_missing_solver_are_refused() {
     assert!(stderr(&output).contains("upside down"), "{}", stderr(&output));
     assert!(!Path::new(&out).exists());
 }
+
+#[test]
+fn the_committed_campaigns_are_what_their_plans_say() {
+    for vehicle in ["husky", "warthog"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("campaigns").join(vehicle);
+        let report = wade(&["campaign", "report", folder.to_str().expect("a name")]);
+        assert!(report.status.success(), "{}", stderr(&report));
+        let said = String::from_utf8_lossy(&report.stdout).into_owned();
+        assert!(said.contains("paper     175 of 175 cases"), "{said}");
+        // in its own channel, and in one half as large again
+        let in_channel = |line: &&str| line.contains("cells x 1.00, channel x");
+        assert_eq!(said.lines().filter(in_channel).count(), 2, "{said}");
+    }
+}

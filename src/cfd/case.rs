@@ -178,7 +178,8 @@ impl Inputs<'_> {
         let Self { vehicle, case, settings, solver } = self;
         let speed = case.speed_mps.max(case.end_speed_mps);
         let length = vehicle.dimensions.length;
-        let channel = Channel::new(&settings.mesh, placement, length, speed, case.cell_scale);
+        let channel =
+            Channel::new(&settings.mesh, placement, length, speed, [case.cell_scale, case.channel_scale]);
         let level = placement.water_level;
         let mut files = BTreeMap::new();
         let mut add = |path: &str, text: String| {

@@ -88,6 +88,9 @@ pub struct CaseSummary {
     pub drift_fz_n: f64,
     /// Mass that went in and did not come out over the water that went in.
     pub mass_imbalance: f64,
+    /// Size of the channel relative to the settings.
+    #[serde(default = "super::plan::as_set")]
+    pub channel_scale: f64,
 }
 
 impl CaseSummary {
@@ -134,6 +137,7 @@ impl CaseSummary {
             drift_fy_n: outcome.drift[1],
             drift_fz_n: outcome.drift[2],
             mass_imbalance: outcome.mass_imbalance,
+            channel_scale: case.channel_scale,
         }
     }
 }
@@ -146,6 +150,8 @@ fn net(loads: &[Load]) -> Vec3 {
 pub fn state_hash(case: &Case) -> String {
     // a case always has a JSON form; an empty one would match no other
     let text = serde_json::to_string(case).unwrap_or_default();
+    // what was computed in the channel of the settings keeps the hash that it had before there was another
+    let text = text.replace(",\"channel_scale\":1.0}", "}");
     sha256(text.as_bytes())[..32].to_owned()
 }
 

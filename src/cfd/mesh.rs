@@ -69,16 +69,18 @@ impl TurnedBox {
 }
 
 impl Channel {
-    /// The channel for a vehicle of `length` in place, at `speed` [m/s]; `cell_scale` makes every cell coarser.
+    /// The channel for a vehicle of `length` in place, at `speed` [m/s]; `cell_scale` makes every cell coarser, `channel_scale`
+    /// the channel larger.
     pub fn new(
         settings: &MeshSettings,
         placement: &Placement,
         length: f64,
         speed: f64,
-        cell_scale: f64,
+        [cell_scale, channel_scale]: [f64; 2],
     ) -> Self {
         // the paper's 10 x 6 x 3 m for the Warthog; its 6 x 5 x 1.5 m for the Husky is set in the Husky's campaign
-        let size = settings.channel_m.map_or(Vec3::new(6.56, 3.94, 1.97) * length, Vec3::from);
+        let size =
+            settings.channel_m.map_or(Vec3::new(6.56, 3.94, 1.97) * length, Vec3::from) * channel_scale;
         let cell = length / settings.cells_per_length * cell_scale;
         let level = placement.water_level;
         let wet = (level / (settings.wet_layer * cell)).round().max(1.0);

@@ -48,7 +48,7 @@ pub struct Report {
     pub at_rest: Vec<AtRest>,
     /// Head-on cases in fresh water.
     pub head_on: Vec<HeadOn>,
-    /// The same case on finer and finer meshes.
+    /// The same case on finer and finer meshes, then in a larger channel.
     pub meshes: Vec<OnMesh>,
     /// Driving twins against parked ones.
     pub twins: Option<Twins>,
@@ -99,13 +99,15 @@ pub struct HeadOn {
     pub paper_c: Option<f64>,
 }
 
-/// One case on one mesh.
+/// One case on one mesh in one channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OnMesh {
     /// The case.
     pub id: String,
     /// Size of the cells relative to the campaign's.
     pub cell_scale: f64,
+    /// Size of the channel relative to the campaign's.
+    pub channel_scale: f64,
     /// Cells.
     pub cells: usize,
     /// Longitudinal force [N].
@@ -219,8 +221,8 @@ impl Report {
         }
         for mesh in &self.meshes {
             line(format_args!(
-                "  mesh, cells x {:.2}: {} cells, Fx {:.1} N, Fz {:.1} N ({:.1} at rest)",
-                mesh.cell_scale, mesh.cells, mesh.fx_n, mesh.fz_n, mesh.rest_fz_n
+                "  mesh, cells x {:.2}, channel x {:.2}: {} cells, Fx {:.2} N, Fz {:.1} N ({:.1} at rest)",
+                mesh.cell_scale, mesh.channel_scale, mesh.cells, mesh.fx_n, mesh.fz_n, mesh.rest_fz_n
             ));
         }
         if let Some(twins) = &self.twins {
@@ -300,7 +302,7 @@ fn straight_ahead<'a>(cases: &'a [&CaseSummary]) -> Vec<&'a CaseSummary> {
     ahead
 }
 
-/// The check case that was computed on several meshes, coarsest first.
+/// The check case that was computed on several meshes, coarsest first, and in a larger channel.
 fn meshes(cases: &[&CaseSummary]) -> Vec<OnMesh> {
     let all = || [Set::Check, Set::Mesh, Set::Ahead].into_iter().flat_map(|set| of_set(cases, set));
     let Some(first) = all().find(|case| case.cell_scale != 1.0) else { return Vec::new() };
@@ -308,10 +310,12 @@ fn meshes(cases: &[&CaseSummary]) -> Vec<OnMesh> {
         case.speed_mps == first.speed_mps && (case.depth_m - first.depth_m).abs() < 1e-9
     };
     let mut all: Vec<&CaseSummary> = all().filter(same).collect();
-    all.sort_by(|a, b| b.cell_scale.total_cmp(&a.cell_scale));
+    let order = |case: &CaseSummary| (case.channel_scale, -case.cell_scale);
+    all.sort_by(|a, b| order(a).partial_cmp(&order(b)).unwrap_or(std::cmp::Ordering::Equal));
     let row = |case: &CaseSummary| OnMesh {
         id: case.id.clone(),
         cell_scale: case.cell_scale,
+        channel_scale: case.channel_scale,
         cells: case.cells,
         fx_n: case.fx_n,
         fz_n: case.fz_n,

@@ -131,12 +131,12 @@ impl Plan {
             .collect()
     }
 
-    /// The check's state of several meshes on cells 0.36 times as long.
+    /// The check's state of several meshes on cells 0.36 times as long, and in a channel half as large again.
     fn finest(&self) -> Vec<Case> {
         let speed = 0.5 * self.campaign.table.speed_mps.max;
         let [_, depth, _] = self.trial_depths();
-        let case = Case::steady(&self.campaign.vehicle, Set::Mesh, 0, speed, depth);
-        vec![Case { cell_scale: 0.36, ..case }]
+        let case = |number| Case::steady(&self.campaign.vehicle, Set::Mesh, number, speed, depth);
+        vec![Case { cell_scale: 0.36, ..case(0) }, Case { channel_scale: 1.5, ..case(1) }]
     }
 
     /// Straight ahead at quarters of the highest speed: what the checks leave out at their depths, and all of it at
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fourth_mesh_is_of_the_state_of_the_other_three() {
+    fn the_fourth_mesh_and_the_larger_channel_are_of_the_state_of_the_other_meshes() {
         let mut plan = empty();
         plan.extend(Set::Check, 0, 1, 0.378).unwrap();
         plan.extend(Set::Mesh, 0, 1, 0.378).unwrap();
@@ -301,5 +301,11 @@ mod tests {
         let scales: Vec<f64> = finer.iter().map(|case| case.cell_scale).collect();
         assert_eq!(scales, [0.72, 0.5, 0.36]);
         assert!(finer.iter().all(|case| coordinates(case) == coordinates(finer[0])));
+        let larger: Vec<&Case> = plan.cases.iter().filter(|case| case.channel_scale != 1.0).collect();
+        assert_eq!(
+            larger.iter().map(|case| (case.cell_scale, case.channel_scale)).collect::<Vec<_>>(),
+            [(1.0, 1.5)]
+        );
+        assert_eq!(coordinates(larger[0]), coordinates(finer[0]));
     }
 }

@@ -110,7 +110,15 @@ pub fn trials(
         )),
         channel_width: plan.cases.first().map(|case| {
             let (settings, placement) = (&plan.campaign.settings.mesh, Placement::new(vehicle, case));
-            Channel::new(settings, &placement, vehicle.dimensions.length, case.speed_mps, 1.0).size.y
+            Channel::new(
+                settings,
+                &placement,
+                vehicle.dimensions.length,
+                case.speed_mps,
+                [1.0, case.channel_scale],
+            )
+            .size
+            .y
         }),
         measured: Measured {
             columns: Some(FORCES.map(str::to_owned).into()),
