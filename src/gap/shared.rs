@@ -15,6 +15,9 @@ use super::statistics::quiet_white_variance;
 
 /// Share of the product of a column and the gap that must hang together.
 const LASTS: f64 = 0.5;
+/// Share of it that must be more than noise can have in common. What noise can is a bound already, reached only where the two
+/// noises are one; the rest is for how well they are known.
+const BEYOND: f64 = 1.0 / 3.0;
 
 /// True where what a sum of columns and a residual have in common outlasts the noise of a bin.
 pub(super) fn outlasts_noise(design: &Design, sum: &DVector<f64>, residual: &DVector<f64>) -> bool {
@@ -43,7 +46,7 @@ pub(super) fn exceeds_noise(
         (0..design.rows.width).map(of).sum()
     };
     let most: f64 = design.rows.of_trial.iter().map(bound).sum();
-    (1.0 - LASTS) * common(design, sum, residual, &[0; 6]) > most
+    (1.0 - BEYOND) * common(design, sum, residual, &[0; 6]) > most
 }
 
 /// Sum of the products of two rows of a component that are so many bins apart, either way; the bins by component.
