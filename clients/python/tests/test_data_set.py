@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import duckdb
 import pytest
@@ -30,7 +29,7 @@ def test_duckdb_reads_a_campaign(vehicle: str) -> None:
         assert mean == pytest.approx(stated, rel=1e-5)
 
 
-def test_the_meta_data_carry_units_and_provenance(tmp_path: Path) -> None:
+def test_the_meta_data_carry_units_and_provenance() -> None:
     sections = ROOT / "campaigns" / "husky" / "sections.parquet"
     pairs = duckdb.execute("select key, value from parquet_kv_metadata(?)", [str(sections)]).fetchall()
     meta = {key.decode(): value.decode() for key, value in pairs}
