@@ -256,12 +256,12 @@ impl Collected {
     /// The same state over a parked bed as a case over a driving one, where both flows have settled.
     pub fn settled_twin(&self, driving: &CaseSummary) -> Option<&CaseSummary> {
         let state = |case: &CaseSummary| {
-            [case.speed_mps, case.heading_deg, case.depth_m, case.density_kgpm3, case.cell_scale]
+            let CaseSummary {
+                speed_mps, heading_deg, depth_m, density_kgpm3, cell_scale, channel_scale, ..
+            } = *case;
+            [speed_mps, heading_deg, depth_m, density_kgpm3, cell_scale, channel_scale]
         };
-        // of the sets that a twin is taken of, none of whose cases is tilted
-        let is_twin = |case: &&CaseSummary| {
-            matches!(case.set, Set::Paper | Set::Check | Set::Ahead) && state(case) == state(driving)
-        };
+        let is_twin = |case: &&CaseSummary| Set::TWINNED.contains(&case.set) && state(case) == state(driving);
         let parked = self.cases.values().find(is_twin)?;
         (driving.set == Set::Driving && driving.settled && parked.settled).then_some(parked)
     }

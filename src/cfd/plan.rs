@@ -42,6 +42,11 @@ pub enum Set {
     Ahead,
 }
 
+impl Set {
+    /// Sets of which a driving twin is taken: steady, over a parked bed, level.
+    pub(super) const TWINNED: [Self; 3] = [Self::Paper, Self::Check, Self::Ahead];
+}
+
 impl fmt::Display for Set {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

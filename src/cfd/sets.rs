@@ -75,7 +75,7 @@ impl Plan {
         };
         let known = |twin: &Case| self.cases.iter().any(|case| case.is_same_state(twin));
         let moves = |case: &&Case| case.speed_mps > 0.0 && case.cell_scale == 1.0;
-        let steady = [Set::Paper, Set::Check, Set::Ahead].into_iter().flat_map(|set| self.of(set));
+        let steady = Set::TWINNED.into_iter().flat_map(|set| self.of(set));
         let mut free: Vec<Case> = steady.filter(moves).map(twin).filter(|twin| !known(twin)).collect();
         if free.len() < count {
             return Err(PlanError::NoTwin { available: free.len(), wanted: count });
