@@ -103,6 +103,39 @@ fn a_hull_without_weights_follows_what_was_there_and_is_the_first_where_nothing_
 }
 
 #[test]
+fn bundles_that_belong_together_are_replaced_together_or_not_at_all() {
+    let copy = copy_of_vehicles();
+    let [husky, warthog] = ["husky", "warthog"].map(|name| copy.path().join(name));
+    let new = copy.path().join("new");
+    std::fs::create_dir(&new).expect("a folder");
+    let first = [version(&husky), version(&warthog)];
+    let next = |place: &Path, from: &Path| (place.to_owned(), bundle::read(from).expect("sound"));
+    let all = || vec![next(&new.join("husky"), &husky), next(&husky, &husky), next(&warthog, &warthog)];
+    let kept =
+        |vehicle: &str, version: u32| copy.path().join(format!("{vehicle}.versions/{version}/{vehicle}"));
+
+    // what stands in the way of the last of them
+    copy_folder(&husky, &kept("warthog", first[1]));
+    let before = [bytes(&husky), bytes(&warthog), bytes(&kept("warthog", first[1]))];
+    let error = bundle::succeed_together(all()).expect_err("another is kept there").to_string();
+    assert!(error.contains("warthog.versions") && error.contains("another version"), "{error}");
+    assert_eq!([bytes(&husky), bytes(&warthog), bytes(&kept("warthog", first[1]))], before);
+    assert!(!new.join("husky").exists() && !kept("husky", first[0]).exists());
+    // and one that is not even written
+    let damaged = || vec![next(&husky, &husky), next(&copy.path().join("elsewhere"), &warthog)];
+    bundle::succeed_together(damaged()).expect_err("a bundle stands in a folder of its name");
+    assert_eq!(bytes(&husky), before[0]);
+    for folder in [copy.path(), &new] {
+        assert!(!folder.join(".husky.new").exists() && !folder.join(".warthog.new").exists());
+    }
+
+    std::fs::remove_dir_all(copy.path().join("warthog.versions")).expect("removed");
+    let versions = bundle::succeed_together(all()).expect("written");
+    assert_eq!(versions, [1, first[0] + 1, first[1] + 1]);
+    assert_eq!([bytes(&kept("husky", first[0])), bytes(&kept("warthog", first[1]))], before[..2]);
+}
+
+#[test]
 fn a_damaged_kept_version_is_not_put_back() {
     let copy = copy_of_vehicles();
     let husky = copy.path().join("husky");

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     Bundle, BundleError, FILES, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, at, exchange,
-    read, read_bounded, stage, staging_of, tensors, write,
+    place, read, read_bounded, stage, staging_of, tensors,
 };
 use crate::effects::EffectsFile;
 use crate::files::sha256;
@@ -70,17 +70,74 @@ pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleEr
 ///
 /// The bundle changes in one step of the file system at the end; an error before it leaves everything as it was.
 pub fn succeed(directory: &Path, bundle: Bundle) -> Result<u32, BundleError> {
-    let before = if directory.exists() { version_in(directory)? } else { 0 };
-    let last = numbers(directory)?.last().copied().unwrap_or(0).max(before);
-    let version =
-        last.checked_add(1).ok_or(Fault::NoVersion { last }).map_err(at(&versions_of(directory)))?;
-    let bundle = Bundle { version, ..bundle };
-    if directory.join(NETWORK_FILE).exists() {
-        put(&stage(directory, &bundle)?, directory, before)?;
-    } else {
-        write(directory, &bundle)?;
+    let next = Next::stage(directory, bundle)?;
+    let put = next.put();
+    next.drop_staged();
+    put.map(|()| next.version)
+}
+
+/// As [`succeed`], of bundles that belong together: an error with one of them leaves all as they were. Gives the new versions.
+pub fn succeed_together(bundles: Vec<(PathBuf, Bundle)>) -> Result<Vec<u32>, BundleError> {
+    let mut staged: Vec<Next> = Vec::new();
+    for (directory, bundle) in bundles {
+        let next = Next::stage(&directory, bundle);
+        staged.push(next.inspect_err(|_| staged.iter().for_each(Next::drop_staged))?);
     }
-    Ok(version)
+    for (index, next) in staged.iter().enumerate() {
+        next.put().inspect_err(|_| {
+            staged[..index].iter().rev().for_each(Next::take_back);
+            staged[index..].iter().for_each(Next::drop_staged);
+        })?;
+    }
+    staged.iter().for_each(Next::drop_staged);
+    Ok(staged.iter().map(|next| next.version).collect())
+}
+
+/// A version that stands beside its place.
+struct Next {
+    directory: PathBuf,
+    staged: PathBuf,
+    version: u32,
+    /// Version of the one in place, where that is kept.
+    keeps: Option<u32>,
+}
+
+impl Next {
+    fn stage(directory: &Path, bundle: Bundle) -> Result<Self, BundleError> {
+        let before = if directory.exists() { version_in(directory)? } else { 0 };
+        let last = numbers(directory)?.last().copied().unwrap_or(0).max(before);
+        let version =
+            last.checked_add(1).ok_or(Fault::NoVersion { last }).map_err(at(&versions_of(directory)))?;
+        let staged = stage(directory, &Bundle { version, ..bundle })?;
+        let keeps = directory.join(NETWORK_FILE).exists().then_some(before);
+        Ok(Self { directory: directory.to_owned(), staged, version, keeps })
+    }
+
+    /// Takes the place; what was there and is not kept stands where this was staged.
+    fn put(&self) -> Result<(), BundleError> {
+        match self.keeps {
+            Some(before) => put(&self.staged, &self.directory, before),
+            None => place(&self.staged, &self.directory).map_err(|error| at(&self.directory)(error.into())),
+        }
+    }
+
+    /// Undoes [`Next::put`], as far as the file system lets.
+    fn take_back(&self) {
+        let before =
+            self.keeps.map_or_else(|| self.staged.clone(), |before| place_of(&self.directory, before));
+        if exchange(&before, &self.directory).is_ok() {
+            let _ = fs::remove_dir_all(before);
+        } else {
+            // there was none
+            let _ = fs::rename(&self.directory, &self.staged);
+            self.drop_staged();
+        }
+    }
+
+    /// Also what was in place and is not kept: it could not be served.
+    fn drop_staged(&self) {
+        let _ = fs::remove_dir_all(&self.staged);
+    }
 }
 
 /// Puts a kept version in its place again, by default the one before the version that is there, and keeps the latter.

@@ -35,7 +35,7 @@ use crate::vehicle::{Vehicle, VehicleError};
 use tensors::TensorError;
 use vehicle_file::VehicleFile;
 
-pub use history::{Kept, apply, kept, roll_back, succeed};
+pub use history::{Kept, apply, kept, roll_back, succeed, succeed_together};
 
 /// The file that makes a folder a bundle.
 pub const VEHICLE_FILE: &str = "vehicle.toml";
@@ -389,7 +389,10 @@ pub fn check_place(directory: &Path, name: &str) -> Result<(), BundleError> {
 /// before is deleted.
 pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
     let staged = stage(directory, bundle)?;
-    place(&staged, directory).map_err(|error| at(directory)(error.into()))
+    place(&staged, directory).map_err(|error| at(directory)(error.into()))?;
+    // the one before
+    let _ = fs::remove_dir_all(staged);
+    Ok(())
 }
 
 /// Writes a bundle beside its place.
@@ -428,12 +431,9 @@ fn staging_of(directory: &Path, name: &str) -> PathBuf {
     directory.with_file_name(format!(".{name}.new"))
 }
 
+/// Puts what was staged in its place, and what was there where that was staged.
 fn place(staged: &Path, directory: &Path) -> std::io::Result<()> {
-    if !directory.exists() {
-        return fs::rename(staged, directory);
-    }
-    exchange(staged, directory)?;
-    fs::remove_dir_all(staged)
+    if directory.exists() { Ok(exchange(staged, directory)?) } else { fs::rename(staged, directory) }
 }
 
 /// Exchanges the staged folder with the one in place in a single step of the file system.

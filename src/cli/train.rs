@@ -338,6 +338,7 @@ impl Train {
         let learnt =
             self.variant.train(&loaded, &source, (sides, self.part), &config, checkpoint.as_ref())?;
         let record = &learnt.record;
+        let mut next = Vec::with_capacity(record.vehicles.len());
         for of_vehicle in &record.vehicles {
             let name = &of_vehicle.name;
             let (Some(bundle), Some(weights)) = (loaded.bundles.get(name), learnt.weights.get(name)) else {
@@ -347,10 +348,13 @@ impl Train {
             if bundle.effects.is_some() {
                 eprintln!("{name}: its effects are taken out with its former weights; run wade gap again");
             }
-            let next = Bundle { trained: Some(weights.clone()), effects: None, ..bundle.clone() };
-            let version = bundle::succeed(&self.data.vehicles.bundle(name), next)?;
+            let bundle = Bundle { trained: Some(weights.clone()), effects: None, ..bundle.clone() };
+            next.push((self.data.vehicles.bundle(name), bundle));
+        }
+        let versions = bundle::succeed_together(next)?;
+        for (of_vehicle, version) in record.vehicles.iter().zip(versions) {
             report(of_vehicle, record.judged(), version);
-            self.running.reload(name);
+            self.running.reload(&of_vehicle.name);
         }
         // the last of all: who finds it finds the weights that it is about
         record.write(&self.out)?;
