@@ -273,8 +273,6 @@ fn a_surface_that_no_case_wetted_has_nothing_learnt_however_near_the_state() {
 
 #[test]
 fn a_network_that_learnt_little_states_how_far_it_is_off() {
-    // the share goes by the seed of the training, from 0.20 to 0.32 over three of them, with 20 cases as with 40: what so little
-    // teaching states is three to five times too wide, and this seed lies above the bar
     let lesson = Lesson::of(40, |_| true);
     let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
     let names: Vec<&String> = models.keys().collect();
@@ -285,10 +283,11 @@ fn a_network_that_learnt_little_states_how_far_it_is_off() {
         stated += forces.uncertainty.abs().sum() / size;
         missed += (forces.wrench.force - state.hydrostatic() - state.dynamic()).abs().sum() / size;
     }
-    // the mean of |error| is 0.71 to 0.80 of a deviation; the loads are a formula, of which the regressions miss next to
-    // nothing: what is missed here the network has lost
+    // the mean of |error| is 0.71 to 0.80 of a deviation, and the factors are those of cases that were not known; 0.50 to 0.68 with
+    // 20 and 40 cases and three seeds. The loads are a formula, of which the regressions miss next to nothing: what is missed
+    // here the network has lost
     let share = missed / stated;
-    assert!((0.25..2.0).contains(&share), "missed {missed}, stated {stated}");
+    assert!((0.4..1.2).contains(&share), "missed {missed}, stated {stated}");
 }
 
 #[test]

@@ -215,6 +215,11 @@ fn predict(layers: &Layers<f32>, state: &Known, prepared: &Prepared, form: &Anch
     state.reading.surfaces.iter().enumerate().map(force).sum()
 }
 
+/// What coefficients of one on all surfaces are worth [N].
+fn dynamic_load(state: &Known) -> f64 {
+    state.reading.surfaces.iter().map(|surface| surface.unit).sum()
+}
+
 /// What is known of the errors: those of cases, and how large they are expected to be in states between them.
 fn missed(
     layers: &Layers<f32>,
@@ -239,7 +244,12 @@ fn missed(
         let Some(of_case) = of_case else { continue };
         // states that the network has not seen tell what it loses of what it was taught
         let lost = |fresh: &Known| predict(layers, fresh, prepared, form) - fresh.dynamic();
-        missed.push(of(state, part, true, of_case + fresh.first().map_or_else(Vec3::zeros, lost)));
+        // in proportion: one of them may be much faster than the case
+        let here = |fresh: &Known| {
+            let share = dynamic_load(state) / dynamic_load(fresh);
+            if share.is_finite() { lost(fresh) * share } else { Vec3::zeros() }
+        };
+        missed.push(of(state, part, true, of_case + fresh.first().map_or_else(Vec3::zeros, here)));
         for fresh in fresh {
             let parts = [ensemble.deviation(fresh, prepared), teacher.noise(fresh, prepared), lost(fresh)];
             let expected = parts.iter().map(|part| part.component_mul(part)).sum::<Vec3>().map(f64::sqrt);
