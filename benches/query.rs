@@ -130,6 +130,11 @@ fn queries(vehicle: &str) -> Vec<Subject> {
     let mut subjects: Vec<Subject> = every_isa.collect();
     subjects.push(query(name("query of the paper's network", best), paper(vehicle, best), wet, 1));
     subjects.push(query(name("tilted query", best), of(best), tilted, 1));
+    // the water crosses most surfaces
+    let half = Condition { depth: 0.5 * wet.depth, ..tilted };
+    subjects.push(query(name("half wet tilted query", best), of(best), half, 1));
+    let of_paper = name("half wet tilted query of the paper's network", best);
+    subjects.push(query(of_paper, paper(vehicle, best), half, 1));
     subjects.push(query(name("256 queries", best), of(best), wet, 256));
     let plain = of(best);
     let row = Row::new(format!("{vehicle} reference, plain loops"), layer2(&plain));

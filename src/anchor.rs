@@ -260,7 +260,7 @@ impl Anchor {
     pub fn read(&self, vehicle: &Vehicle, condition: &Condition, out: &mut Reading) {
         let plane = condition.water_plane(vehicle.z0);
         out.wetting.resize(self.surfaces.len(), Wetting::default());
-        self.table.wetting_into(&vehicle.hull, &plane, &mut out.wetting);
+        self.table.wetting_into(&plane, &mut out.wetting);
         let flow = Flow::of(vehicle, condition);
         out.pressure = 0.5 * condition.density * flow.speed * flow.speed;
         out.global = flow.global(vehicle, condition);

@@ -80,7 +80,7 @@ pub fn surface_hydrostatics_into(
 }
 
 /// Load of a fluid with `rho g = 1` on one triangle: `-int delta n dA` [m3] and its moment [m4].
-pub(super) fn unit_load(triangle: &WetTriangle, about: &Vec3) -> Wrench {
+fn unit_load(triangle: &WetTriangle, about: &Vec3) -> Wrench {
     let (area, [a, b, c], [da, db, dc]) = (triangle.area_vector(), triangle.vertices, triangle.depths);
     // the three edge midpoints, collected by corner: int delta x dA = A / 12 sum of x_i (sum of depths + delta_i)
     let sum = da + db + dc;

@@ -11,8 +11,6 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::hydrostatics::unit_load;
-use super::immersion::{WetTriangle, wet_triangles};
 use super::surfaces::Hull;
 use crate::frame::{Vec3, WaterPlane};
 use crate::wrench::Wrench;
@@ -23,6 +21,8 @@ const ROOM: f64 = 1e-9;
 const MOST_INTERVALS: usize = 40_000;
 /// Heights closer than this are one [m]: a polynomial over less would be rounding.
 const LEAST_INTERVAL: f64 = 1e-6;
+/// Faces that are passed over together where the water does not reach them.
+const BLOCK: usize = 8;
 /// Coefficients of a polynomial: degree four.
 const TERMS: usize = 5;
 /// Quantities of a surface: force, moment, wet area, soaked area and its first moment.
@@ -49,18 +49,12 @@ impl Wetting {
         (self.soaked_area > 0.0).then(|| self.soaked_moment / self.soaked_area)
     }
 
-    fn add_wet(&mut self, triangle: &WetTriangle) {
-        self.pressure += unit_load(triangle, &Vec3::zeros());
-        self.area += triangle.area_vector().norm();
-    }
-
-    /// Adds the integral of `weight depth` and of its product with the position, exact by the edges' midpoints.
-    fn add_depth(&mut self, triangle: &WetTriangle, weight: f64) {
-        let third = triangle.area_vector().norm() * weight / 3.0;
-        for (point, depth) in triangle.edge_midpoints() {
-            self.soaked_area += third * depth;
-            self.soaked_moment += point * (third * depth);
-        }
+    fn add(&mut self, face: &Face, wet: &Below, soaked: &Below) {
+        self.pressure.force -= face.normal * wet.depth;
+        self.pressure.moment -= wet.moment.cross(&face.normal);
+        self.area += wet.area;
+        self.soaked_area += (wet.depth - soaked.depth) * FILM.recip();
+        self.soaked_moment += (wet.moment - soaked.moment) * FILM.recip();
     }
 
     fn values(&self) -> [f64; QUANTITIES] {
@@ -83,8 +77,9 @@ pub struct WettingTable {
 /// Faces by rising top, so that the wet ones come first.
 #[derive(Debug, Clone)]
 struct SurfaceTable {
-    faces: Vec<usize>,
+    faces: Vec<Face>,
     tops: Vec<f64>,
+    /// One a block of faces.
     bottoms: Vec<f64>,
     x_range: [f64; 2],
     y_range: [f64; 2],
@@ -99,6 +94,24 @@ struct LevelTable {
     heights: Vec<f64>,
     /// One an interval, in powers of the share of the interval that is under water.
     intervals: Vec<[[f64; QUANTITIES]; TERMS]>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    corners: [Vec3; 3],
+    /// Outward.
+    normal: Vec3,
+    area: f64,
+}
+
+/// What a face has below the surface, the depth being that of its corners.
+#[derive(Debug, Clone, Copy, Default)]
+struct Below {
+    area: f64,
+    /// Integral of the depth [m3].
+    depth: f64,
+    /// Integral of the depth times the position [m4].
+    moment: Vec3,
 }
 
 /// What a wet face contributes besides the plane `n . x = c`:
@@ -123,24 +136,23 @@ impl WettingTable {
     /// Prepares the hull of a vehicle with `count` surfaces.
     pub fn new(hull: &Hull, count: usize) -> Self {
         let mut surfaces: Vec<SurfaceTable> = (0..count).map(|s| SurfaceTable::new(hull, s)).collect();
-        let heights: Vec<Vec<f64>> = surfaces.iter().map(|s| s.heights(hull)).collect();
+        let heights: Vec<Vec<f64>> = surfaces.iter().map(SurfaceTable::heights).collect();
         if heights.iter().map(Vec::len).sum::<usize>() <= MOST_INTERVALS {
             for (surface, heights) in surfaces.iter_mut().zip(heights) {
-                surface.level = Some(LevelTable::new(surface, hull, heights));
+                surface.level = Some(LevelTable::new(surface, heights));
             }
         }
         Self { surfaces }
     }
 
-    /// What the water reaches on each surface. `hull` is the one the table was made from; `out` has one entry a
-    /// surface. No allocation.
-    pub fn wetting_into(&self, hull: &Hull, plane: &WaterPlane, out: &mut [Wetting]) {
+    /// What the water reaches on each surface; `out` has one entry a surface. No allocation.
+    pub fn wetting_into(&self, plane: &WaterPlane, out: &mut [Wetting]) {
         for (table, out) in self.surfaces.iter().zip(out) {
             *out = match &table.level {
                 Some(level) if plane.is_level() => {
                     level.at(plane.offset).unwrap_or_else(|| table.submerged().wetting(plane))
                 }
-                _ => table.clip(hull, plane),
+                _ => table.clip(plane),
             };
         }
     }
@@ -148,24 +160,22 @@ impl WettingTable {
 
 impl SurfaceTable {
     fn new(hull: &Hull, surface: usize) -> Self {
-        let mesh = &hull.mesh;
-        let corner_z = |f: usize| mesh.triangle(f).map(|p| p.z);
-        let top = |f: usize| corner_z(f).into_iter().fold(f64::NEG_INFINITY, f64::max);
-        let mut faces: Vec<usize> = hull.faces_of(surface).collect();
-        faces.sort_by(|a, b| top(*a).total_cmp(&top(*b)));
+        let mut faces: Vec<Face> = hull.faces_of(surface).map(|f| Face::new(hull.mesh.triangle(f))).collect();
+        faces.sort_by(|a, b| a.range(2)[1].total_cmp(&b.range(2)[1]));
         let mut prefix = vec![Terms::default()];
         let mut sum = Terms::default();
-        for &face in &faces {
-            sum.add(mesh.triangle(face));
+        for face in &faces {
+            sum.add(face);
             prefix.push(sum);
         }
+        let lowest = |faces: &[Face]| faces.iter().map(|face| face.range(2)[0]).fold(f64::INFINITY, f64::min);
         let range = |axis: usize| {
-            let values = || faces.iter().flat_map(|f| mesh.triangle(*f)).map(|p| p[axis]);
-            [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
+            let ranges = faces.iter().map(|face| face.range(axis));
+            ranges.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], [low, high]| [a.min(low), b.max(high)])
         };
         Self {
-            tops: faces.iter().map(|f| top(*f)).collect(),
-            bottoms: faces.iter().map(|f| corner_z(*f).into_iter().fold(f64::INFINITY, f64::min)).collect(),
+            tops: faces.iter().map(|face| face.range(2)[1]).collect(),
+            bottoms: faces.chunks(BLOCK).map(|block| lowest(block)).collect(),
             x_range: range(0),
             y_range: range(1),
             prefix,
@@ -180,29 +190,30 @@ impl SurfaceTable {
     }
 
     /// Levels at which a vertex gets wet or soaked, rising, those that are one left out.
-    fn heights(&self, hull: &Hull) -> Vec<f64> {
-        let corners = self.faces.iter().flat_map(|f| hull.mesh.triangle(*f));
+    fn heights(&self) -> Vec<f64> {
+        let corners = self.faces.iter().flat_map(|face| face.corners);
         let mut heights: Vec<f64> = corners.flat_map(|corner| [corner.z, corner.z + FILM]).collect();
         heights.sort_by(f64::total_cmp);
         heights.dedup_by(|next, kept| *next - *kept < LEAST_INTERVAL);
         heights
     }
 
-    fn clip(&self, hull: &Hull, plane: &WaterPlane) -> Wetting {
+    fn clip(&self, plane: &WaterPlane) -> Wetting {
         // what lies below both planes is soaked
         let film = WaterPlane { offset: plane.offset - FILM, ..*plane };
         let (low, _) = self.waterline_heights(&film);
         let (_, high) = self.waterline_heights(plane);
         let soaked = self.tops.partition_point(|top| *top <= low);
         let mut sum = self.prefix[soaked].wetting(plane);
-        for (face, bottom) in self.faces[soaked..].iter().zip(&self.bottoms[soaked..]) {
-            if *bottom < high {
-                for triangle in wet_triangles(&hull.mesh, *face, plane).iter() {
-                    sum.add_wet(triangle);
-                    sum.add_depth(triangle, FILM.recip());
-                }
-                for triangle in wet_triangles(&hull.mesh, *face, &film).iter() {
-                    sum.add_depth(triangle, -FILM.recip());
+        for (index, bottom) in self.bottoms.iter().enumerate().skip(soaked / BLOCK) {
+            if *bottom >= high {
+                continue;
+            }
+            let block = index * BLOCK..self.faces.len().min((index + 1) * BLOCK);
+            for face in &self.faces[block.start.max(soaked)..block.end] {
+                let depths = face.corners.map(|corner| plane.depth_below(&corner));
+                if depths.iter().any(|depth| *depth > 0.0) {
+                    sum.add(face, &face.below(depths), &face.below(depths.map(|depth| depth - FILM)));
                 }
             }
         }
@@ -224,7 +235,7 @@ impl SurfaceTable {
 }
 
 impl LevelTable {
-    fn new(surface: &SurfaceTable, hull: &Hull, heights: Vec<f64>) -> Self {
+    fn new(surface: &SurfaceTable, heights: Vec<f64>) -> Self {
         // inside the interval: at its ends a horizontal face is about to get wet
         let nodes: [f64; TERMS] = std::array::from_fn(|i| (i as f64 + 0.5) / TERMS as f64);
         let powers = SMatrix::<f64, TERMS, TERMS>::from_fn(|row, column| nodes[row].powi(column as i32));
@@ -233,7 +244,7 @@ impl LevelTable {
         let interval = |pair: &[f64]| {
             let values = nodes.map(|share| {
                 let level = pair[0] + share * (pair[1] - pair[0]);
-                surface.clip(hull, &WaterPlane::level(level, 0.0)).values()
+                surface.clip(&WaterPlane::level(level, 0.0)).values()
             });
             std::array::from_fn(|term| {
                 std::array::from_fn(|quantity| {
@@ -262,9 +273,83 @@ impl LevelTable {
     }
 }
 
-impl Terms {
-    fn add(&mut self, [a, b, c]: [Vec3; 3]) {
+impl Face {
+    fn new(corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners;
         let vector = (b - a).cross(&(c - a)) * 0.5;
+        let area = vector.norm();
+        // one without an area has no direction, and bears nothing
+        let normal = if area > 0.0 { vector / area } else { Vec3::zeros() };
+        Self { corners, normal, area }
+    }
+
+    fn range(&self, axis: usize) -> [f64; 2] {
+        let values = self.corners.map(|corner| corner[axis]);
+        [
+            values.into_iter().fold(f64::INFINITY, f64::min),
+            values.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        ]
+    }
+
+    /// The part of which the depth is positive, with the depths of the corners. Only positive terms are added, so that the
+    /// centroid of a sliver lies on it.
+    #[inline(always)]
+    fn below(&self, depths: [f64; 3]) -> Below {
+        let [a, b, c] = [0, 1, 2].map(|i| (self.corners[i], depths[i]));
+        match depths.map(|depth| depth > 0.0) {
+            [false, false, false] => Below::default(),
+            [true, false, false] => self.tip(a, b, c),
+            [false, true, false] => self.tip(b, c, a),
+            [false, false, true] => self.tip(c, a, b),
+            [false, true, true] => self.blunt(a, b, c),
+            [true, false, true] => self.blunt(b, c, a),
+            [true, true, false] => self.blunt(c, a, b),
+            [true, true, true] => Below::over([a, b, c], self.area),
+        }
+    }
+
+    /// Of which the first corner alone is wet.
+    fn tip(&self, a: Corner, b: Corner, c: Corner) -> Below {
+        let ((ab, along_b), (ac, along_c)) = (cut(a, b), cut(a, c));
+        Below::over([a, ab, ac], self.area * along_b * along_c)
+    }
+
+    /// Of which the first corner alone is dry.
+    fn blunt(&self, a: Corner, b: Corner, c: Corner) -> Below {
+        let ((ab, from_b), (ac, from_c)) = (cut(b, a), cut(c, a));
+        let near_b = Below::over([ab, b, c], self.area * from_b);
+        let near_c = Below::over([ab, c, ac], self.area * (1.0 - from_b) * from_c);
+        Below {
+            area: near_b.area + near_c.area,
+            depth: near_b.depth + near_c.depth,
+            moment: near_b.moment + near_c.moment,
+        }
+    }
+}
+
+/// A place and its depth.
+type Corner = (Vec3, f64);
+
+/// Where an edge from a wet to a dry corner meets the surface, and which share of it is wet.
+fn cut((wet, depth): Corner, (dry, height): Corner) -> (Corner, f64) {
+    let share = depth / (depth - height);
+    ((wet + (dry - wet) * share, 0.0), share)
+}
+
+impl Below {
+    /// Over a triangle of so much area: the three edge midpoints, which are exact, collected by corner.
+    #[inline(always)]
+    fn over([(a, da), (b, db), (c, dc)]: [Corner; 3], area: f64) -> Self {
+        let sum = da + db + dc;
+        let moment = (a * (sum + da) + b * (sum + db) + c * (sum + dc)) * (area / 12.0);
+        Self { area, depth: area * sum / 3.0, moment }
+    }
+}
+
+impl Terms {
+    fn add(&mut self, face: &Face) {
+        let [a, b, c] = face.corners;
+        let vector = face.normal * face.area;
         let centroid = (a + b + c) / 3.0;
         let midpoints = [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
         let spread = midpoints.iter().map(|m| m * m.transpose()).sum::<Matrix3<f64>>() / 3.0;
@@ -272,8 +357,8 @@ impl Terms {
         self.first += vector * centroid.transpose();
         self.moment += centroid.cross(&vector);
         self.second -= vector.cross_matrix() * spread;
-        self.area += vector.norm();
-        self.area_moment += centroid * vector.norm();
+        self.area += face.area;
+        self.area_moment += centroid * face.area;
     }
 
     fn wetting(&self, plane: &WaterPlane) -> Wetting {
@@ -296,6 +381,7 @@ mod tests {
     use super::*;
     use crate::frame::up_from_roll_pitch;
     use crate::geometry::hydrostatics::surface_hydrostatics;
+    use crate::geometry::immersion::wet_triangles;
     use crate::vehicle::shipped;
 
     /// Largest difference to the pressure integral face by face, over the weight of the water displaced.
@@ -308,7 +394,7 @@ mod tests {
             let table = WettingTable::new(&vehicle.hull, count);
             let mut wetting = vec![Wetting::default(); count];
             for plane in &planes {
-                table.wetting_into(&vehicle.hull, plane, &mut wetting);
+                table.wetting_into(plane, &mut wetting);
                 let rho_g = 1.0 / crate::frame::GRAVITY;
                 let truth = surface_hydrostatics(&vehicle.hull, count, plane, rho_g, &Vec3::zeros());
                 for (surface, (got, want)) in wetting.iter().zip(&truth).enumerate() {
@@ -354,7 +440,7 @@ mod tests {
             let table = WettingTable::new(&hull, count);
             let mut wetting = vec![Wetting::default(); count];
             for plane in &planes {
-                table.wetting_into(&hull, plane, &mut wetting);
+                table.wetting_into(plane, &mut wetting);
                 for (surface, got) in wetting.iter().enumerate() {
                     let (mut area, mut moment, mut whole) = (0.0, Vec3::zeros(), 0.0);
                     for step in 0..LEVELS {
