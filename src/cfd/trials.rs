@@ -18,7 +18,7 @@ use super::placement::Placement;
 use super::plan::{Plan, Set};
 use crate::condition::{Condition, GroundContact};
 use crate::dataset::{Dataset, Image, Sample};
-use crate::frame::Vec3;
+use crate::frame::{GRAVITY, Vec3};
 use crate::train::TrainError;
 use crate::train::label::{labels, order};
 use crate::trials::{Columns, Manifest, Measured, Method, SIMULATED, WHEELS, WRENCH};
@@ -42,7 +42,7 @@ pub enum CaseTrialsError {
     },
     /// No two flows to hold against each other.
     #[error(
-        "no case of the chosen sets has a twin over a parked bed such that both have settled: choose driving, and run and collect paper too"
+        "no case of the chosen sets has a twin over a parked bed such that both have settled and are not choked: choose driving, and run and collect paper too"
     )]
     NoTwins,
     /// Surfaces that are not the vehicle's.
@@ -57,7 +57,8 @@ pub enum CaseTrialsError {
 }
 
 /// Trials of the computed cases of some sets, one a case, with what holds for all. With `pairs`, of those that have a twin over
-/// a parked bed, whose mean wrench stands beside each as the prediction.
+/// a parked bed and of the twins, the mean wrench of the twin standing beside both as the prediction; where a steady flow
+/// passes the hull at all, and each flow by its mean, since what it does within its window is no load of the bed's.
 pub fn trials(
     plan: &Plan,
     dataset: &Dataset,
@@ -77,26 +78,34 @@ pub fn trials(
     }
     // a sample of a case has surfaces
     let order = order(vehicle, dataset.meta.vehicles.get(&vehicle.name).map_or(&[], Vec::as_slice))?;
-    let wheels = wheels(plan, vehicle);
-    let (mut trials, mut noise) = (Vec::new(), Noise::default());
+    let (wheels, channel_width) = (wheels(plan, vehicle), channel_width(plan, vehicle));
+    let (mut trials, mut noise, mut loads) = (Vec::new(), Noise::default(), BTreeMap::new());
     let heard = |samples: &[&Sample]| -> Result<Vec<[f64; 6]>, CaseTrialsError> {
         let wrenches = samples.iter().map(|sample| wrench(vehicle, &order, sample)).collect::<Option<_>>();
         wrenches.ok_or_else(|| CaseTrialsError::NoMoments { case: samples[0].case.clone() })
     };
     for (case, samples) in &cases {
         let twin = pairs.and_then(|all| cases.get(all.settled_twin(all.cases.get(*case)?)?.id.as_str()));
+        let twin = twin.filter(|parked| !is_choked(&parked[0].condition, vehicle, channel_width));
         if !sets.iter().any(|set| is_of(samples, set)) || (pairs.is_some() && twin.is_none()) {
             continue;
         }
-        let wrenches = heard(samples)?;
-        let mut columns = columns(samples, &wrenches, &wheels);
-        noise.hear(samples, &wrenches);
-        if let Some(parked) = twin {
-            let wrenches = heard(parked)?;
-            noise.hear(parked, &wrenches);
-            columns.extend((0..6).map(|c| (SIMULATED[c], vec![mean(&wrenches, c); samples.len()])));
+        // the prediction is right of the parked flow itself, which what does not go with the bed would change as well
+        let predicted = twin.map(|parked| heard(parked)).transpose()?;
+        for samples in [Some(samples), twin].into_iter().flatten() {
+            let mut wrenches = heard(samples)?;
+            noise.hear(samples, &wrenches, vehicle);
+            if predicted.is_some() {
+                let means = std::array::from_fn(|c| mean(&wrenches, c));
+                wrenches.fill(means);
+            }
+            let mut columns = columns(samples, &wrenches, &wheels);
+            if let Some(predicted) = &predicted {
+                columns.extend((0..6).map(|c| (SIMULATED[c], vec![mean(predicted, c); samples.len()])));
+            }
+            loads.insert(samples[0].case.clone(), dynamic_load(samples, vehicle));
+            trials.push((samples[0].case.clone(), columns));
         }
-        trials.push(((*case).to_owned(), columns));
     }
     if trials.is_empty() {
         return Err(CaseTrialsError::NoTwins);
@@ -104,22 +113,15 @@ pub fn trials(
     let manifest = Manifest {
         vehicle: vehicle.name.clone(),
         generated: Some(format!(
-            "computed by {}, cases of {names}, means of a tenth of a second{}; nothing of it was measured",
+            "computed by {}, cases of {names}, means of {}; nothing of it was measured",
             dataset.meta.provenance,
-            if pairs.is_some() { ", beside the mean of the same state over a parked bed" } else { "" }
+            if pairs.is_some() {
+                "whole windows, beside that of the same state over a parked bed"
+            } else {
+                "a tenth of a second"
+            }
         )),
-        channel_width: plan.cases.first().map(|case| {
-            let (settings, placement) = (&plan.campaign.settings.mesh, Placement::new(vehicle, case));
-            Channel::new(
-                settings,
-                &placement,
-                vehicle.dimensions.length,
-                case.speed_mps,
-                [1.0, case.channel_scale],
-            )
-            .size
-            .y
-        }),
+        channel_width,
         measured: Measured {
             columns: Some(FORCES.map(str::to_owned).into()),
             method: Some(Method::Cfd),
@@ -127,10 +129,28 @@ pub fn trials(
         },
         sensor_noise: noise.of_a_section(),
         // of a pair both means are in the gap
-        trial_offset: noise.of_a_mean(if pairs.is_some() { 2.0 } else { 1.0 }),
+        trial_offsets: noise.of_means(if pairs.is_some() { 2.0 } else { 1.0 }, &loads),
         ..Manifest::default()
     };
     Ok((manifest, trials))
+}
+
+/// Width of the channel of the plan's cases [m].
+fn channel_width(plan: &Plan, vehicle: &Vehicle) -> Option<f64> {
+    let case = plan.cases.first()?;
+    let (settings, placement) = (&plan.campaign.settings.mesh, Placement::new(vehicle, case));
+    let scales = [1.0, case.channel_scale];
+    let length = vehicle.dimensions.length;
+    Some(Channel::new(settings, &placement, length, case.speed_mps, scales).size.y)
+}
+
+/// True between Schijf's two limiting speeds, the roots of `F = (1 - m) (2/3 (1 + F^2 / 2))^1.5`: no steady flow passes the hull
+/// there, and a bore leaves it as long as the flow is computed. The blockage `m` is that of the vehicle's whole width.
+fn is_choked(condition: &Condition, vehicle: &Vehicle, channel_width: Option<f64>) -> bool {
+    let Some(width) = channel_width else { return false };
+    let froude = condition.velocity.norm() / (GRAVITY * condition.depth).sqrt();
+    let free = 1.0 - vehicle.dimensions.width / width;
+    froude > free * (2.0 / 3.0 * (1.0 + 0.5 * froude * froude)).powf(1.5)
 }
 
 /// Wheels that have a column, with their radius [m].
@@ -188,19 +208,29 @@ fn columns(
     columns
 }
 
+/// What a coefficient of one is worth in a case [N]: `rho v^2 / 2` over width times depth, in the mean.
+fn dynamic_load(samples: &[&Sample], vehicle: &Vehicle) -> f64 {
+    let load = |sample: &&Sample| {
+        let Condition { density, velocity, depth, .. } = sample.condition;
+        0.5 * density * velocity.norm_squared() * vehicle.dimensions.width * depth
+    };
+    samples.iter().map(load).sum::<f64>() / samples.len() as f64
+}
+
 /// What the flow does of itself: sums of squares and their numbers.
 #[derive(Debug, Default)]
 struct Noise {
     section: [f64; 6],
     sections: f64,
+    /// Of means over the dynamic load, with which they wander.
     mean: [f64; 6],
     means: f64,
 }
 
 impl Noise {
     /// Takes a case in: second differences of sections where the acceleration stays what it is, which trends do not touch;
-    /// and, where the state stays the same, half the difference of the means of both halves of the window.
-    fn hear(&mut self, samples: &[&Sample], wrenches: &[[f64; 6]]) {
+    /// and, where the state stays the same and moves, half the difference of the means of both halves of the window.
+    fn hear(&mut self, samples: &[&Sample], wrenches: &[[f64; 6]], vehicle: &Vehicle) {
         for (three, w) in samples.windows(3).zip(wrenches.windows(3)) {
             let acceleration = three[0].condition.acceleration;
             if three.iter().any(|sample| sample.condition.acceleration != acceleration) {
@@ -209,10 +239,11 @@ impl Noise {
             (0..6).for_each(|c| self.section[c] += (w[0][c] - 2.0 * w[1][c] + w[2][c]).powi(2) / 6.0);
             self.sections += 1.0;
         }
-        let half = wrenches.len() / 2;
-        if half > 0 && samples.iter().all(|sample| sample.condition == samples[0].condition) {
+        let (half, load) = (wrenches.len() / 2, dynamic_load(samples, vehicle));
+        if half > 0 && load > 0.0 && samples.iter().all(|sample| sample.condition == samples[0].condition) {
             for c in 0..6 {
-                self.mean[c] += (0.5 * (mean(&wrenches[half..], c) - mean(&wrenches[..half], c))).powi(2);
+                let off = 0.5 * (mean(&wrenches[half..], c) - mean(&wrenches[..half], c));
+                self.mean[c] += (off / load).powi(2);
             }
             self.means += 1.0;
         }
@@ -222,8 +253,11 @@ impl Noise {
         deviations(&self.section, self.sections)
     }
 
-    fn of_a_mean(&self, flows: f64) -> BTreeMap<String, f64> {
-        deviations(&self.mean.map(|squares| flows * squares), self.means)
+    /// Of the means of so many flows, by trial: in proportion to its dynamic load.
+    fn of_means(&self, flows: f64, loads: &BTreeMap<String, f64>) -> BTreeMap<String, BTreeMap<String, f64>> {
+        let of = |load: f64| deviations(&self.mean.map(|squares| flows * squares * load * load), self.means);
+        let heard = loads.iter().filter(|_| self.means > 0.0);
+        heard.map(|(case, load)| (case.clone(), of(*load))).collect()
     }
 }
 

@@ -343,7 +343,8 @@ impl Collect {
 ///
 /// A trial a case, a row a section of 0.1 s, labelled as computed. The effects of speed that changes are in `unsteady`; those
 /// of a moving bed and turning wheels are in `driving` beside `paper`, which holds the same states over a parked bed; with
-/// `--pairs` a parked flow is the prediction (`sim_*`) of its driving twin, so that the gap is what the bed does and no more.
+/// `--pairs` a parked flow is the prediction (`sim_*`) of its driving twin and of itself, so that the gap is what the bed does
+/// and no more.
 #[derive(Debug, Args)]
 struct Trials {
     /// Folder of the campaign
@@ -353,7 +354,8 @@ struct Trials {
     /// The sets of cases; may be given several times
     #[arg(long, value_enum, required = true)]
     set: Vec<SetName>,
-    /// Only cases over a driving bed whose parked twin is computed too, both settled: the twin's mean is the prediction
+    /// Only cases over a driving bed whose parked twin is computed too, both settled and not choked, and the twins: the mean of
+    /// the twin is the prediction
     #[arg(long)]
     pairs: bool,
     /// Folder for the trials, which must not hold any yet

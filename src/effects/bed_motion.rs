@@ -1,8 +1,9 @@
 //! E18, driving over the bed instead of standing on it in a current.
 //!
 //! A model learnt from parked hulls has the slow water near the bed under the hull; a hull that drives through still water
-//! has not. `F = 1/2 rho A |v_g| (-C_D v_g + C_L |v_g| up)` with the velocity over ground `v_g`. The slow layer is thin, so
-//! the drag changes at the foot of the hull and the lift under its middle. The paper's CFD is of parked hulls. The shape
+//! has not; and its wheels roll, which bear a side force of their own where it drifts. `F = 1/2 rho A |v_g| (-C_D v_g -
+//! C_S v_gy y + C_L |v_g| up)` with the velocity over ground `v_g` and its part `v_gy` along the axles `y`. The slow layer is
+//! thin, so the drag changes at the foot of the hull and the lift under its middle. The paper's CFD is of parked hulls. The shape
 //! says which area carries it: 0 the wet front, 1 the wet underside, which does not grow with the depth, 2 the area that the
 //! model's own drag speaks of, `|D| / (1/2 rho K v^2)` with its coefficient `K` ahead. Coefficients come from paired CFD
 //! cases; there is no published band.
@@ -20,10 +21,12 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
     let speed = ground.norm();
     let at_bed = |point: Vec3| Vec3::new(point.x, point.y, input.body.z0);
     let middle = at_bed(input.immersion.center_of_buoyancy);
+    let across = Vec3::y() * ground.y;
     if Effect::BedMotion.is_in_proportion(shape) {
         let load = input.half_density() * area_of_drag(input) * speed;
         emit(0, Part::Hull, input.at(ground * -load, &middle));
         emit(1, Part::Hull, input.at(up * (load * speed), &middle));
+        emit(2, Part::Hull, input.at(across * -load, &middle));
         return;
     }
     for (index, panel) in input.body.panels.iter().enumerate() {
@@ -32,6 +35,7 @@ pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, P
         let load = input.half_density() * facing * part.fraction * speed;
         emit(0, Part::Panel(index), input.at(ground * -load, &at_bed(part.point)));
         emit(1, Part::Panel(index), input.at(up * (load * speed), &middle));
+        emit(2, Part::Panel(index), input.at(across * -load, &at_bed(part.point)));
     }
 }
 

@@ -198,7 +198,7 @@ impl Effect {
                 "F = 1/2 rho C pi r^2 wet |omega r| (omega r - v_x) on each wheel, or F = 1/2 rho C r^2 int |u| u cos(phi) dphi over its wet lugs, u = omega r - v_x cos(phi); torque -1/2 rho C_t r^3 of the same without the cosine"
             }
             Self::BedMotion => {
-                "F = 1/2 rho A |v_g| (-C_D v_g + C_L |v_g| up), A the wet front or underside or |D| / (1/2 rho K v^2) with the model's drag D; the drag at the bed, the lift under the center of buoyancy"
+                "F = 1/2 rho A |v_g| (-C_D v_g - C_S v_gy y + C_L |v_g| up), A the wet front or underside or |D| / (1/2 rho K v^2) with the model's drag D; the drag and the side force at the bed, the lift under the center of buoyancy"
             }
             _ => "",
         }
@@ -282,7 +282,9 @@ impl Effect {
             Self::WheelPaddleThrust => {
                 const { &[l("thrust", 0.0, 6.0, [0.1, 2.0]), c("torque", "1", -12.0, 12.0)] }
             }
-            Self::BedMotion => const { &[c("drag", "1", -4.0, 4.0), c("lift", "1", -4.0, 4.0)] },
+            Self::BedMotion => {
+                const { &[c("drag", "1", -4.0, 4.0), c("lift", "1", -4.0, 4.0), c("side", "1", -4.0, 4.0)] }
+            }
             Self::SensorDelay => const { &[c("delay", "s", 0.0, 1.0)] },
             Self::SensorBias | Self::SensorBiasStep => {
                 const {

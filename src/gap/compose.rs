@@ -330,7 +330,7 @@ fn excess(all: &[Series], design: &Design, setting: &Setting, trial: usize) -> V
     for &component in &setting.components {
         let values = series.binned(|sample| series.gap[sample][component]);
         let bin = design.noise.bin[component];
-        let expected = 1.0 + (design.noise.offset[component] / bin).powi(2);
+        let expected = 1.0 + (design.noise.offset[trial][component] / bin).powi(2);
         sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += (value / bin).powi(2) - expected);
     }
     sum
@@ -465,9 +465,16 @@ fn summary(report: &Report, gated: Option<Gated>) -> String {
     let names = |effects: &[NamedEffect]| {
         effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
     };
-    let closed = report.gap.held_out.get("all").and_then(|all| all.closure);
-    let closed = closed.map_or_else(String::new, |c| {
-        format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c)
+    let held = report.gap.held_out.get("all");
+    let closed = held.and_then(|all| Some((all.closure?, all.interval))).map_or_else(String::new, |(c, interval)| {
+        match interval.filter(|[low, _]| *low <= 0.0 && c > 0.0) {
+            Some([low, high]) => format!(
+                " The trials that took no part are too few, or their gap too small, to show how much of it that closes ({:.0} to {:.0} %).",
+                100.0 * low,
+                100.0 * high
+            ),
+            None => format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c),
+        }
     });
     match report.verdict {
         Verdict::NothingMissing => {

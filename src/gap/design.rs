@@ -30,8 +30,8 @@ pub(super) struct Candidate {
 pub(super) struct RowNoise {
     /// Standard deviation of a bin, by component.
     pub bin: [f64; 6],
-    /// Standard deviation of the zero from trial to trial.
-    pub offset: [f64; 6],
+    /// Standard deviation of the zero, by trial and component.
+    pub offset: Vec<[f64; 6]>,
     /// Standard deviation that the model states of itself, by trial and component; 0 where it states none.
     pub model: Vec<[f64; 6]>,
     /// Smoothing of the rows.
@@ -126,7 +126,7 @@ pub(super) fn to_rows(
                 let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
                 let bin = noise.bin[component];
                 let model = noise.model[trial][component] / bin;
-                let zero = (noise.offset[component] / bin).hypot(model);
+                let zero = (noise.offset[trial][component] / bin).hypot(model);
                 values.iter_mut().for_each(|value| *value /= bin);
                 match &pace {
                     Some(pace) => whiten(&mut values, pace, [zero, model]),

@@ -267,10 +267,14 @@ impl<'a> Judge<'a> {
         if effect.needs_its_first() && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
             return Some(Refusal::NotSignificant);
         }
-        // a moving bed changes drag and lift; drag alone is the drag coefficient's
-        let held = &self.design.candidates[member.candidate].columns;
-        if effect == Effect::BedMotion && held.len() > 1 && member.columns.len() < held.len() {
-            return Some(Refusal::NotSignificant);
+        // a moving bed changes the lift, and the drag along or across: either alone is another effect's
+        if effect == Effect::BedMotion {
+            const LIFT: usize = 1;
+            let lifts = |&(_, coefficient): &(usize, usize)| coefficient == LIFT;
+            let both = |columns: &[(usize, usize)]| columns.iter().any(lifts) && !columns.iter().all(lifts);
+            if both(&self.design.candidates[member.candidate].columns) && !both(&member.columns) {
+                return Some(Refusal::NotSignificant);
+            }
         }
         if !self.relevant(member, base, fitted) {
             return Some(Refusal::Irrelevant);

@@ -61,7 +61,8 @@ pub(super) fn floors(
     std::array::from_fn(|component| {
         let name = WRENCH[component];
         let stated = manifest.sensor_noise.get(name).copied();
-        let offset = manifest.trial_offset.get(name).copied().unwrap_or(0.0);
+        let offsets = naming.iter().map(|&trial| manifest.trial_offset_of(&all[trial].name, name));
+        let offset = (offsets.map(|o| o * o).sum::<f64>() / naming.len().max(1) as f64).sqrt();
         let mut floor = Floor { sample: 0.0, offset, model: 0.0, source: FloorSource::HighFrequency };
         if !components.contains(&component) {
             return floor;
@@ -155,11 +156,11 @@ pub(super) fn row_noise(
     all: &[Series],
     trials: &[usize],
     components: &[usize],
-    floors: &[Floor; 6],
+    (floors, manifest): (&[Floor; 6], &Manifest),
     smoothing: Smoothing,
 ) -> RowNoise {
     let model = all.iter().map(|series| model_error(std::slice::from_ref(&series))).collect();
-    let mut noise = RowNoise { bin: [1.0; 6], offset: [0.0; 6], model, smoothing };
+    let mut noise = RowNoise { bin: [1.0; 6], offset: vec![[0.0; 6]; all.len()], model, smoothing };
     for &component in components {
         let mut variances = Vec::new();
         for &trial in trials {
@@ -178,7 +179,9 @@ pub(super) fn row_noise(
         // what the model does not know of itself goes with the state, and stays; a component of which it knows little
         // says little beside the others
         noise.bin[component] = bin.hypot(floors[component].model);
-        noise.offset[component] = floors[component].offset;
+        for (offset, series) in noise.offset.iter_mut().zip(all) {
+            offset[component] = manifest.trial_offset_of(&series.name, WRENCH[component]);
+        }
     }
     noise
 }

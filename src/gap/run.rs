@@ -81,7 +81,7 @@ pub fn run(
         return Err(GapError::TooShort { blocks, block_s, folds });
     }
     let smoothing = calibrate(&mut all);
-    let noise = row_noise(&all, &naming, &setting.components, &floors, smoothing);
+    let noise = row_noise(&all, &naming, &setting.components, (&floors, &trials.manifest), smoothing);
     let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
     settle(&mut design, &all, &setting);
     let general = General::new(&all, &design, &setting.components);

@@ -58,6 +58,9 @@ pub struct Manifest {
     /// Standard deviation of the zero from trial to trial, by component [N, N m].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub trial_offset: BTreeMap<String, f64>,
+    /// The same of trials whose zero wanders more or less than that of the others, by trial and component [N, N m].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub trial_offsets: BTreeMap<String, BTreeMap<String, f64>>,
     /// The body, where another simulator's prediction stands in the trials.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<Body>,
@@ -143,6 +146,7 @@ impl Manifest {
         };
         self.nominal_depth.keys().try_for_each(|name| known("nominal_depth", name))?;
         self.channel_widths.keys().try_for_each(|name| known("channel_widths", name))?;
+        self.trial_offsets.keys().try_for_each(|name| known("trial_offsets", name))?;
         self.measured.repeats.iter().flatten().try_for_each(|name| known("measured.repeats", name))?;
         let twins = self.measured.dry_twins.iter().flat_map(|(wet, dry)| [wet, dry]);
         twins.into_iter().try_for_each(|name| known("measured.dry_twins", name))?;
@@ -158,7 +162,8 @@ impl Manifest {
         let columns = self.measured.columns.iter().flatten();
         columns.into_iter().try_for_each(|name| component("measured.columns", name))?;
         self.sensor_noise.keys().try_for_each(|name| component("sensor_noise", name))?;
-        self.trial_offset.keys().try_for_each(|name| component("trial_offset", name))?;
+        let offsets = self.trial_offset.keys().chain(self.trial_offsets.values().flat_map(BTreeMap::keys));
+        offsets.into_iter().try_for_each(|name| component("trial_offset", name))?;
         let Measured { other_forces, known_loads, method, .. } = &self.measured;
         for (key, columns) in [("measured.other_forces", other_forces), ("measured.known_loads", known_loads)]
         {
@@ -189,6 +194,12 @@ impl Manifest {
     /// Width of the channel in which a trial was run [m].
     pub fn channel_width_of(&self, trial: &str) -> Option<f64> {
         self.channel_widths.get(trial).copied().or(self.channel_width)
+    }
+
+    /// Standard deviation of the zero of a trial [N, N m]; 0 where none is stated.
+    pub fn trial_offset_of(&self, trial: &str, component: &str) -> f64 {
+        let own = self.trial_offsets.get(trial).and_then(|of| of.get(component));
+        own.or(self.trial_offset.get(component)).copied().unwrap_or(0.0)
     }
 
     fn check_numbers(&self) -> Result<(), Fault> {
@@ -232,9 +243,12 @@ impl Manifest {
         for value in self.body.iter().flat_map(|body| body.center_of_mass) {
             within("body.center_of_mass".to_owned(), value, PLACE)?;
         }
-        for (table, deviations) in
-            [("sensor_noise", &self.sensor_noise), ("trial_offset", &self.trial_offset)]
-        {
+        let of_all = [
+            ("sensor_noise".to_owned(), &self.sensor_noise),
+            ("trial_offset".to_owned(), &self.trial_offset),
+        ];
+        let of_trials = self.trial_offsets.iter().map(|(trial, of)| (format!("trial_offsets.{trial}"), of));
+        for (table, deviations) in of_all.into_iter().chain(of_trials) {
             for (name, &value) in deviations {
                 within(format!("{table}.{name}"), value, DEVIATION)?;
             }
