@@ -75,6 +75,7 @@ Trials: a folder of CSV files, one a trial, in SI units and body axes (forward, 
   other_forces = [\"drive_fx\"]            columns of known forces, for inverse_dynamics
   known_loads = [\"hung_fz\"]              columns of loads that the cell bears besides the water's, such as known weights
   [sensor_noise]  [trial_offset]           standard deviation of a sample and of the zero from run to run: fx = 4.0
+  [trial_offsets.run07]                    the same of a run whose zero wanders more or less than that of the others
   [body]                                   with sim_ columns: length, width, draft, mass, displaced_volume, center_of_mass
 
 Settings that a file (--config) leaves out are these:
