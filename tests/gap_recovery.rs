@@ -119,6 +119,63 @@ fn wheels_that_spin_thrust_by_what_they_slip() {
 }
 
 #[test]
+fn a_driving_bed_is_told_by_its_lift_and_by_what_it_does_along_and_across() {
+    const DRAG: f64 = -0.1;
+    const LIFT: f64 = -0.15;
+    const SIDE: f64 = 0.3;
+    // half of the trials drift; every second one is the one before once more, parked in a current
+    let mut motions = pushes(2 * TRIALS, SAMPLES, 21);
+    for (_, motion) in motions.iter_mut().enumerate().filter(|(index, _)| index % 4 < 2) {
+        motion.iter_mut().for_each(|s| (s.v.y, s.a.y) = (0.3 * s.v.x, 0.3 * s.a.x));
+    }
+    for pair in motions.chunks_mut(2) {
+        pair[1] = pair[0].clone();
+    }
+    let bed = |s: &State| {
+        let load = 0.5 * planted::RHO * planted::WIDTH * s.depth * s.v.norm();
+        [-DRAG * load * s.v.x, -(DRAG + SIDE) * load * s.v.y, LIFT * load * s.v.norm(), 0.0, 0.0, 0.0]
+    };
+    let loads: Vec<Vec<[f64; 6]>> = motions
+        .iter()
+        .enumerate()
+        .map(|(index, motion)| {
+            motion.iter().map(|s| if index % 2 == 0 { bed(s) } else { [0.0; 6] }).collect()
+        })
+        .collect();
+    let mut trials = trials(&motions, &loads, &Noise::white(NOISE), 21);
+    for (index, trial) in trials.trials.iter_mut().enumerate() {
+        (3..6).for_each(|c| trial.measured[c] = None);
+        if index % 2 == 1 {
+            trial.current = trial.velocity.iter().map(|v| -v).collect();
+            trial.velocity.fill(Vec3::zeros());
+            trial.acceleration.fill(Vec3::zeros());
+        }
+    }
+    let report = run(&trials);
+    assert_eq!(names(&report), ["bed_motion"], "{} {:?}", report.summary, report.rejected);
+    for (name, planted) in [("drag", DRAG), ("lift", LIFT), ("side", SIDE)] {
+        let found = &report.effects[0].parameters[name];
+        assert!((found.value - planted).abs() < 3.0 * found.std + 0.1 * planted.abs(), "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn a_trial_whose_zero_is_said_to_wander_is_no_gap() {
+    let motions = motions(TRIALS, SAMPLES, 5);
+    // three cells that were mounted badly
+    let zero = |trial: usize| if trial % 7 == 0 { 10.0 * NOISE[0] } else { 0.0 };
+    let zeros: Vec<Vec<[f64; 6]>> =
+        (0..TRIALS).map(|trial| vec![[zero(trial), 0.0, 0.0, 0.0, 0.0, 0.0]; SAMPLES]).collect();
+    let mut trials = trials(&motions, &zeros, &Noise::white(NOISE), 5);
+    let unsaid = run(&trials);
+    assert_ne!(unsaid.verdict, Verdict::NothingMissing, "{}", unsaid.summary);
+    let wanders = |trial: usize| (format!("run{trial:02}"), [("fx".to_owned(), 10.0 * NOISE[0])].into());
+    trials.manifest.trial_offsets = (0..TRIALS).step_by(7).map(wanders).collect();
+    let said = run(&trials);
+    assert_eq!(said.verdict, Verdict::NothingMissing, "{} {:?}", said.summary, said.gap.unexplained);
+}
+
+#[test]
 fn a_load_in_shallow_water_alone_is_described_there_and_not_applied() {
     let (trials, _) = pushed(|motion| {
         let shallow = |(load, s): ([f64; 6], &State)| if s.depth < 0.15 { load } else { [0.0; 6] };

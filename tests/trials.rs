@@ -81,6 +81,8 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
         fx = 4.0
         [trial_offset]
         fx = 2.0
+        [trial_offsets.b]
+        fx = 3.0
         [body]
         length = 1.5
         width = 1.4
@@ -102,6 +104,9 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
     assert_eq!(read.manifest.nominal_depth["a"], 0.2032);
     let widths = ["a", "b"].map(|trial| read.manifest.channel_width_of(trial));
     assert_eq!(widths, [Some(6.0), Some(f64::INFINITY)]);
+    let offsets =
+        [("a", "fx"), ("b", "fx"), ("b", "fy")].map(|(trial, c)| read.manifest.trial_offset_of(trial, c));
+    assert_eq!(offsets, [2.0, 3.0, 0.0]);
     let trial = &read.trials[0];
     assert_eq!((trial.len(), &trial.rows[..]), (2, &[3, 4][..]));
     assert_eq!(trial.measured[0].as_deref(), Some(&[-50.0, -51.0][..]));
@@ -310,6 +315,9 @@ fn a_manifest_with_unknown_names_or_numbers_is_refused() {
         ("vehicle = \"w\"\n[measured]\nmethod = \"guess\"", "guess"),
         ("vehicle = \"w\"\n[sensor_noise]\nfw = 1.0", "sensor_noise names \"fw\""),
         ("vehicle = \"w\"\n[trial_offset]\nfx = -1.0", "trial_offset.fx = -1"),
+        ("vehicle = \"w\"\n[trial_offsets.run]\nfx = -1.0", "trial_offsets.run.fx = -1"),
+        ("vehicle = \"w\"\n[trial_offsets.run]\nfw = 1.0", "names \"fw\""),
+        ("vehicle = \"w\"\n[trial_offsets.ran]\nfx = 1.0", "trial_offsets names \"ran\""),
     ] {
         let error = read(manifest, &[("run.csv", &run)]).expect_err("refused");
         assert!(error.to_string().contains("trials.toml") && error.to_string().contains(expected), "{error}");

@@ -231,22 +231,26 @@ impl ActiveEffects {
         let without_rate = still(&state);
         let current_stated = condition.velocity != condition.ground_velocity;
         let EffectLoads { loads, surface_forces, immersion, added_mass, .. } = out;
+        // set for each effect below
+        let mut input = Input {
+            body: &self.body,
+            condition: &state,
+            immersion,
+            predicted: forces.wrench,
+            base_drag: BaseDrag::zeros(),
+            yaw: circumstances.heading.unwrap_or(0.0),
+            wetting_rate: rate.unwrap_or(0.0),
+            channel_width: None,
+            wheel_speeds: circumstances.wheel_speeds.map_or([None; 4], |speeds| speeds.map(Some)),
+        };
         for entry in &self.entries {
             let implicit = entry.effect == Effect::AddedMass && circumstances.implicit_added_mass;
-            let input = Input {
-                body: &self.body,
-                condition: if implicit { &without_rate } else { &state },
-                immersion,
-                predicted: match at_edge {
-                    Some(wrench) if entry.effect.acts_on_own_drag() => wrench,
-                    _ => forces.wrench,
-                },
-                base_drag: entry.base_drag,
-                yaw: circumstances.heading.unwrap_or(0.0),
-                wetting_rate: rate.unwrap_or(0.0),
-                channel_width: entry.channel_width,
-                wheel_speeds: circumstances.wheel_speeds.map_or([None; 4], |speeds| speeds.map(Some)),
+            input.condition = if implicit { &without_rate } else { &state };
+            input.predicted = match at_edge {
+                Some(wrench) if entry.effect.acts_on_own_drag() => wrench,
+                _ => forces.wrench,
             };
+            (input.base_drag, input.channel_width) = (entry.base_drag, entry.channel_width);
             let left_out = match entry.effect {
                 Effect::HullFlooding | Effect::WaveMemory if session.is_none() => Some(LeftOut::NoSession),
                 Effect::Current if current_stated => Some(LeftOut::CurrentStated),

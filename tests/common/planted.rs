@@ -13,7 +13,7 @@ pub const MASS: f64 = 280.0;
 pub const VOLUME: f64 = 0.3;
 pub const RATE: f64 = 100.0;
 const G: f64 = 9.81;
-const RHO: f64 = 1000.0;
+pub const RHO: f64 = 1000.0;
 
 /// One instant of the true motion.
 #[derive(Debug, Clone, Copy)]
