@@ -299,7 +299,7 @@ fn a_wrong_tensor_is_named_and_the_next_request_is_answered() {
         (asked("force_n", 2), invalid, "force_n"),
         (asked("added_mass", 1), invalid, "added_mass"),
         (change(&|r| r.model_name = "tank".into()), Code::NotFound, ""),
-        (change(&|r| r.model_version = "9".into()), Code::NotFound, ""),
+        (change(&|r| r.model_version = u32::MAX.to_string()), Code::NotFound, ""),
     ];
     runtime().block_on(async {
         let mut inference = connect(&served).await;
