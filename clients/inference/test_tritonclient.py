@@ -150,7 +150,7 @@ def test_a_wrong_tensor_is_named(client: triton.InferenceServerClient) -> None:
         client.infer("tank", [good])
     assert "NOT_FOUND" in raised.value.status()
     with pytest.raises(InferenceServerException, match="version"):
-        client.infer("husky", [good], model_version="9")
+        client.infer("husky", [good], model_version="4294967295")
     with pytest.raises(InferenceServerException, match="sequence"):
         client.infer("husky", [good], sequence_id=5, sequence_start=True)
     assert client.infer("husky", [good]).as_numpy("force_n").shape == (2, 3)
