@@ -163,7 +163,7 @@ fn a_driving_bed_is_told_by_its_lift_and_by_what_it_does_along_and_across() {
 fn a_trial_whose_zero_is_said_to_wander_is_no_gap() {
     let motions = motions(TRIALS, SAMPLES, 5);
     // three cells that were mounted badly
-    let zero = |trial: usize| if trial % 7 == 0 { 10.0 * NOISE[0] } else { 0.0 };
+    let zero = |trial: usize| if trial.is_multiple_of(7) { 10.0 * NOISE[0] } else { 0.0 };
     let zeros: Vec<Vec<[f64; 6]>> =
         (0..TRIALS).map(|trial| vec![[zero(trial), 0.0, 0.0, 0.0, 0.0, 0.0]; SAMPLES]).collect();
     let mut trials = trials(&motions, &zeros, &Noise::white(NOISE), 5);

@@ -175,7 +175,7 @@ impl SurfaceTable {
         };
         Self {
             tops: faces.iter().map(|face| face.range(2)[1]).collect(),
-            bottoms: faces.chunks(BLOCK).map(|block| lowest(block)).collect(),
+            bottoms: faces.chunks(BLOCK).map(lowest).collect(),
             x_range: range(0),
             y_range: range(1),
             prefix,
