@@ -70,10 +70,8 @@ pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleEr
 ///
 /// The bundle changes in one step of the file system at the end; an error before it leaves everything as it was.
 pub fn succeed(directory: &Path, bundle: Bundle) -> Result<u32, BundleError> {
-    let next = Next::stage(directory, bundle)?;
-    let put = next.put();
-    next.drop_staged();
-    put.map(|()| next.version)
+    // one bundle, one version
+    Ok(succeed_together(vec![(directory.to_owned(), bundle)])?[0])
 }
 
 /// As [`succeed`], of bundles that belong together: an error with one of them leaves all as they were. Gives the new versions.
