@@ -125,10 +125,10 @@ fn a_driving_bed_is_told_by_its_lift_and_by_what_it_does_along_and_across() {
     const SIDE: f64 = 0.3;
     // half of the trials drift; every second one is the one before once more, parked in a current
     let mut motions = pushes(2 * TRIALS, SAMPLES, 21);
-    for (_, motion) in motions.iter_mut().enumerate().filter(|(index, _)| index % 4 < 2) {
-        motion.iter_mut().for_each(|s| (s.v.y, s.a.y) = (0.3 * s.v.x, 0.3 * s.a.x));
-    }
-    for pair in motions.chunks_mut(2) {
+    for (index, pair) in motions.chunks_mut(2).enumerate() {
+        if index % 2 == 0 {
+            pair[0].iter_mut().for_each(|s| (s.v.y, s.a.y) = (0.3 * s.v.x, 0.3 * s.a.x));
+        }
         pair[1] = pair[0].clone();
     }
     let bed = |s: &State| {
@@ -585,6 +585,27 @@ fn a_fault_that_half_of_the_trials_have_is_none_of_the_sensor_and_not_called_not
     });
     assert_eq!(zero.verdict, Verdict::NoCandidateFits, "{}", zero.summary);
     assert_eq!(why(&zero, "sensor_bias"), Some(gap::Refusal::Unstable), "{:?}", zero.rejected);
+}
+
+#[test]
+fn a_gain_is_told_by_the_trials_that_load_its_channel_and_not_by_the_noise_of_the_others() {
+    const GAIN: f64 = -0.035;
+    // one in five drifts
+    let mut motions = pushes(TRIALS, SAMPLES, 33);
+    for motion in motions.iter_mut().step_by(5) {
+        motion.iter_mut().for_each(|s| (s.v.y, s.a.y) = (0.5 * s.v.x, 0.5 * s.a.x));
+    }
+    let of = |s: &State| [0.0, GAIN * planted::simulate(s)[1], 0.0, 0.0, 0.0, 0.0];
+    let added: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| motion.iter().map(of).collect()).collect();
+    // where nothing goes aside the prediction of the side force is the noise of the recorded speed, and the gap that negated
+    let quiet = [8.0, 0.5, 12.0, 4.0, 4.0, 4.0];
+    let noise = Noise { velocity: 0.04, ..Noise::white(quiet) };
+    let config = Config { library: vec![Effect::SensorGain], ..Config::default() };
+    let report = run_with(&trials(&motions, &added, &noise, 33), &config);
+    assert_eq!(names(&report), ["sensor_gain"], "{} {:?}", report.summary, report.rejected);
+    let found = report.effects[0].parameters["fy"].value;
+    // that noise is a hundredth of the energy of the channel, and pulls the gain towards -1 by as much
+    assert!((found - GAIN).abs() < 0.01, "{found}");
 }
 
 #[test]

@@ -183,7 +183,7 @@ impl Effect {
                 "W = -phi rho g V h_in / h_out upwards, dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)"
             }
             Self::WaterEntrySlamming => {
-                "F = C rho dV/dd w^2 upwards and -C_h rho dV/dd w u across, w the rate of the depth d, on entry only; V the water displaced, or pi L (b d / h)^2 / 8 until d = h, wet_at"
+                "F = C rho dV/dd w^2 upwards and -C_h rho dV/dd w u across, w the rate of the depth d, on entry only; V the water displaced, or pi l (b d / h)^2 / 8 until d = h, wet_at, on each strip of length l with its own d and w"
             }
             Self::WaveMemory => {
                 "f_i = -k_i rho V sqrt(g / L) Re z_i, or -k_i rho V (g / (L W)) Im z_i, z' = -(1/T - i W) z + dv/dt in body axes"

@@ -1,35 +1,120 @@
 //! E7, the blow of entering the water: momentum of the water that starts to move with the hull.
 //!
-//! `F = C w^2 dM/dd` upwards and `-C u w dM/dd` across, on entry only, with the rate `w` of the level and the water `M(d)`
-//! that moves with the hull. The shape is 0 for `M = rho V`, the water displaced; else it is the depth `h` at which the
-//! bottom is wet from side to side, and `M = rho pi c^2 L / 2` (von Karman) with the half beam `c = (B / 2) min(d / h, 1)`
-//! of a wedge. Wagner's splash makes `h` smaller by pi/2 (M); above about 30 degrees of deadrise theory fails
-//! (Constantinescu 2008).
+//! `F = C w^2 dM/dd` upwards and `-C u w dM/dd` across, on entry only, with the rate `w` at which the water rises there and the
+//! water `M(d)` that moves with the hull. The shape is 0 for `M = rho V`, the water displaced; else it is the depth `h` at
+//! which the bottom is wet from side to side, and `M = rho pi c^2 / 2` on each meter of the length (von Karman) with the half
+//! beam `c = (B / 2) min(d / h, 1)` of a wedge, in strips: one that pitches or runs down a ramp gets wet from an end, each
+//! strip at a depth and a rate of its own. Wagner's splash makes `h` smaller by pi/2 (M); above about 30 degrees of deadrise
+//! theory fails (Constantinescu 2008).
+
+use std::f64::consts::PI;
 
 use super::input::{Input, Part};
 use super::library::Shape;
+use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
+/// Strips of the length.
+const STRIPS: usize = 9;
+
 pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let (state, immersion) = (input.condition, input.immersion);
+    let (state, immersion, body) = (input.condition, input.immersion, input.body);
+    let wet_at = shape[0];
+    if wet_at <= 0.0 {
+        return blow(input, &immersion.waterplane_center, immersion.waterplane_area, emit);
+    }
     let up = state.up.into_inner();
-    let growth = state.density * growth(shape[0], input) * input.wetting_rate.max(0.0);
-    // the rate of the level is the entry speed, whatever carries the hull down
-    let blow = up * (growth * input.wetting_rate.max(0.0));
-    emit(0, Part::Hull, input.at(blow, &immersion.waterplane_center));
-    let across = state.velocity - up * state.velocity.dot(&up);
-    emit(1, Part::Hull, input.at(across * -growth, &immersion.waterplane_center));
+    let length = body.length / STRIPS as f64;
+    let half = 0.5 * body.width;
+    for strip in 0..STRIPS {
+        let along = (strip as f64 + 0.5) * length - 0.5 * body.length;
+        let depth = state.depth - up.x * along;
+        if depth > 0.0 && depth < wet_at {
+            let surface = Vec3::new(along, 0.0, body.z0) + up * depth;
+            blow(input, &surface, PI * half * half * length * depth / (wet_at * wet_at), emit);
+        }
+    }
 }
 
-/// Growth of the moving volume with the depth [m2].
-fn growth(wet_at: f64, input: &Input) -> f64 {
-    let immersion = input.immersion;
-    if wet_at <= 0.0 {
-        return immersion.waterplane_area;
+/// At a point of the water surface, from the growth of the moving volume with the depth there [m2].
+fn blow(input: &Input, point: &Vec3, growth: f64, emit: &mut impl FnMut(usize, Part, Wrench)) {
+    let up = input.condition.up.into_inner();
+    // the rate of the level is the entry speed, whatever carries the hull down
+    let rate = input.wetting_rate - up.dot(&input.condition.angular_velocity.cross(point));
+    let gain = input.condition.density * growth * rate.max(0.0);
+    if gain > 0.0 {
+        emit(0, Part::Hull, input.at(up * (gain * rate), point));
+        let velocity = input.local_velocity(point);
+        emit(1, Part::Hull, input.at((velocity - up * velocity.dot(&up)) * -gain, point));
     }
-    if immersion.depth <= 0.0 || immersion.depth >= wet_at {
-        return 0.0;
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::condition::Condition;
+    use crate::effects::{Body, Immersion};
+    use crate::frame::up_from_roll_pitch;
+    use crate::vehicle::shipped;
+
+    /// Sum of a coefficient.
+    fn load(wet_at: f64, state: &Condition, wetting_rate: f64, coefficient: usize) -> (Body, Wrench) {
+        let body = Body::of_vehicle(&shipped::husky().unwrap().vehicle().unwrap());
+        let mut immersion = Immersion::default();
+        body.immerse(state, &mut immersion);
+        let input = Input {
+            body: &body,
+            condition: state,
+            immersion: &immersion,
+            predicted: Wrench::default(),
+            base_drag: Vec3::zeros(),
+            yaw: 0.0,
+            wetting_rate,
+            channel_width: None,
+            wheel_speeds: [None; 4],
+        };
+        let mut sum = Wrench::default();
+        basis(&[wet_at, 0.0, 0.0], &input, &mut |index, _, wrench| {
+            if index == coefficient {
+                sum += wrench;
+            }
+        });
+        (body, sum)
     }
-    let half = 0.5 * input.body.width;
-    std::f64::consts::PI * half * half * input.body.length * immersion.depth / (wet_at * wet_at)
+
+    #[test]
+    fn a_level_wedge_is_von_karman_s() {
+        let state = Condition::level(Vec3::new(0.7, -0.2, 0.0), 0.05);
+        let (body, up) = load(0.1, &state, 0.3, 0);
+        // rho pi (B / 2)^2 L d / h^2 w^2 by hand
+        let gain = state.density * PI * (0.5 * body.width).powi(2) * body.length * 0.05 / 0.01 * 0.3;
+        assert!((up.force - Vec3::new(0.0, 0.0, gain * 0.3)).norm() < 1e-9 * gain, "{up:?}");
+        let (_, across) = load(0.1, &state, 0.3, 1);
+        assert!((across.force + state.velocity * gain).norm() < 1e-9 * gain, "{across:?}");
+        for (depth, rate) in [(0.11, 0.3), (0.05, -0.3), (-0.01, 0.3)] {
+            let state = Condition { depth, ..state };
+            assert_eq!(load(0.1, &state, rate, 0).1, Wrench::default(), "{depth} {rate}");
+        }
+    }
+
+    #[test]
+    fn a_nose_that_dips_is_struck_alone_and_a_body_that_pitches_where_it_goes_down() {
+        // positive pitch lowers the nose, and the water stands at the middle
+        let tilted = Condition { up: up_from_roll_pitch(0.0, 0.1), ..Condition::level(Vec3::zeros(), 0.0) };
+        let (body, nose) = load(0.2, &tilted, 0.3, 0);
+        // of half the length, each meter at its own depth: a fourth of the level wedge with the nose's
+        let deepest = 0.5 * body.length * 0.1_f64.sin();
+        let expected =
+            0.25 * tilted.density * PI * (0.5 * body.width).powi(2) * body.length * deepest / 0.04 * 0.09;
+        let share = nose.force.norm() / expected;
+        // nine strips, of which the middle one has its own middle at the surface
+        assert!((share - 80.0 / 81.0).abs() < 1e-9, "{share}");
+        assert!(nose.moment.y < 0.0, "the nose is lifted: {nose:?}");
+        let pitching =
+            Condition { angular_velocity: Vec3::new(0.0, 0.5, 0.0), ..Condition::level(Vec3::zeros(), 0.05) };
+        let (_, turned) = load(0.2, &pitching, 0.0, 0);
+        assert!(turned.force.z > 0.0 && turned.moment.y < 0.0, "{turned:?}");
+    }
 }

@@ -6,10 +6,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::design::Design;
+use super::design::{Candidate, Design};
 use super::features::{Features, of_bins};
-use super::judge::Judge;
+use super::judge::{Judge, lives_on_a_rate};
 use super::locate::{Limits, OPEN, inside};
+use super::shared::outlasts_noise;
 use crate::effects::Effect;
 
 /// Features that may limit an effect of the water: depth, Froude number, speed.
@@ -44,12 +45,9 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
     let features: Vec<Vec<Features>> = judge.all.iter().map(of_bins).collect();
     let places: Vec<Features> =
         design.rows.rows.iter().step_by(design.rows.width).map(|row| features[row.trial][row.bin]).collect();
-    let one = |candidate: &super::design::Candidate| {
-        let columns: Vec<usize> = candidate.columns.iter().map(|(column, _)| *column).collect();
-        let bins = sums(design, &columns);
-        let Some(whole_sum) = total(bins.iter()) else {
-            return Gated { effect: candidate.effect, limits: OPEN, share: 0.0, tried: 0 };
-        };
+    let one = |candidate: &Candidate| {
+        let bins = sums(design, &columns(candidate));
+        let whole_sum = total(bins.iter())?;
         let ridge = RIDGE * whole_sum.xx.diagonal().max();
         let mut found = (OPEN, whole_sum.gain(ridge));
         let mut tried = 0;
@@ -60,7 +58,26 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
             }
             found = next;
         }
-        Gated { effect: candidate.effect, limits: found.0, share: found.1 / whole, tried }
+        Some(Gated { effect: candidate.effect, limits: found.0, share: found.1 / whole, tried })
+    };
+    // where an effect is hardly excited, the noise of the recorded motion is in it and, with the other sign, in the gap
+    let of_noise = |gated: &Gated, candidate: &Candidate| {
+        if lives_on_a_rate(gated.effect) {
+            return false;
+        }
+        let (columns, bins) = (columns(candidate), sums(design, &columns(candidate)));
+        let inside: Vec<bool> = places.iter().map(|place| inside(&gated.limits, place)).collect();
+        let Some(sum) = total(bins.iter().zip(&inside).filter(|(_, inside)| **inside).map(|(bin, _)| bin))
+        else {
+            return true;
+        };
+        let beta = sum.solve(RIDGE * sum.xx.diagonal().max());
+        let load = |row: usize| {
+            let of = |(column, beta): (&usize, &f64)| design.x[(row, *column)] * beta;
+            if inside[row / design.rows.width] { columns.iter().zip(beta.iter()).map(of).sum() } else { 0.0 }
+        };
+        let load = DVector::from_fn(design.y.len(), |row, _| load(row));
+        !outlasts_noise(design, &load, &design.y)
     };
     // what remembers, or begins in the middle of the trials, has a border of its own
     let bordered = |effect: Effect| effect.has_memory() || effect == Effect::SensorBiasStep;
@@ -68,9 +85,10 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
         .candidates
         .iter()
         .filter(|candidate| library.contains(&candidate.effect) && !bordered(candidate.effect));
-    let found: Vec<Gated> = candidates.map(one).collect();
-    let tried = found.iter().map(|gated| gated.tried).sum();
-    let best = found.into_iter().max_by(|a, b| a.share.total_cmp(&b.share).then(b.effect.cmp(&a.effect)))?;
+    let mut found: Vec<(Gated, &Candidate)> = candidates.filter_map(|of| Some((one(of)?, of))).collect();
+    let tried = found.iter().map(|(gated, _)| gated.tried).sum();
+    found.sort_by(|(a, _), (b, _)| b.share.total_cmp(&a.share).then(a.effect.cmp(&b.effect)));
+    let (best, _) = found.into_iter().find(|(gated, candidate)| !of_noise(gated, candidate))?;
     (best.limits != OPEN && best.share > EXPLAINED).then_some(Gated { tried, ..best })
 }
 
@@ -79,6 +97,10 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
 struct Sum {
     xx: DMatrix<f64>,
     xy: DVector<f64>,
+}
+
+fn columns(candidate: &Candidate) -> Vec<usize> {
+    candidate.columns.iter().map(|(column, _)| *column).collect()
 }
 
 fn sums(design: &Design, columns: &[usize]) -> Vec<Sum> {
@@ -104,12 +126,17 @@ impl Sum {
         self.xy += &other.xy;
     }
 
-    /// What least squares takes off the sum of squares.
-    fn gain(&self, ridge: f64) -> f64 {
+    /// Coefficients of least squares.
+    fn solve(&self, ridge: f64) -> DVector<f64> {
         let count = self.xy.len();
         let matrix =
             DMatrix::from_fn(count, count, |i, j| self.xx[(i, j)] + if i == j { ridge } else { 0.0 });
-        matrix.cholesky().map_or(0.0, |factor| self.xy.dot(&factor.solve(&self.xy)))
+        matrix.cholesky().map_or_else(|| DVector::zeros(count), |factor| factor.solve(&self.xy))
+    }
+
+    /// What they take off the sum of squares.
+    fn gain(&self, ridge: f64) -> f64 {
+        self.xy.dot(&self.solve(ridge))
     }
 }
 

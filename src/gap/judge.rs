@@ -33,6 +33,9 @@ const MOST_FOLDS: f64 = 0.75;
 /// Scatter of a coefficient from trial to trial beyond its noise, over the coefficient, above which it is no coefficient: a
 /// gain that warms up, a pull that depends on the place. A law that holds in outline stays below.
 const MOST_SCATTER: f64 = 0.75;
+/// What holds this share of an effect's energy tells of it: where there is nearly none, the noise of the recorded motion is in
+/// the effect and, with the other sign, in the gap.
+const TELLING: f64 = 0.9;
 /// A shifted sum that still points the same way is no placebo.
 const SAME_DIRECTION: f64 = 0.9;
 
@@ -347,7 +350,7 @@ impl<'a> Judge<'a> {
         helped >= MOST_FOLDS * folds && kept && self.helps_most_blocks(member, base, fitted, &without)
     }
 
-    /// Among the blocks that together hold nine tenths of the member's own energy, most must be better.
+    /// Among the blocks that tell of the member, most must be better.
     fn helps_most_blocks(&self, member: &Member, base: &[usize], with: &Fitted, without: &Fitted) -> bool {
         let design = self.design;
         let blocks = design.rows.blocks;
@@ -367,19 +370,8 @@ impl<'a> Judge<'a> {
             energy[place.block] += own * own;
             change[place.block] += (design.y[row] - b).powi(2) - (design.y[row] - a).powi(2);
         }
-        let mut order: Vec<usize> = (0..blocks).collect();
-        order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]).then(a.cmp(&b)));
-        let whole: f64 = energy.iter().sum();
-        let (mut held, mut better, mut looked) = (0.0, 0, 0);
-        for block in order {
-            if held > 0.9 * whole {
-                break;
-            }
-            held += energy[block];
-            looked += 1;
-            better += usize::from(change[block] < 0.0);
-        }
-        2 * better > looked
+        let telling = telling(&energy);
+        2 * telling.iter().filter(|&&block| change[block] < 0.0).count() > telling.len()
     }
 
     /// Gain of a member, and that of the best of copies of itself that are shifted in time around each trial, which have its
@@ -531,22 +523,38 @@ pub(super) fn lives_on_a_rate(effect: Effect) -> bool {
     matches!(effect, AddedMass | MassError | SensorDelay | WaterEntrySlamming | WaveMemory)
 }
 
-/// Standard deviation of a coefficient between trials beyond what noise explains, by moments (DerSimonian and Laird,
-/// Controlled Clinical Trials 1986); 0 where its excess is as likely chance. A trial that is explained badly as a whole says
+/// The fewest that together hold [`TELLING`] of the energy.
+fn telling(energy: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..energy.len()).collect();
+    order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]).then(a.cmp(&b)));
+    let (most, mut held) = (TELLING * energy.iter().sum::<f64>(), 0.0);
+    order.retain(|&index| {
+        let needed = held <= most;
+        held += energy[index];
+        needed
+    });
+    order
+}
+
+/// Standard deviation of a coefficient between the trials that tell of it, beyond what noise explains, by moments (DerSimonian
+/// and Laird, Controlled Clinical Trials 1986); 0 where its excess is as likely chance. A trial that is explained badly as a whole says
 /// little of one coefficient: its noise is its own residual where that is larger than all trials' together.
 fn scatter(design: &Design, columns: &[usize], beta: &DVector<f64>, index: usize) -> f64 {
     let residual = design.residual(columns, beta);
     let x = design.x.column(columns[index]);
     let noise = mean_square(residual.as_slice()).max(f64::MIN_POSITIVE);
     // inverse of the variance of the trial's own deviation, and that over its standard deviation
-    let of_trial = |rows: &Range<usize>| {
+    let of_trial = |trial: usize| {
+        let rows = &design.rows.of_trial[trial];
         let residual = &residual.as_slice()[rows.clone()];
         let variance = noise.max(mean_square(residual));
         let of = |(xx, xr): (f64, f64), (x, r): (&f64, &f64)| (xx + x * x, xr + x * r);
         let (xx, xr) = x.as_slice()[rows.clone()].iter().zip(residual).fold((0.0, 0.0), of);
         (xx > 0.0).then(|| (xx / variance, xr / (xx * variance).sqrt()))
     };
-    let trials: Vec<(f64, f64)> = design.rows.of_trial.iter().filter_map(of_trial).collect();
+    let energy = |rows: &Range<usize>| x.as_slice()[rows.clone()].iter().map(|x| x * x).sum::<f64>();
+    let energies: Vec<f64> = design.rows.of_trial.iter().map(energy).collect();
+    let trials: Vec<(f64, f64)> = telling(&energies).into_iter().filter_map(of_trial).collect();
     let (sum, squares) =
         trials.iter().fold((0.0, 0.0), |(s, q), (weight, _)| (s + weight, q + weight * weight));
     let freedom = trials.len().max(2) as f64 - 1.0;
