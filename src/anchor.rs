@@ -181,6 +181,11 @@ impl Reading {
             ..Self::default()
         }
     }
+
+    /// What coefficients of one on all surfaces are worth [N].
+    pub fn dynamic_load(&self) -> f64 {
+        self.surfaces.iter().map(|surface| surface.unit).sum()
+    }
 }
 
 impl SurfaceReading {

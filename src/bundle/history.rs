@@ -123,12 +123,11 @@ impl Next {
     fn take_back(&self) {
         let before =
             self.keeps.map_or_else(|| self.staged.clone(), |before| place_of(&self.directory, before));
-        if exchange(&before, &self.directory).is_ok() {
-            let _ = fs::remove_dir_all(before);
-        } else {
+        if !before.exists() {
             // there was none
-            let _ = fs::rename(&self.directory, &self.staged);
-            self.drop_staged();
+            let _ = fs::remove_dir_all(&self.directory);
+        } else if exchange(&before, &self.directory).is_ok() {
+            let _ = fs::remove_dir_all(before);
         }
     }
 

@@ -18,6 +18,7 @@ use super::placement::Placement;
 use super::plan::{Plan, Set};
 use crate::condition::{Condition, GroundContact};
 use crate::dataset::{Dataset, Image, Sample};
+use crate::effects;
 use crate::frame::{GRAVITY, Vec3};
 use crate::train::TrainError;
 use crate::train::label::{labels, order};
@@ -90,18 +91,24 @@ pub fn trials(
         if !sets.iter().any(|set| is_of(samples, set)) || (pairs.is_some() && twin.is_none()) {
             continue;
         }
-        // the prediction is right of the parked flow itself, which what does not go with the bed would change as well
-        let predicted = twin.map(|parked| heard(parked)).transpose()?;
+        let mut flows = Vec::new();
         for samples in [Some(samples), twin].into_iter().flatten() {
-            let mut wrenches = heard(samples)?;
+            let wrenches = heard(samples)?;
             noise.hear(samples, &wrenches, vehicle);
-            if predicted.is_some() {
-                let means = std::array::from_fn(|c| mean(&wrenches, c));
-                wrenches.fill(means);
+            flows.push((samples, wrenches));
+        }
+        if twin.is_some() {
+            for (_, wrenches) in &mut flows {
+                let mean = mean(wrenches);
+                wrenches.fill(mean);
             }
+        }
+        // right of the parked flow itself, which what does not go with the bed would change as well
+        let predicted = flows.get(1).map(|(_, parked)| parked[0]);
+        for (samples, wrenches) in flows {
             let mut columns = columns(samples, &wrenches, &wheels);
-            if let Some(predicted) = &predicted {
-                columns.extend((0..6).map(|c| (SIMULATED[c], vec![mean(predicted, c); samples.len()])));
+            if let Some(predicted) = predicted {
+                columns.extend((0..6).map(|c| (SIMULATED[c], vec![predicted[c]; samples.len()])));
             }
             loads.insert(samples[0].case.clone(), dynamic_load(samples, vehicle));
             trials.push((samples[0].case.clone(), columns));
@@ -144,13 +151,11 @@ fn channel_width(plan: &Plan, vehicle: &Vehicle) -> Option<f64> {
     Some(Channel::new(settings, &placement, length, case.speed_mps, scales).size.y)
 }
 
-/// True between Schijf's two limiting speeds, the roots of `F = (1 - m) (2/3 (1 + F^2 / 2))^1.5`: no steady flow passes the hull
-/// there, and a bore leaves it as long as the flow is computed. The blockage `m` is that of the vehicle's whole width.
+/// True where a bore leaves the hull as long as the flow is computed, taking it to fill the depth in its whole width.
 fn is_choked(condition: &Condition, vehicle: &Vehicle, channel_width: Option<f64>) -> bool {
     let Some(width) = channel_width else { return false };
     let froude = condition.velocity.norm() / (GRAVITY * condition.depth).sqrt();
-    let free = 1.0 - vehicle.dimensions.width / width;
-    froude > free * (2.0 / 3.0 * (1.0 + 0.5 * froude * froude)).powf(1.5)
+    effects::is_choked(froude, vehicle.dimensions.width / width)
 }
 
 /// Wheels that have a column, with their radius [m].
@@ -241,10 +246,8 @@ impl Noise {
         }
         let (half, load) = (wrenches.len() / 2, dynamic_load(samples, vehicle));
         if half > 0 && load > 0.0 && samples.iter().all(|sample| sample.condition == samples[0].condition) {
-            for c in 0..6 {
-                let off = 0.5 * (mean(&wrenches[half..], c) - mean(&wrenches[..half], c));
-                self.mean[c] += (off / load).powi(2);
-            }
+            let [early, late] = [&wrenches[..half], &wrenches[half..]].map(mean);
+            (0..6).for_each(|c| self.mean[c] += (0.5 * (late[c] - early[c]) / load).powi(2));
             self.means += 1.0;
         }
     }
@@ -261,8 +264,9 @@ impl Noise {
     }
 }
 
-fn mean(wrenches: &[[f64; 6]], component: usize) -> f64 {
-    wrenches.iter().map(|wrench| wrench[component]).sum::<f64>() / wrenches.len() as f64
+fn mean(wrenches: &[[f64; 6]]) -> [f64; 6] {
+    let count = wrenches.len() as f64;
+    std::array::from_fn(|c| wrenches.iter().map(|wrench| wrench[c]).sum::<f64>() / count)
 }
 
 /// Standard deviations by component; none where nothing was heard.

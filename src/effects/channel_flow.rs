@@ -54,14 +54,26 @@ fn faded(froude: f64, blockage: f64, gone_at: f64) -> f64 {
     subcritical(limit, blockage) * left.clamp(0.0, 1.0)
 }
 
-/// Schijf's limit: the flow beside the hull is as fast as its own waves, `F = (1 - m) (2/3 (1 + F^2 / 2))^1.5`.
+/// True between Schijf's two limits: no steady flow passes a hull of this blockage without a bore.
+pub fn is_choked(froude: f64, blockage: f64) -> bool {
+    to_the_limit(froude, blockage) < 0.0
+}
+
+/// 0 at Schijf's limits, where the flow beside the hull is as fast as its own waves, below 0 between them:
+/// `(1 - m) (2/3 (1 + F^2 / 2))^1.5 - F`. One limit is below `F = 1`, the other above.
+fn to_the_limit(froude: f64, blockage: f64) -> f64 {
+    let inner = 2.0 / 3.0 * (1.0 + 0.5 * froude * froude);
+    (1.0 - blockage) * inner * inner.sqrt() - froude
+}
+
+/// Schijf's lower limit.
 fn limiting_froude(blockage: f64) -> f64 {
     let free = 1.0 - blockage;
     let mut froude = free;
     for _ in 0..12 {
-        // Newton; the right side is convex and the root below 1
+        // Newton; convex, and the root below 1
         let inner = 2.0 / 3.0 * (1.0 + 0.5 * froude * froude);
-        let value = free * inner * inner.sqrt() - froude;
+        let value = to_the_limit(froude, blockage);
         let slope = free * inner.sqrt() * froude - 1.0;
         froude -= value / slope.min(-1e-3);
     }
@@ -94,6 +106,9 @@ mod tests {
         // by hand for m = 0.267: F = 0.733 (2/3 (1 + 0.4668^2 / 2))^1.5 = 0.4668
         let limit = limiting_froude(0.267);
         assert!((limit - 0.4668).abs() < 2e-3, "{limit}");
+        assert!(is_choked(limit + 0.01, 0.267) && !is_choked(limit - 0.01, 0.267));
+        // by hand: 0.733 (2/3 (1 + 1.928^2 / 2))^1.5 = 1.928
+        assert!(is_choked(1.918, 0.267) && !is_choked(1.938, 0.267));
         // the critical depth is two thirds of the energy
         let critical = 1.0 - 2.0 / 3.0 * (1.0 + 0.5 * limit * limit);
         assert!((subcritical(limit, 0.267) - critical).abs() < 1e-2, "{critical}");

@@ -1,6 +1,6 @@
 //! Hydrostatic pressure integrated exactly over the wet part of a hull (effect E1).
 
-use super::immersion::{WetTriangle, wet_triangles};
+use super::immersion::{WetTriangle, depth_moments, wet_triangles};
 use super::mesh::Mesh;
 use super::surfaces::Hull;
 use crate::condition::FRESH_WATER;
@@ -81,11 +81,10 @@ pub fn surface_hydrostatics_into(
 
 /// Load of a fluid with `rho g = 1` on one triangle: `-int delta n dA` [m3] and its moment [m4].
 fn unit_load(triangle: &WetTriangle, about: &Vec3) -> Wrench {
-    let (area, [a, b, c], [da, db, dc]) = (triangle.area_vector(), triangle.vertices, triangle.depths);
-    // the three edge midpoints, collected by corner: int delta x dA = A / 12 sum of x_i (sum of depths + delta_i)
-    let sum = da + db + dc;
-    let first_moment = (a * (sum + da) + b * (sum + db) + c * (sum + dc)) / 12.0 - about * (sum / 3.0);
-    Wrench { force: -area * (sum / 3.0), moment: -first_moment.cross(&area) }
+    let area = triangle.area_vector();
+    let (depth, moment) = depth_moments([0, 1, 2].map(|i| (triangle.vertices[i], triangle.depths[i])));
+    let first_moment = moment / 12.0 - about * (depth / 3.0);
+    Wrench { force: -area * (depth / 3.0), moment: -first_moment.cross(&area) }
 }
 
 fn scaled(unit: Wrench, factor: f64) -> Wrench {

@@ -57,17 +57,18 @@ pub fn clip(corners: [Vec3; 3], plane: &WaterPlane) -> WetTriangles {
         3 => one(WetTriangle { vertices: corners, depths }),
         1 => {
             let [a, b, c] = starting_at(wet.iter().position(|w| *w), corners, depths);
-            one(triangle(a, cut(a, b), cut(a, c)))
+            one(triangle(a, cut(a, b).0, cut(a, c).0))
         }
         _ => {
             let [a, b, c] = starting_at(wet.iter().position(|w| !*w), corners, depths);
-            let (ab, ca) = (cut(b, a), cut(c, a));
+            let (ab, ca) = (cut(b, a).0, cut(c, a).0);
             WetTriangles { triangles: [triangle(ab, b, c), triangle(ab, c, ca)], count: 2 }
         }
     }
 }
 
-type Corner = (Vec3, f64);
+/// A place and its depth.
+pub(super) type Corner = (Vec3, f64);
 
 fn one(triangle: WetTriangle) -> WetTriangles {
     WetTriangles { triangles: [triangle, WetTriangle::default()], count: 1 }
@@ -82,8 +83,17 @@ fn starting_at(first: Option<usize>, p: [Vec3; 3], d: [f64; 3]) -> [Corner; 3] {
     [i, (i + 1) % 3, (i + 2) % 3].map(|k| (p[k], d[k]))
 }
 
-/// Where an edge from a wet to a dry corner meets the surface; always computed from the wet end, so that the two
-/// faces of an edge agree on the point.
-fn cut((wet, depth): Corner, (dry, height): Corner) -> Corner {
-    (wet + (dry - wet) * (depth / (depth - height)), 0.0)
+/// Where an edge from a wet to a dry corner meets the surface, and which share of it is wet; always computed from the wet
+/// end, so that the two faces of an edge agree on the point.
+pub(super) fn cut((wet, depth): Corner, (dry, height): Corner) -> (Corner, f64) {
+    let share = depth / (depth - height);
+    ((wet + (dry - wet) * share, 0.0), share)
+}
+
+/// Sums over a wet triangle by which it weighs the depth: `int delta dA = A / 3` of the first, `int delta x dA = A / 12` of the
+/// second. The three edge midpoints, which are exact, collected by corner.
+#[inline(always)]
+pub(super) fn depth_moments([(a, da), (b, db), (c, dc)]: [Corner; 3]) -> (f64, Vec3) {
+    let sum = da + db + dc;
+    (sum, a * (sum + da) + b * (sum + db) + c * (sum + dc))
 }

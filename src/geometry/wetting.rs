@@ -11,6 +11,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
+use super::immersion::{Corner, cut, depth_moments};
 use super::surfaces::Hull;
 use crate::frame::{Vec3, WaterPlane};
 use crate::wrench::Wrench;
@@ -327,22 +328,12 @@ impl Face {
     }
 }
 
-/// A place and its depth.
-type Corner = (Vec3, f64);
-
-/// Where an edge from a wet to a dry corner meets the surface, and which share of it is wet.
-fn cut((wet, depth): Corner, (dry, height): Corner) -> (Corner, f64) {
-    let share = depth / (depth - height);
-    ((wet + (dry - wet) * share, 0.0), share)
-}
-
 impl Below {
-    /// Over a triangle of so much area: the three edge midpoints, which are exact, collected by corner.
+    /// Over a triangle of so much area.
     #[inline(always)]
-    fn over([(a, da), (b, db), (c, dc)]: [Corner; 3], area: f64) -> Self {
-        let sum = da + db + dc;
-        let moment = (a * (sum + da) + b * (sum + db) + c * (sum + dc)) * (area / 12.0);
-        Self { area, depth: area * sum / 3.0, moment }
+    fn over(corners: [Corner; 3], area: f64) -> Self {
+        let (depth, moment) = depth_moments(corners);
+        Self { area, depth: area * depth / 3.0, moment: moment * (area / 12.0) }
     }
 }
 

@@ -143,7 +143,7 @@ fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> (Vec<Lo
 
 /// See [`Known::carried`].
 fn carry(loads: &mut [Load], reading: &Reading) {
-    let whole: f64 = reading.surfaces.iter().map(|surface| surface.unit).sum();
+    let whole = reading.dynamic_load();
     if whole == 0.0 {
         return;
     }

@@ -215,11 +215,6 @@ fn predict(layers: &Layers<f32>, state: &Known, prepared: &Prepared, form: &Anch
     state.reading.surfaces.iter().enumerate().map(force).sum()
 }
 
-/// What coefficients of one on all surfaces are worth [N].
-fn dynamic_load(state: &Known) -> f64 {
-    state.reading.surfaces.iter().map(|surface| surface.unit).sum()
-}
-
 /// What is known of the errors: those of cases, and how large they are expected to be in states between them.
 fn missed(
     layers: &Layers<f32>,
@@ -243,15 +238,16 @@ fn missed(
         let of_case = ensemble.missed(number, state, prepared).filter(|_| state.image == Image::Original);
         let Some(of_case) = of_case else { continue };
         // states that the network has not seen tell what it loses of what it was taught
-        let lost = |fresh: &Known| predict(layers, fresh, prepared, form) - fresh.dynamic();
+        let lost = fresh.iter().map(|fresh| predict(layers, fresh, prepared, form) - fresh.dynamic());
+        let lost: Vec<(&Known, Vec3)> = fresh.iter().zip(lost).collect();
         // in proportion: one of them may be much faster than the case
-        let here = |fresh: &Known| {
-            let share = dynamic_load(state) / dynamic_load(fresh);
-            if share.is_finite() { lost(fresh) * share } else { Vec3::zeros() }
+        let here = |(fresh, lost): &(&Known, Vec3)| {
+            let share = state.reading.dynamic_load() / fresh.reading.dynamic_load();
+            if share.is_finite() { lost * share } else { Vec3::zeros() }
         };
-        missed.push(of(state, part, true, of_case + fresh.first().map_or_else(Vec3::zeros, here)));
-        for fresh in fresh {
-            let parts = [ensemble.deviation(fresh, prepared), teacher.noise(fresh, prepared), lost(fresh)];
+        missed.push(of(state, part, true, of_case + lost.first().map_or_else(Vec3::zeros, here)));
+        for (fresh, lost) in lost {
+            let parts = [ensemble.deviation(fresh, prepared), teacher.noise(fresh, prepared), lost];
             let expected = parts.iter().map(|part| part.component_mul(part)).sum::<Vec3>().map(f64::sqrt);
             // the mean magnitude of a Laplace distribution of that deviation
             missed.push(of(fresh, part, false, expected * std::f64::consts::FRAC_1_SQRT_2));
