@@ -293,6 +293,15 @@ fn a_folder_that_is_none_says_what_it_lacks() {
 }
 
 #[test]
+fn an_ending_in_capitals_is_a_trial_too_and_not_another_of_the_same_name() {
+    let run = table(&[], 20);
+    let trials = read(MANIFEST, &[("one.csv", &run), ("two.CSV", &run)]).expect("sound");
+    assert_eq!(trials.trials.iter().map(|trial| trial.name.as_str()).collect::<Vec<_>>(), ["one", "two"]);
+    let error = read(MANIFEST, &[("one.csv", &run), ("one.CSV", &run)]).expect_err("refused");
+    assert!(matches!(&error.fault, Fault::SameName { name } if name == "one"), "{error}");
+}
+
+#[test]
 fn a_manifest_with_unknown_names_or_numbers_is_refused() {
     let run = table(&[], 5);
     for (manifest, expected) in [

@@ -14,6 +14,7 @@ mod trial;
 mod units;
 mod write;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -51,6 +52,14 @@ pub enum Fault {
     /// A folder without a trial.
     #[error("there is no trial: a trial is a CSV file beside {MANIFEST_FILE}")]
     NoTrial,
+    /// Two files whose names differ in the case of their endings alone.
+    #[error(
+        "{name}.csv is there twice, its ending once in capitals: rename one, a trial is named after its file"
+    )]
+    SameName {
+        /// The name of both.
+        name: String,
+    },
     /// A column that is needed.
     #[error("column {column} is missing; there are: {present}")]
     MissingColumn {
@@ -352,6 +361,10 @@ impl Trials {
         if files.is_empty() {
             return Err(at(directory)(Fault::NoTrial));
         }
+        let mut names = BTreeSet::new();
+        if let Some(name) = files.iter().map(|file| stem(file)).find(|name| !names.insert(name.clone())) {
+            return Err(at(directory)(Fault::SameName { name }));
+        }
         manifest.check(&files).map_err(at(&path))?;
         let trials: Vec<Trial> =
             files.iter().map(|file| Trial::read(file, &manifest)).collect::<Result<_, _>>()?;
@@ -373,7 +386,7 @@ impl Trials {
 fn csv_files(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
     let paths = fs::read_dir(directory)?.map(|entry| Ok(entry?.path()));
     let mut paths = paths.collect::<std::io::Result<Vec<_>>>()?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
+    paths.retain(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")));
     paths.sort();
     Ok(paths)
 }
