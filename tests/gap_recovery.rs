@@ -710,6 +710,8 @@ fn what_passes_and_leaves_too_much_is_told_and_not_named() {
     assert_eq!(report.verdict, Verdict::NoCandidateFits, "{}", report.summary);
     let drag = report.rejected.iter().find(|rejected| rejected.name == "drag_coefficient_error");
     assert_eq!(drag.and_then(|drag| drag.why), Some(gap::Refusal::Incomplete), "{:?}", report.rejected);
+    let left = report.gap.unexplained.expect("told");
+    assert!(left.contains("; nearest comes drag coefficient error"), "{left}");
 }
 
 #[test]
@@ -797,6 +799,69 @@ fn mirrored(mut trials: Trials) -> Trials {
         }
     }
     trials
+}
+
+#[test]
+fn a_channel_that_cannot_be_what_it_is_called_is_refused_with_its_trial() {
+    let good = with(&["squat"], 3.0, 16).0;
+    let body = gap::body_of(&good).expect("a body");
+    let refused = |spoil: &dyn Fn(&mut [Option<Vec<f64>>; 6])| {
+        // one trial, then all
+        [4..5, 0..TRIALS].map(|spoiled| {
+            let mut trials = good.clone();
+            trials.trials[spoiled].iter_mut().for_each(|trial| spoil(&mut trial.measured));
+            gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default())
+        })
+    };
+    let all = |value: &mut Option<Vec<f64>>, to: &dyn Fn(f64) -> f64| {
+        value.iter_mut().flatten().for_each(|value| *value = to(*value));
+    };
+    for (result, of) in refused(&|measured| all(&mut measured[0], &|_| 3.0)).iter().zip(PLACES) {
+        let is_named = |e: &GapError| matches!(e, GapError::Dead { place, column: "fx", .. } if place == of);
+        assert!(result.as_ref().is_err_and(is_named), "{result:?}");
+    }
+    for (result, of) in refused(&|measured| all(&mut measured[0], &|x| -x)).iter().zip(PLACES) {
+        let is_named =
+            |e: &GapError| matches!(e, GapError::Reversed { place, column: "fx", .. } if place == of);
+        assert!(result.as_ref().is_err_and(is_named), "{result:?}");
+    }
+    let [alone, everywhere] = refused(&|measured| {
+        let most = measured[0].iter().flatten().fold(0.0, |most: f64, x| most.min(*x));
+        all(&mut measured[0], &|x| x.max(0.5 * most));
+    });
+    for result in [alone, everywhere] {
+        // each trial stops elsewhere
+        let is_named =
+            |e: &GapError| matches!(e, GapError::Saturated { column: "fx", count, .. } if *count >= 20);
+        assert!(result.as_ref().is_err_and(is_named), "{result:?}");
+    }
+    let [_, everywhere] = refused(&|measured| measured.swap(0, 2));
+    assert_eq!(everywhere, Err(GapError::Swapped { column: "fx", other: "fz" }));
+    // a zero that is off by the weight turns fz about, but not its changes
+    let [_, everywhere] = refused(&|measured| all(&mut measured[2], &|x| x - planted::MASS * 9.81));
+    assert!(everywhere.is_ok(), "{everywhere:?}");
+}
+
+/// What one trial and all of them are called where a channel is refused.
+const PLACES: [&str; 2] = ["run04.csv", "every trial"];
+
+#[test]
+fn a_recording_that_was_damaged_is_pointed_at_and_where_it_is_kept_back_hides_no_name() {
+    let (mut trials, _) = with(&["squat"], 3.0, 16);
+    let clean = run(&trials);
+    let is_loud = |remark: &&String| remark.contains("times the noise");
+    assert_eq!((names(&clean), clean.remarks.iter().find(is_loud)), (vec!["squat"], None));
+    let kept_back = clean.gap.held_out_trials[0].clone();
+    trials.manifest.sensor_noise.insert("fz".into(), NOISE[2]);
+    let damaged = trials.trials.iter_mut().find(|trial| trial.name == kept_back).expect("a trial");
+    let mut random = Random::new(3);
+    for value in damaged.measured[2].iter_mut().flatten() {
+        *value += 20.0 * NOISE[2] * gaussian(&mut random);
+    }
+    let report = run(&trials);
+    assert_eq!(names(&report), ["squat"], "{}", report.summary);
+    let remark = report.remarks.iter().find(is_loud).expect("remarked");
+    assert!(remark.starts_with("fz: 1 of ") && remark.contains(&kept_back), "{remark}");
 }
 
 #[test]

@@ -312,15 +312,16 @@ impl Effect {
             }
             Self::SensorGain => {
                 const {
+                    // farther off it is no error of a scale: such a channel was zeroed in the water, or holds something else
                     &[
-                        c("fx", "1", -0.9, 3.0),
-                        c("fy", "1", -0.9, 3.0),
-                        c("fz", "1", -0.9, 3.0),
-                        c("mx", "1", -0.9, 3.0),
-                        c("my", "1", -0.9, 3.0),
-                        c("mz", "1", -0.9, 3.0),
+                        c("fx", "1", -0.5, 1.0),
+                        c("fy", "1", -0.5, 1.0),
+                        c("fz", "1", -0.5, 1.0),
+                        c("mx", "1", -0.5, 1.0),
+                        c("my", "1", -0.5, 1.0),
+                        c("mz", "1", -0.5, 1.0),
                         // one calibration factor of the whole sensor
-                        c("all", "1", -0.9, 3.0),
+                        c("all", "1", -0.5, 1.0),
                     ]
                 }
             }

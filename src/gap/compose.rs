@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 
 use super::candidates::Setting;
 use super::design::Design;
-use super::detect::{self, Excitation};
+use super::detect::{self, Excitation, GapSize};
 use super::effects_file::remarks;
 use super::experiment::separating;
 use super::fit::{Fit, Parameter, fit};
@@ -17,8 +17,8 @@ use super::noise::{Floor, floors_of};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 use super::series::Series;
 use super::statistics::quantile;
-use super::verdict::{Found, STRUCTURE};
-use super::{Named, locate};
+use super::verdict::{Found, STRUCTURE, Unfit};
+use super::{Named, locate, plausible};
 use crate::condition::Condition;
 use crate::effects::{self, Effect, Kind, Memory, Part};
 use crate::files::hexadecimal;
@@ -57,10 +57,13 @@ pub(super) fn compose(
     let mut held_out = closures_of(&named);
     let is_fault = found.members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
     let disproof = held_out.get("all").and_then(|all| all.disproof(config.coverage, is_fault));
-    // of several explanations one may hold, and the trials that tell them apart are asked for; a fault is exact or is none
-    let disproof = disproof.filter(|_| found.verdict == Verdict::Named || fits && is_fault);
+    // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows; a fault is
+    // exact or is none
+    let disproof =
+        disproof.filter(|share| fits && (found.verdict == Verdict::Named || is_fault || *share < 0.0));
     if disproof.is_some() {
         found.verdict = Verdict::NoCandidateFits;
+        found.left = found.of_gap.clone();
         named.clear();
         held_out = closures_of(&named);
     }
@@ -88,6 +91,9 @@ pub(super) fn compose(
     });
     let mut said: Vec<String> = trials.remarks().iter().map(ToString::to_string).collect();
     said.extend(outside(all));
+    if !setting.computed {
+        said.extend(plausible::remarks(all, &setting.components));
+    }
     said.extend(remarks(&effects));
     said.extend(unpublished(&effects));
     let unexplained = unexplained(judge, &found, disproof);
@@ -241,21 +247,19 @@ fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String
     loads
 }
 
-/// What is not named: effects beside the set that was found, and its own members where it does not hold.
+/// What is not named: effects beside the set that was found, or each by itself where none holds.
 fn rejected(judge: &Judge, found: &Found, library: &[Effect], holds: bool) -> Vec<Rejected> {
     let whole = judge.missing();
     // where nothing is missing nothing has a share
     let share = |gain: f64| if whole > f64::MIN_POSITIVE { (gain / whole).clamp(0.0, 1.0) } else { 0.0 };
     let of = |&effect: &Effect| {
-        let others = found.members.iter().filter(|member| judge.effect(member) != effect);
-        let others: Vec<Member> = others.cloned().collect();
-        let is_member = others.len() < found.members.len();
-        if is_member && holds {
+        if holds && found.members.iter().any(|member| judge.effect(member) == effect) {
             return None;
         }
-        let beside = judge.weighed(&others, effect)?;
+        let named: &[Member] = if holds { &found.members } else { &[] };
+        let beside = judge.weighed(named, effect)?;
         let alone = judge.design.empty_loss() - judge.ranked(&[], effect)?.first()?.0;
-        let why = beside.refused.or(is_member.then_some(Refusal::Incomplete));
+        let why = beside.refused.or((!holds).then_some(Refusal::Incomplete));
         let (share_of_gap, share_alone) = (share(beside.gain), share(alone));
         Some(Rejected { name: effect.name(), why, share_of_gap, share_alone })
     };
@@ -300,11 +304,29 @@ fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<St
     }
     let functions: Vec<String> =
         left.strongest.iter().map(|(name, share)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
-    let mut text = format!(
-        "{:.0} % of the gap above the floor can be predicted from the state beyond the named effects; it goes most with {}",
-        (100.0 * share).clamp(0.0, 100.0),
-        functions.join(", ")
-    );
+    let beyond = if found.verdict == Verdict::NoCandidateFits { "" } else { " beyond the named effects" };
+    let mut text = match (100.0 * share).clamp(0.0, 100.0).round() {
+        0.0 => "no smooth function of the state predicts the gap".to_owned(),
+        share => format!(
+            "{share:.0} % of the gap above the floor can be predicted from the state{beyond}; it goes most with {}",
+            functions.join(", ")
+        ),
+    };
+    if let Some(unfit) = found.unfit.filter(|_| found.verdict == Verdict::NoCandidateFits) {
+        let names = names(judge, &found.members).join(" and ").replace('_', " ");
+        text += &match unfit {
+            Unfit::Explains(share, asked) => format!(
+                "; nearest comes {names}, with {:.0} % of it, where {:.0} % are asked for",
+                100.0 * share.max(0.0),
+                100.0 * asked
+            ),
+            Unfit::Unresolved => {
+                format!("; nearest comes {names}, which would fade faster than these samples resolve")
+            }
+            Unfit::Imitates => format!("; nearest comes {names}, but one effect in a region explains more"),
+            Unfit::Leaves => format!("; nearest comes {names}, but much of what lasts is still there"),
+        };
+    }
     if let Some(gated) = found.gated.filter(|_| found.verdict == Verdict::NoCandidateFits) {
         text += &format!(
             "; where {} it is like {}, and {:.0} % of it goes with that there",
@@ -314,11 +336,15 @@ fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<St
         );
     }
     if let Some(share) = disproof {
-        text += &format!(
-            "; {} hold on the trials in which they were found, and explain {:.0} % of the squared gap of those kept back",
-            names(judge, &found.members).join(" and ").replace('_', " "),
-            100.0 * share
-        );
+        let names = names(judge, &found.members).join(" and ").replace('_', " ");
+        text += &if share > 0.0 {
+            format!(
+                "; {names} would explain {:.0} % of the squared gap of the trials kept back",
+                100.0 * share
+            )
+        } else {
+            format!("; {names} would make the gap of the trials kept back larger")
+        };
     }
     Some(text)
 }
@@ -445,20 +471,41 @@ fn trace(
     }
 }
 
-/// Says so where the gap is clearly larger than the noise and only the model's own error keeps it from counting.
+/// Says so where the gap is clearly larger than the noise: only the model's own error keeps it from counting, or nothing that
+/// the trials tell goes with it.
 fn hidden(report: &Report) -> Option<String> {
     const CLEARLY: f64 = 2.0;
-    let times = |(name, floor): &(&&str, &Floor)| {
-        report.gap.size.get(**name).map_or(0.0, |size| size.rms / floor.total().max(f64::MIN_POSITIVE))
+    const BEYOND: f64 = 1.5;
+    let sizes = report.gap.floors.iter().filter_map(|(name, floor)| {
+        let size = report.gap.size.get(name)?;
+        Some((*name, *floor, size))
+    });
+    let most = |over: &dyn Fn(&Floor) -> f64, of: &dyn Fn(&(&str, Floor, &GapSize)) -> bool| {
+        let times =
+            |(_, floor, size): &(&str, Floor, &GapSize)| size.rms / over(floor).max(f64::MIN_POSITIVE);
+        sizes.clone().filter(|entry| of(entry)).max_by(|a, b| times(a).total_cmp(&times(b)))
     };
-    let loud = report.gap.floors.iter().filter(|of| of.1.model > of.1.total() && times(of) > CLEARLY);
-    let (name, floor) = loud.max_by(|a, b| times(a).total_cmp(&times(b)))?;
-    Some(format!(
-        " and what the model states of itself. Of {name} the noise is {:.3} and the model's own error {:.3}: the gap of {:.3} may be either's.",
-        floor.total(),
-        floor.model,
-        report.gap.size.get(*name).map_or(0.0, |size| size.rms),
-    ))
+    let is_beyond = |(_, floor, size): &(&str, Floor, &GapSize)| {
+        size.above_floor && size.rms > BEYOND * floor.with_model()
+    };
+    if let Some((name, floor, size)) = most(&Floor::with_model, &is_beyond) {
+        return Some(format!(
+            ". Yet the gap of {name} is {:.3}, where {:.3} are expected of noise and model: it hangs together with nothing that these trials tell.",
+            size.rms,
+            floor.with_model(),
+        ));
+    }
+    let is_hidden = |(_, floor, size): &(&str, Floor, &GapSize)| {
+        floor.model > floor.total() && size.rms > CLEARLY * floor.total()
+    };
+    most(&Floor::total, &is_hidden).map(|(name, floor, size)| {
+        format!(
+            " and what the model states of itself. Of {name} the noise is {:.3} and the model's own error {:.3}: the gap of {:.3} may be either's.",
+            floor.total(),
+            floor.model,
+            size.rms,
+        )
+    })
 }
 
 fn summary(report: &Report, gated: Option<Gated>) -> String {

@@ -212,7 +212,8 @@ fn best_split(points: &[&Point], tried: &mut usize) -> Option<(usize, f64)> {
             let (a, b) = (prefix[n] / n as f64, (whole - prefix[n]) / (count - n) as f64);
             let gain = (a - b).powi(2) * n as f64 * (count - n) as f64 / count as f64;
             if best.is_none_or(|(other, ..)| gain > other) {
-                best = Some((gain, feature, value));
+                // between two values, so that the words of it tell on which side each lies
+                best = Some((gain, feature, 0.5 * (value + pairs[n].0)));
             }
         }
     }
@@ -237,7 +238,8 @@ fn region(limits: &Limits, check: &[&Point], all: &[&Point]) -> Option<(Region, 
     let region = Region {
         place: in_words(limits),
         conditions: conditions(limits),
-        share_of_gap: share,
+        // elsewhere there may be less than noise is expected to leave
+        share_of_gap: share.min(1.0),
         share_of_samples: within.len() as f64 / check.len() as f64,
         trials: entered.len(),
         contrast: (here.max(0.0) / there.max(1e-6 * here)).sqrt(),

@@ -148,9 +148,11 @@ pub enum GapError {
     },
     /// A channel without a signal.
     #[error(
-        "column {column}: {value} in every row of every trial, where a standard deviation of {spread:.3} {unit} is expected: the channel was dead or not recorded; list the other components in measured.columns"
+        "column {column}: {value} in every row of {place}, where a standard deviation of {spread:.3} {unit} is expected: the channel was dead or not recorded; leave the trial out, or list the other components in measured.columns"
     )]
     Dead {
+        /// The trial, or all of them.
+        place: String,
         /// The column.
         column: &'static str,
         /// The value.
@@ -159,6 +161,46 @@ pub enum GapError {
         spread: f64,
         /// The unit.
         unit: &'static str,
+    },
+    /// A channel that stands at the end of its range.
+    #[error(
+        "column {column}: {count} samples of {place} are exactly {value} {unit}, an end of its range, where a standard deviation of {spread:.3} {unit} is expected: did the sensor saturate? Leave those rows or the trial out, or list the other components in measured.columns"
+    )]
+    Saturated {
+        /// The trial, or all of them.
+        place: String,
+        /// The column.
+        column: &'static str,
+        /// The value [N or N m].
+        value: f64,
+        /// How many samples have it.
+        count: usize,
+        /// Standard deviation of what is expected in them [N or N m].
+        spread: f64,
+        /// The unit.
+        unit: &'static str,
+    },
+    /// A load with the other sign.
+    #[error(
+        "column {column} of {place} is {ratio:.2} times what is expected: is its sign reversed, or that of the motion? x is forward, y left, z up, and loads are those of the water on the vehicle, without its weight"
+    )]
+    Reversed {
+        /// The trial, or all of them.
+        place: String,
+        /// The column.
+        column: &'static str,
+        /// Measured over expected.
+        ratio: f64,
+    },
+    /// Two channels, each of which is the other.
+    #[error(
+        "columns {column} and {other} hold what is expected of each other: are their names exchanged? x is forward, y left, z up"
+    )]
+    Swapped {
+        /// The column.
+        column: &'static str,
+        /// The other.
+        other: &'static str,
     },
     /// A load in another unit.
     #[error(

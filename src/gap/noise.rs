@@ -94,11 +94,17 @@ fn model_error(trials: &[&Series]) -> [f64; 6] {
 fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for series in all {
-        let values: Vec<f64> = series.gap.iter().map(|gap| gap[component]).collect();
-        sum += noise_variance(&values, scales(&series.t)) * values.len() as f64;
-        count += values.len() as f64;
+        let samples = series.t.len() as f64;
+        sum += sample_noise(series, component).powi(2) * samples;
+        count += samples;
     }
     (sum / f64::max(count, 1.0)).sqrt()
+}
+
+/// Noise of a sample of one trial by what changes within a tenth of a second [N or N m].
+pub(super) fn sample_noise(series: &Series, component: usize) -> f64 {
+    let values: Vec<f64> = series.gap.iter().map(|gap| gap[component]).collect();
+    noise_variance(&values, scales(&series.t)).sqrt()
 }
 
 /// Octaves below the rate of the samples in which noise is told from signal.
@@ -108,7 +114,8 @@ fn scales(t: &[f64]) -> u32 {
     (FAST / mean_step(t).max(1e-6)).log2().max(0.0) as u32
 }
 
-/// The floors of some trials alone, where they come from the trials themselves: noise may differ from trial to trial.
+/// The floors of some trials alone, where they come from the trials themselves or these are louder than is stated: noise may
+/// differ from trial to trial.
 pub(super) fn floors_of(
     all: &[Series],
     trials: &[usize],
@@ -117,9 +124,12 @@ pub(super) fn floors_of(
 ) -> [Floor; 6] {
     let mut own = *floors;
     for &component in components {
-        if own[component].source == FloorSource::HighFrequency && !trials.is_empty() {
-            own[component].sample = high_frequency(trials.iter().map(|&trial| &all[trial]), component);
+        if own[component].source == FloorSource::Repeats || trials.is_empty() {
+            continue;
         }
+        let sample = high_frequency(trials.iter().map(|&trial| &all[trial]), component);
+        let is_stated = own[component].source == FloorSource::Stated;
+        own[component].sample = if is_stated { sample.max(own[component].sample) } else { sample };
     }
     own
 }

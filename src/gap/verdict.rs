@@ -48,9 +48,26 @@ pub(super) struct Found {
     pub residual: DVector<f64>,
     /// One effect that explains more within a region than the members do everywhere.
     pub gated: Option<Gated>,
-    /// What is left, without a name.
+    /// What is left without a name: after the members where they fit, else of the gap as it is.
     pub left: Structure,
+    /// What the gap has without a name before anything is taken out.
+    pub of_gap: Structure,
     pub loss: f64,
+    /// Why members that pass every gate are not named.
+    pub unfit: Option<Unfit>,
+}
+
+/// Why effects that pass every gate are not named.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Unfit {
+    /// They explain this share of what is missing, where that much is asked for.
+    Explains(f64, f64),
+    /// One of them goes faster than the samples tell.
+    Unresolved,
+    /// One effect in a region explains more.
+    Imitates,
+    /// Much of what lasts is still there.
+    Leaves,
 }
 
 impl Found {
@@ -66,7 +83,6 @@ impl Found {
         let (beta, loss) =
             design.solve(&columns).unwrap_or_else(|| (DVector::zeros(columns.len()), design.empty_loss()));
         let residual = design.residual(&columns, &beta);
-        let left = general.structure(design, &judge.setting.components, &residual);
         let coverage = (design.empty_loss() - loss) / judge.missing();
         let faults = members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
         let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
@@ -83,11 +99,18 @@ impl Found {
             let same = matches!(members, [one] if judge.effect(one) == gated.effect);
             !same || gated.share > coverage + LIMITED
         });
-        let fits = !members.is_empty()
-            && coverage >= needed
-            && !unresolved
-            && !imitated
-            && !leaves_much(design, &residual);
+        let unfit = match members.is_empty() {
+            true => None,
+            _ if coverage < needed => Some(Unfit::Explains(coverage, needed)),
+            _ if unresolved => Some(Unfit::Unresolved),
+            _ if imitated => Some(Unfit::Imitates),
+            _ => leaves_much(design, &residual).then_some(Unfit::Leaves),
+        };
+        let fits = !members.is_empty() && unfit.is_none();
+        let left = match fits {
+            true => general.structure(design, &judge.setting.components, &residual),
+            false => gap_structure.clone(),
+        };
         let alternatives = if fits { judge.alternatives(members, library) } else { Vec::new() };
         let verdict = match (missing, fits) {
             (false, _) => Verdict::NothingMissing,
@@ -95,7 +118,8 @@ impl Found {
             _ if alternatives.is_empty() => Verdict::Named,
             _ => Verdict::Ambiguous,
         };
-        Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, loss }
+        let of_gap = gap_structure.clone();
+        Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, of_gap, loss, unfit }
     }
 }
 
