@@ -12,6 +12,11 @@
 //! the wet area alone. It rises from zero over the first centimeters of still water on the surface. What the network is told
 //! of the wet part is of the soaked area, which does not step where the water reaches a level underside.
 //!
+//! The remainder's moment about the centroid of the wet part is answered too, in units of `q A_s a` with the root `a` of the
+//! surface's area: a bow wave on one end of a side and the trough behind it make a couple whose force is next to nothing, which
+//! no place of that force inside the surface could tell. Force and moment of still water and flow together are then one force
+//! at one point, as far as it lies where the water may reach.
+//!
 //! Left and right: what is told of a surface on one side is told in terms of that side (toward it is positive), and of a
 //! surface on the plane of symmetry only what does not change under reflection, with lateral answers multiplied by
 //! something that does. So the mirror image of a state gets the mirror image of the answer, by construction.
@@ -28,7 +33,7 @@ use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
 /// What the network's answer is a remainder of: weights that were taught beside another are of no use here.
-pub const BASE: &str = "archimedes + windward drag of the soaked part";
+pub const BASE: &str = "archimedes + windward drag of the soaked part, force and moment";
 
 /// Names of what is told of a state, in order.
 pub const GLOBAL_NAMES: [&str; 11] = [
@@ -67,7 +72,7 @@ pub const STATIC_NAMES: [&str; 12] =
 
 /// Names of what the network answers for a surface, in order.
 pub const OUTPUT_NAMES: [&str; 7] =
-    ["force_x", "force_aside", "force_z", "force_up_aside", "center_x", "center_aside", "center_z"];
+    ["force_x", "force_aside", "force_z", "force_up_aside", "moment_x_aside", "moment_y", "moment_z_aside"];
 
 /// Number of global features.
 pub const GLOBAL: usize = GLOBAL_NAMES.len();
@@ -164,10 +169,12 @@ pub struct SurfaceReading {
     pub onset: f64,
     /// `q A_s`: what a coefficient of one is worth [N].
     pub unit: f64,
+    /// Length that a coefficient of a moment has beside `unit` [m].
+    pub arm: f64,
     /// Factors of the two lateral coefficients.
     pub lateral: [f64; 2],
-    /// The box around the wet part [m].
-    pub wet_box: [Vec3; 2],
+    /// The box around the part that the water may reach, up to the head of the stream above still water [m].
+    pub reach: [Vec3; 2],
     /// Features.
     pub dynamic: [f32; DYNAMIC],
 }
@@ -196,30 +203,25 @@ impl SurfaceReading {
         self.drag + Vec3::new(o[0], aside, o[2]) * self.unit
     }
 
-    /// The whole load that the network's answer means, hydrostatics included, as a force at one point: on the line along
-    /// which it has the moment of its parts the point nearest to the wet centroid, as far as it lies in the box around
-    /// the wet part.
-    pub fn load(&self, output: &[f32; OUTPUTS]) -> SurfaceForce {
-        let dynamic = self.force(output);
-        let force = self.hydrostatic.force + dynamic;
-        let moment = self.hydrostatic.moment + self.center_of_pressure(output).cross(&dynamic);
-        let [low, high] = self.wet_box;
-        // x cross F = M - (M . F) F / F^2 for x = c + F cross (M - c cross F) / F^2
-        let shift = force.cross(&(moment - self.center.cross(&force)));
-        let size = force.norm_squared();
-        let point = if size > 0.0 { self.center + shift / size } else { self.center };
-        SurfaceForce { force, point: point.sup(&low).inf(&high), wetted_fraction: self.wet_fraction }
+    /// The moment of the dynamic force that the network's answer means, about the centroid of the wet part [N m].
+    pub fn moment(&self, output: &[f32; OUTPUTS]) -> Vec3 {
+        let o = output.map(f64::from);
+        let aside = self.lateral[0];
+        Vec3::new(o[4] * aside, o[5], o[6] * aside) * (self.unit * self.arm)
     }
 
-    /// Where the dynamic force acts, inside the box around the wet part [m].
-    pub fn center_of_pressure(&self, output: &[f32; OUTPUTS]) -> Vec3 {
-        let o = output.map(f64::from);
-        let share = Vec3::new(o[4].tanh(), o[5].tanh() * self.lateral[0], o[6].tanh());
-        let [low, high] = self.wet_box;
-        let toward = |axis: usize| {
-            if share[axis] > 0.0 { high[axis] - self.center[axis] } else { self.center[axis] - low[axis] }
-        };
-        self.center + Vec3::new(share.x * toward(0), share.y * toward(1), share.z * toward(2))
+    /// The whole load that the network's answer means, hydrostatics included, as a force at one point: on the line along
+    /// which it has the moment of its parts the point nearest to the wet centroid, as far as the water may reach there.
+    pub fn load(&self, output: &[f32; OUTPUTS]) -> SurfaceForce {
+        let force = self.hydrostatic.force + self.force(output);
+        // about the wet centroid
+        let still = self.hydrostatic.moment - self.center.cross(&self.hydrostatic.force);
+        let moment = still + self.moment(output);
+        let [low, high] = self.reach;
+        // x cross F = M - (M . F) F / F^2 for x = F cross M / F^2
+        let size = force.norm_squared();
+        let point = if size > 0.0 { self.center + force.cross(&moment) / size } else { self.center };
+        SurfaceForce { force, point: point.sup(&low).inf(&high), wetted_fraction: self.wet_fraction }
     }
 }
 
@@ -356,6 +358,7 @@ impl Anchor {
             wetting.soaked_area / (length * width),
             ((min.z - vehicle.z0) / condition.depth.max(LEAST_DEPTH)).clamp(0.0, 4.0),
         ];
+        let reach_top = max.z.min(level.max(min.z) + head).max(center.z);
         SurfaceReading {
             wet_fraction,
             center,
@@ -363,8 +366,9 @@ impl Anchor {
             drag: front * -(CD0 * shelter * pressure),
             onset,
             unit: pressure * surface.area * reached * onset,
+            arm: surface.area.sqrt(),
             lateral: if surface.side == 0.0 { [ahead.y, condition.up.y] } else { [surface.side, 0.0] },
-            wet_box: [min.inf(&center), Vec3::new(max.x, max.y, top).sup(&center)],
+            reach: [min, Vec3::new(max.x, max.y, reach_top)],
             dynamic: dynamic.map(|x| x as f32),
         }
     }

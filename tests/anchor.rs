@@ -52,7 +52,7 @@ fn loads(vehicle: &Vehicle, anchor: &Anchor, condition: &Condition) -> Vec<(Vec3
     anchor.read(vehicle, condition, &mut reading);
     let load = |(surface, fixed): (&SurfaceReading, &[f32; STATIC])| {
         let output = answer(&reading.global, fixed, &surface.dynamic);
-        (surface.force(&output), surface.center_of_pressure(&output))
+        (surface.force(&output), surface.moment(&output))
     };
     reading.surfaces.iter().zip(&fixed).map(load).collect()
 }
@@ -60,6 +60,8 @@ fn loads(vehicle: &Vehicle, anchor: &Anchor, condition: &Condition) -> Vec<(Vec3
 #[test]
 fn a_mirror_image_of_the_state_gets_the_mirror_image_of_any_answer() {
     let reflect = |v: Vec3| Vec3::new(v.x, -v.y, v.z);
+    // a moment is an axial vector
+    let reflect_moment = |m: Vec3| -reflect(m);
     for name in common::VEHICLES {
         let vehicle = vehicle(name);
         let anchor = Anchor::new(&vehicle);
@@ -76,7 +78,11 @@ fn a_mirror_image_of_the_state_gets_the_mirror_image_of_any_answer() {
                     "{name} {}",
                     surface.name
                 );
-                assert!((here[index].1 - reflect(partner.1)).norm() < 1e-4, "{name} {}", surface.name);
+                assert!(
+                    (here[index].1 - reflect_moment(partner.1)).norm() < 1e-4 * scale,
+                    "{name} {}",
+                    surface.name
+                );
             }
         }
     }
@@ -152,17 +158,37 @@ fn no_load_steps_where_the_water_reaches_a_level_face() {
 }
 
 #[test]
-fn forces_act_inside_the_box_around_the_wet_part() {
+fn a_force_acts_where_the_water_may_reach_and_has_the_moment_of_the_answer_where_it_can() {
     for name in common::VEHICLES {
         let vehicle = vehicle(name);
-        let anchor = Anchor::new(&vehicle);
+        let fixed = Anchor::new(&vehicle).static_rows(&vehicle);
+        let (mut held, mut moved) = (0, 0);
         for state in states() {
-            let loads = loads(&vehicle, &anchor, &state);
-            for (surface, (_, point)) in read(&vehicle, &state).surfaces.iter().zip(loads) {
-                let [low, high] = surface.wet_box;
-                let inside = (0..3).all(|i| point[i] >= low[i] - 1e-9 && point[i] <= high[i] + 1e-9);
-                assert!(surface.wet_fraction == 0.0 || inside, "{name}: {point} in {low} {high}");
+            let reading = read(&vehicle, &state);
+            for (surface, fixed) in reading.surfaces.iter().zip(&fixed).filter(|(s, _)| s.wet_fraction > 0.0)
+            {
+                let output = answer(&reading.global, fixed, &surface.dynamic).map(|x| 0.02 * x);
+                let load = surface.load(&output);
+                let [low, high] = surface.reach;
+                let strictly = |margin: f64| {
+                    (0..3).all(|i| load.point[i] > low[i] + margin && load.point[i] < high[i] - margin)
+                };
+                assert!(strictly(-1e-9), "{name}: {} in {low} {high}", load.point);
+                if !strictly(1e-9) {
+                    held += 1;
+                    continue;
+                }
+                moved += 1;
+                // what of a moment is along the force no point gives it
+                let moment = surface.hydrostatic.moment - surface.center.cross(&surface.hydrostatic.force)
+                    + surface.moment(&output);
+                let served = (load.point - surface.center).cross(&load.force);
+                let along = load.force.normalize();
+                let across = moment - along * moment.dot(&along);
+                let size = load.force.norm() * (high - low).norm();
+                assert!((served - across).norm() < 1e-9 * size, "{name}: {served} {across}");
             }
         }
+        assert!(moved > 100 && held > 0, "{moved} inside, {held} at an edge");
     }
 }

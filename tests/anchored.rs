@@ -106,17 +106,22 @@ fn the_gradient_agrees_with_finite_differences() {
     let columns = 3 * SURFACES;
     let mut draw = |rows| DMatrix::from_fn(rows, columns, |_, _| 2.0 * random.unit() - 1.0);
     let (inputs, mut targets) = (draw(SMALL.inputs), draw(TARGETS));
-    // rooms to either side, and the switch of the moment
-    targets.rows_mut(6, 6).apply(|x| *x = x.abs() + 0.1);
-    targets.row_mut(18).apply(|x| *x = if *x > -0.5 { 0.7 } else { 0.0 });
+    targets.row_mut(16).fill(0.7);
     let batch = Batch { surfaces: SURFACES, inputs, targets, dry: vec![false; columns] };
-    let only = |net_weight, moment_weight| AnchoredLoss {
+    let only = |net_weight, moment_weight, net_moment_weight| AnchoredLoss {
         net_weight,
         moment_weight,
+        net_moment_weight,
         delta: 0.4,
         ..AnchoredLoss::default()
     };
-    for (term, config) in [("surfaces", only(0.0, 0.0)), ("net", only(5.0, 0.0)), ("all", only(1.0, 2.0))] {
+    let terms = [
+        ("surfaces", only(0.0, 0.0, 0.0)),
+        ("net", only(5.0, 0.0, 0.0)),
+        ("net moment", only(0.0, 0.0, 5.0)),
+        ("all", only(1.0, 2.0, 3.0)),
+    ];
+    for (term, config) in terms {
         let total = |layers: &Layers<f64>| {
             loss(&config, &batch, &batch.counts(), &layers.forward(&batch.inputs).output).0
         };
@@ -142,16 +147,24 @@ fn the_loss_reads_an_answer_as_the_model_does() {
     let lesson = Lesson::new();
     let states = lesson.states(&lesson.split.training);
     let mut random = Random::new(5);
-    let config = AnchoredLoss { net_weight: 0.0, moment_weight: 1.0, delta: 1e9, ..AnchoredLoss::default() };
-    let (scale, length) = (7.0, 0.8);
+    let config = AnchoredLoss {
+        net_weight: 0.0,
+        moment_weight: 1.0,
+        net_moment_weight: 2.0,
+        delta: 1e9,
+        ..AnchoredLoss::default()
+    };
+    let (scale, vehicles) = (7.0, lesson.vehicles());
     for state in &states {
+        let prepared = &vehicles[state.vehicle];
+        let (length, mass) = (prepared.vehicle.dimensions.length, prepared.vehicle.center_of_mass);
         for (surface, (force, _)) in state.reading.surfaces.iter().zip(&state.loads) {
             if surface.wet_fraction == 0.0 {
                 continue;
             }
             let answer: [f32; OUTPUTS] = std::array::from_fn(|_| 4.0 * random.unit() as f32 - 2.0);
             let found = Vec3::new(0.3, -0.2, 0.5);
-            let row = targets(surface, &(*force, Some(found)), (scale, length));
+            let row = targets(surface, &(*force, Some(found)), prepared, scale);
             let batch = Batch {
                 surfaces: 1,
                 inputs: DMatrix::zeros(0, 1),
@@ -162,8 +175,13 @@ fn the_loss_reads_an_answer_as_the_model_does() {
             output.as_mut_slice()[..OUTPUTS].copy_from_slice(&answer.map(f64::from));
             let (value, _) = loss(&config, &batch, &batch.counts(), &output);
             let error = (surface.force(&answer) - force) / scale;
-            let turn = surface.center_of_pressure(&answer).cross(force) - found;
-            let expected = 0.5 * (error.norm_squared() + (turn / (scale * length)).norm_squared());
+            // moments about the body origin, then about the center of mass
+            let moment = surface.center.cross(&surface.force(&answer)) + surface.moment(&answer);
+            let turn = (surface.moment(&answer) - (found - surface.center.cross(force))) / (scale * length);
+            let net = (moment - mass.cross(&surface.force(&answer)) - (found - mass.cross(force)))
+                / (scale * length);
+            let expected =
+                0.5 * (error.norm_squared() + turn.norm_squared()) + 2.0 * 0.5 * net.norm_squared();
             assert!((value - expected).abs() < 1e-4 * expected.max(1e-3), "{value} {expected}");
         }
     }

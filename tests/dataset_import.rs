@@ -144,6 +144,20 @@ fn openfoam_in_its_three_formats_gives_back_what_was_planted() {
 }
 
 #[test]
+fn forces_of_no_surface_are_left_out_and_said_so() {
+    let (cases, out) = (copy("openfoam"), TempDir::new().unwrap());
+    let reports = cases.path().join("warthog-head-on/postProcessing");
+    let taken = fs::read_dir(&reports).unwrap().next().unwrap().unwrap().path();
+    copy_tree(&taken, &reports.join("antenna"));
+    fs::create_dir_all(reports.join("residuals/0")).unwrap();
+    let out = out.path().join("data.parquet");
+    let output = import("openfoam", "warthog", cases.path(), &out, &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("reported of antenna too"), "{said}");
+    assert_eq!(dataset::read(&out).unwrap().meta.notes["left_out"], "antenna");
+}
+
+#[test]
 fn fluent_gives_back_what_was_planted() {
     let data = imported("fluent", "husky", &[]);
     of_case(&data, "husky-oblique").into_iter().for_each(|sample| check_loads(sample, false, false));

@@ -438,10 +438,28 @@ fn what_makes_a_part_of_the_trials_worse_is_not_applied() {
     let trials = with(&["added_mass"], 1.0, 11).0;
     let mut report = run(&trials);
     assert!(gap::effects_file(&report, &trials, false).is_ok(), "{}", report.summary);
-    let place = "depth > 0.2 m".to_owned();
-    report.gap.worse_regions.push(gap::Worse { place: place.clone(), before: 1.0, after: 2.0 });
-    let refused = gap::effects_file(&report, &trials, true);
-    assert_eq!(refused, Err(gap::NotApplicable::Worse { place, before: 1.0, after: 2.0 }));
+    let worse = gap::Worse { place: "depth > 0.2 m".into(), component: Some("fz"), before: 1.0, after: 2.0 };
+    report.gap.worse_regions.push(worse.clone());
+    let refused = gap::effects_file(&report, &trials, true).expect_err("refused");
+    assert_eq!(refused, gap::NotApplicable::Worse(worse));
+    let said = refused.to_string();
+    assert!(said.contains("the gap of fz grows from 1.0 to 2.0 noise floors (depth > 0.2 m)"), "{said}");
+}
+
+#[test]
+fn a_component_that_an_effect_makes_worse_is_told_though_all_together_gain() {
+    let mut trials = with(&["density_error"], 6.0, 11).0;
+    let clean = run(&trials).gap;
+    assert!(clean.worse_regions.is_empty(), "{:?}", clean.worse_regions);
+    // along x the trials kept back have what the simulator says
+    let mut random = Random::new(8);
+    for trial in trials.trials.iter_mut().filter(|trial| clean.held_out_trials.contains(&trial.name)) {
+        let said = trial.simulated[0].iter().flatten();
+        trial.measured[0] = Some(said.map(|value| value + NOISE[0] * gaussian(&mut random)).collect());
+    }
+    let worse = run(&trials).gap.worse_regions;
+    assert!(worse.iter().any(|worse| worse.component == Some("fx")), "{worse:?}");
+    assert!(worse.iter().all(|worse| worse.component.is_some() && worse.after > worse.before), "{worse:?}");
 }
 
 #[test]

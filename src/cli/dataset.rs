@@ -13,7 +13,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use wade::bundle;
-use wade::dataset::import::{Format, Import};
+use wade::dataset::import::{Format, Import, LEFT_OUT};
 use wade::dataset::sections::Sections;
 use wade::dataset::split::{self, By};
 use wade::dataset::summary::Summary;
@@ -271,6 +271,11 @@ impl ImportCases {
             bar.set_position(done as u64);
         })?;
         bar.finish_and_clear();
+        if let Some(left_out) = data.meta.notes.get(LEFT_OUT) {
+            eprintln!(
+                "warning: forces were reported of {left_out} too, none of the vehicle's surfaces; they are left out"
+            );
+        }
         let without = data.without_moments();
         if let Some(first) = without.first() {
             let count = without.len();

@@ -213,6 +213,14 @@ fn vehicle_text(vehicle: &VehicleReport) -> String {
     if let Some(theirs) = vehicle.paper {
         line(&format!("({})", paper::LABEL), theirs.mae, theirs.rmse, theirs.smape);
     }
+    if let Some(moment) = vehicle.mean_moment_nm {
+        for model in &vehicle.models {
+            if let Some(mae) = model.moment_mae_nm {
+                text.push_str(&format!("  {:30}{}   MAE of the net moment [N m]\n", model.name, three(mae)));
+            }
+        }
+        text.push_str(&format!("  {:30}{}   mean magnitude [N m]\n", "the net moment itself", three(moment)));
+    }
     for kind in &vehicle.kinds {
         let (mae, share) = (three(kind.mae_n), 100.0 * kind.share);
         text.push_str(&format!(

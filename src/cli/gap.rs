@@ -10,6 +10,7 @@ use wade::bundle;
 use wade::effects::{Body, EffectsFile};
 use wade::files::{sha256_of, write_whole};
 use wade::forces::Forces;
+use wade::frame::Vec3;
 use wade::gap::{self, Config, GapError, NotApplicable, Predicted, Report, effects_file};
 use wade::model::{Model, Workspace};
 use wade::trials::Trials;
@@ -332,15 +333,23 @@ fn check_loss(effects: &EffectsFile, directory: &Path, replace: bool) -> Result<
     )
 }
 
-/// The model's answers with its uncertainty.
+/// The model's answers with its uncertainty. Of its moments the model states none; the error of a force is taken to act a quarter
+/// of the hull from its middle, along each axis.
 fn predictor(model: &Model) -> impl FnMut(&wade::condition::Condition) -> Predicted {
     let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    let dimensions = model.vehicle().dimensions;
     move |condition| {
         model.evaluate(condition, &mut workspace, &mut forces);
         let u = forces.uncertainty;
+        let arm = Vec3::new(dimensions.length, dimensions.width, dimensions.height) * 0.25;
+        let moment = [
+            (u.y * arm.z).hypot(u.z * arm.y),
+            (u.x * arm.z).hypot(u.z * arm.x),
+            (u.x * arm.y).hypot(u.y * arm.x),
+        ];
         Predicted {
             wrench: forces.wrench,
-            uncertainty: [u.x, u.y, u.z, 0.0, 0.0, 0.0],
+            uncertainty: [u.x, u.y, u.z, moment[0], moment[1], moment[2]],
             outside: !forces.outside.is_inside(),
         }
     }

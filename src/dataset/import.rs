@@ -183,10 +183,12 @@ impl Import {
     pub fn run(&self, folder: &Path, progress: &dyn Fn(usize, usize)) -> Result<Dataset, ImportError> {
         let folders = case_folders(folder)?;
         let (mut samples, mut contacts, mut domains) = (Vec::new(), Vec::new(), BTreeSet::new());
+        let mut left_out = BTreeSet::new();
         for (done, path) in folders.iter().enumerate() {
             progress(done, folders.len());
             let (case, of_case) = self.case(path)?;
             samples.extend(of_case);
+            left_out.extend(self.left_out(path, &case));
             contacts.push(case.ground_contact);
             domains.extend(case.domain_m.map(|[x, y, z]| format!("{x} x {y} x {z} ({})", case.vehicle)));
         }
@@ -199,6 +201,9 @@ impl Import {
         if !domains.is_empty() {
             notes.insert("domain_m".to_owned(), domains.into_iter().collect::<Vec<_>>().join(", "));
         }
+        if !left_out.is_empty() {
+            notes.insert(LEFT_OUT.to_owned(), left_out.into_iter().collect::<Vec<_>>().join(", "));
+        }
         let used = |(name, _): &(&String, &Vec<String>)| samples.iter().any(|s: &Sample| s.vehicle == **name);
         let meta = Meta {
             provenance: self.provenance.clone(),
@@ -209,6 +214,22 @@ impl Import {
         let dataset = Dataset { meta, samples };
         dataset.check()?;
         Ok(dataset)
+    }
+
+    /// Names under which the solver of a case reports what is none of the vehicle's surfaces, such as the whole vehicle.
+    fn left_out(&self, folder: &Path, case: &CaseFile) -> Vec<String> {
+        let surfaces = &self.vehicles[&case.vehicle];
+        let is_read = |name: &String| surfaces.iter().any(|surface| case.name_in_solver(surface) == name);
+        let reported = match self.format {
+            Format::OpenFoam => fs::read_dir(folder.join("postProcessing")).into_iter().flatten().flatten(),
+            // a report file holds any of many quantities, none of which need be a load
+            Format::Fluent => return Vec::new(),
+        };
+        reported
+            .filter(|entry| openfoam::has_forces(&entry.path()))
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .filter(|name| !is_read(name))
+            .collect()
     }
 
     fn description(&self, folder: &Path) -> Result<CaseFile, ImportError> {
@@ -335,6 +356,9 @@ impl Import {
         })
     }
 }
+
+/// Note of a data set on what was reported and belongs to no surface.
+pub const LEFT_OUT: &str = "left_out";
 
 /// Two surfaces for which the solver has the same name, and that.
 fn shared_patch(case: &CaseFile, surfaces: &[String]) -> Option<([String; 2], String)> {

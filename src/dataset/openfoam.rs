@@ -149,6 +149,12 @@ fn join(to: &mut Option<Loads>, later: Loads, since: f64) -> Result<(), OpenFoam
 }
 
 /// The folders named by a time, in the order of time.
+/// True for the output of a function object that reports forces.
+pub fn has_forces(folder: &Path) -> bool {
+    let is_forces = |path: &Path| ["force.dat", "forces.dat"].iter().any(|name| path.join(name).exists());
+    starts(folder).is_ok_and(|starts| starts.iter().any(|(_, path)| is_forces(path)))
+}
+
 fn starts(folder: &Path) -> Result<Vec<(f64, PathBuf)>, OpenFoamError> {
     let io = |fault| OpenFoamError::Io { path: folder.to_owned(), fault };
     let mut starts = Vec::new();

@@ -1,9 +1,11 @@
-//! Three models that need no network, each fitted to the training states of one vehicle by least squares.
+//! Models that need no network: three fitted to the training states of one vehicle by least squares, and what the `anchored`
+//! model knows before anything is learnt.
 
 use nalgebra::{DMatrix, RowVector6};
 
 use super::predict::Prediction;
 use super::states::State;
+use crate::anchor::{Anchor, Reading};
 use crate::condition::Condition;
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::geometry::distance::SignedDistanceGrid;
@@ -121,6 +123,30 @@ impl Baseline {
         };
         states.iter().map(predict).collect()
     }
+}
+
+/// The name of [`known`] in reports.
+pub const KNOWN: &str = "hydrostatics + windward drag, nothing learnt";
+
+/// What the `anchored` model knows before anything is learnt ([`crate::anchor`]) says of states.
+pub fn known(vehicle: &Vehicle, states: &[&State]) -> Vec<Prediction> {
+    let anchor = Anchor::new(vehicle);
+    let mut reading = Reading::default();
+    let about = &vehicle.center_of_mass;
+    let predict = |state: &&State| {
+        anchor.read(vehicle, &state.condition, &mut reading);
+        let sum = reading.surfaces.iter().fold(Wrench::default(), |sum, surface| {
+            let still = surface.hydrostatic.moved(&Vec3::zeros(), about);
+            sum + still + Wrench::from_force_at(surface.drag, &surface.center, about)
+        });
+        Prediction {
+            force: sum.force,
+            moment: Some(sum.moment),
+            surface_errors: Vec::new(),
+            uncertainty: None,
+        }
+    };
+    states.iter().map(predict).collect()
 }
 
 fn rest(vehicle: &Vehicle, condition: &Condition) -> Wrench {

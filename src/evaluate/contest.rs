@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::EvaluateError;
-use super::baseline::Baseline;
+use super::baseline::{self, Baseline};
 use super::predict::{Prediction, by_trainer, served};
 use super::states::{State, states};
 use crate::dataset::split::Split;
@@ -63,6 +63,7 @@ pub fn enter(
         let name_of = |model: &Model| model.weights().form.name().to_owned();
         let mut entries: Vec<_> =
             models.iter().map(|model| (name_of(model), served(model, &held_out))).collect();
+        entries.push((baseline::KNOWN.to_owned(), baseline::known(vehicle, &held_out)));
         let learnt: Vec<&State> = training.iter().filter(|state| state.vehicle == *name).collect();
         // a vehicle that is held out as a whole leaves nothing to fit its simple models to
         if !learnt.is_empty() {

@@ -67,12 +67,14 @@ fn heads(first: &str, groups: &[&str]) -> Vec<String> {
     std::iter::once(first.to_owned()).chain(groups.iter().flat_map(of)).collect()
 }
 
+/// The same of the paper, which is other data.
+fn of_paper(quantity: &str) -> [String; 3] {
+    AXES.map(|axis| format!("{axis} {quantity} ({LABEL})"))
+}
+
 fn net_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
-    let papers = "MAE [N]";
-    let mut heads = heads("model", &["MAE [N]", "RMSE [N]", "sMAPE [%]", "MAE on a surface [N]", papers]);
-    heads.extend(
-        ["RMSE [N]", "sMAPE [%]"].iter().flat_map(|group| AXES.map(|axis| format!("{axis} {group}"))),
-    );
+    let mut heads = heads("model", &["MAE [N]", "RMSE [N]", "sMAPE [%]", "MAE on a surface [N]"]);
+    heads.extend(["MAE [N]", "RMSE [N]", "sMAPE [%]"].into_iter().flat_map(of_paper));
     let row = |model: &ModelReport| {
         let is_paper = model.name == vehicle.models[0].name;
         let papers: Vec<Option<f64>> = match paper {
@@ -167,8 +169,8 @@ fn trainings(report: &Report) -> Result<String, PlotError> {
 fn kind_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
     let mut heads = heads("kind", &["MAE [N]"]);
     heads.push("share of the force".to_owned());
-    heads.extend(AXES.map(|axis| format!("{axis} MAE [N]")));
-    heads.push("share of the force".to_owned());
+    heads.extend(of_paper("MAE [N]"));
+    heads.push(format!("share of the force ({LABEL})"));
     let row = |kind: &super::report::GroupReport| {
         let papers = paper.map_or([None; 3], |paper| entry(paper.kinds, &kind.name));
         let share = paper.filter(|_| kind.name == "wheel").map(|paper| paper.wheel_share);
@@ -198,7 +200,8 @@ fn surface_table(vehicle: &VehicleReport) -> String {
 
 fn slice_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
     let mut heads = vec!["slice".to_owned(), "5th or 95th percentile".to_owned(), "states".to_owned()];
-    heads.extend(["ours", "paper"].iter().flat_map(|_| AXES.map(|axis| format!("{axis} MAE [N]"))));
+    heads.extend(AXES.map(|axis| format!("{axis} MAE [N]")));
+    heads.extend(of_paper("MAE [N]"));
     let row = |slice: &super::report::SliceReport| {
         let papers = paper.map_or([None; 3], |paper| entry(paper.slices, &slice.name));
         [escape(&slice.name), format!("{:.3}", slice.bound), slice.samples.to_string()]

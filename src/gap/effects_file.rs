@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::holdout::Worse;
 use super::report::{NamedEffect, Report, Verdict};
 use crate::effects::{ActiveEffect, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
 use crate::trials::{Manifest, Trials};
@@ -24,17 +25,8 @@ pub enum NotApplicable {
     #[error("no named effect is one of the water")]
     NotPhysics,
     /// A part of the trials kept back that it makes worse.
-    #[error(
-        "on trials that took no part the gap grows where {place}, from {before:.1} to {after:.1} noise floors: what was named does not hold there"
-    )]
-    Worse {
-        /// Where.
-        place: String,
-        /// Gap before, in noise floors.
-        before: f64,
-        /// Gap after.
-        after: f64,
-    },
+    #[error("on trials that took no part {0}: what was named does not hold there")]
+    Worse(Worse),
     /// Seen in one condition only.
     #[error(
         "{effects} was seen in one condition only: record another, or take it as it is with --provisional"
@@ -65,11 +57,7 @@ pub fn effects_file(
         return Err(NotApplicable::NotPhysics);
     }
     if let Some(worse) = report.gap.worse_regions.first() {
-        return Err(NotApplicable::Worse {
-            place: worse.place.clone(),
-            before: worse.before,
-            after: worse.after,
-        });
+        return Err(NotApplicable::Worse(worse.clone()));
     }
     let provisional: Vec<&str> = physical.iter().filter(|e| e.provisional).map(|e| e.name).collect();
     if !provisional.is_empty() && !with_provisional {

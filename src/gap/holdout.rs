@@ -56,6 +56,8 @@ pub struct Worse {
     /// The region.
     #[serde(rename = "where")]
     pub place: String,
+    /// The component that gets worse; none where all together do.
+    pub component: Option<&'static str>,
     /// Gap before, in noise floors.
     pub before: f64,
     /// Gap after.
@@ -146,7 +148,24 @@ pub(super) fn closures(
 /// Feature, lower and upper limit.
 type Limits = Vec<(usize, f64, f64)>;
 
-/// Regions, and thirds of depth and speed, where the gap of the trials kept back grows by more than a twentieth.
+impl std::fmt::Display for Worse {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { place, component, before, after } = self;
+        let of = component.map_or_else(String::new, |component| format!(" of {component}"));
+        write!(f, "the gap{of} grows from {before:.1} to {after:.1} noise floors ({place})")
+    }
+}
+
+/// What of the trials kept back a gap is looked at in: all components together, then each by itself.
+struct Point {
+    features: Features,
+    /// Squares in floors, each with what the model states of itself.
+    before: Vec<f64>,
+    after: Vec<f64>,
+}
+
+/// Regions, thirds of depth and speed, and all of them, where the gap of the trials kept back grows by more than a twentieth: of
+/// all components together or of one of them.
 pub(super) fn worse(
     named: &[Named],
     all: &[Series],
@@ -155,25 +174,58 @@ pub(super) fn worse(
     floors: &[Floor; 6],
     regions: &[Region],
 ) -> Vec<Worse> {
-    let mut points: Vec<(Features, f64, f64)> = Vec::new();
+    /// Squared floors by which it must grow, in the mean of all components and of one alone: a fraction of the floor more is no
+    /// harm that anyone could measure, and of several components chance picks the worst.
+    const HARM: [f64; 2] = [0.05, 0.25];
+    let components = &setting.components;
+    let mut points: Vec<Point> = Vec::new();
     for &trial in held {
         let series = &all[trial];
         let added = explained(named, series, trial, setting);
-        let size = |value: &dyn Fn(usize, usize) -> f64| {
-            let square = |i: usize| {
-                setting
-                    .components
-                    .iter()
-                    .map(|&c| (value(i, c) / floors[c].with_model().max(1e-12)).powi(2))
-                    .sum::<f64>()
-                    / setting.components.len() as f64
-            };
-            series.binned(square)
+        let squares = |value: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+            let of =
+                |&c: &usize| series.binned(|i| (value(i, c) / floors[c].with_model().max(1e-12)).powi(2));
+            components.iter().map(of).collect()
         };
-        let before = size(&|i, c| series.gap[i][c]);
-        let after = size(&|i, c| series.gap[i][c] - added[i][c]);
-        points.extend(of_bins(series).into_iter().zip(before).zip(after).map(|((f, b), a)| (f, b, a)));
+        let before = squares(&|i, c| series.gap[i][c]);
+        let after = squares(&|i, c| series.gap[i][c] - added[i][c]);
+        let at = |squares: &[Vec<f64>], bin: usize| squares.iter().map(|of| of[bin]).collect();
+        points.extend(of_bins(series).into_iter().enumerate().map(|(bin, features)| Point {
+            features,
+            before: at(&before, bin),
+            after: at(&after, bin),
+        }));
     }
+    let mut worse = Vec::new();
+    for (place, limits) in places(&points, regions) {
+        let is_within =
+            |p: &&Point| limits.iter().all(|&(i, low, high)| p.features[i] > low && p.features[i] <= high);
+        let within: Vec<&Point> = points.iter().filter(is_within).collect();
+        if within.len() < LEAST {
+            continue;
+        }
+        let mean =
+            |of: &dyn Fn(&Point) -> f64| within.iter().map(|p| of(p)).sum::<f64>() / within.len() as f64;
+        let whole = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
+        let together = (None, mean(&|p| whole(&p.before)), mean(&|p| whole(&p.after)), HARM[0]);
+        let alone = components.iter().enumerate().map(|(index, &c)| {
+            (Some(WRENCH[c]), mean(&|p| p.before[index]), mean(&|p| p.after[index]), HARM[1])
+        });
+        for (component, before, after, harm) in std::iter::once(together).chain(alone) {
+            if after.sqrt() > (1.0 + WORSE) * before.sqrt() && after - before > harm {
+                let [before, after] = [before, after].map(f64::sqrt);
+                worse.push(Worse { place: place.clone(), component, before, after });
+            }
+        }
+    }
+    worse
+}
+
+/// Fewest bins of a place.
+const LEAST: usize = 5;
+
+/// The regions, the thirds of depth and speed, and everywhere, in words and as limits.
+fn places(points: &[Point], regions: &[Region]) -> Vec<(String, Limits)> {
     let mut places: Vec<(String, Limits)> = Vec::new();
     for region in regions {
         let limits: Limits = region
@@ -187,29 +239,15 @@ pub(super) fn worse(
         places.push((region.place.clone(), limits));
     }
     for (feature, name) in [(0, "depth"), (2, "speed")] {
-        let mut values: Vec<f64> = points.iter().map(|(f, ..)| f[feature]).collect();
+        let mut values: Vec<f64> = points.iter().map(|point| point.features[feature]).collect();
         let cuts = [quantile(&mut values.clone(), 1.0 / 3.0), quantile(&mut values, 2.0 / 3.0)];
         let limits = [(f64::NEG_INFINITY, cuts[0]), (cuts[0], cuts[1]), (cuts[1], f64::INFINITY)];
         for (third, (low, high)) in ["lowest", "middle", "highest"].into_iter().zip(limits) {
             places.push((format!("{third} third of {name}"), vec![(feature, low, high)]));
         }
     }
-    let mut worse = Vec::new();
-    for (place, limits) in places {
-        let within = |f: &Features| limits.iter().all(|&(i, low, high)| f[i] > low && f[i] <= high);
-        let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
-        for (features, b, a) in &points {
-            if within(features) {
-                (before, after, count) = (before + b, after + a, count + 1.0);
-            }
-        }
-        let (before, after) = ((before / f64::max(count, 1.0)).sqrt(), (after / f64::max(count, 1.0)).sqrt());
-        // a fraction of the floor more is no harm that anyone could measure
-        if count >= 5.0 && after > (1.0 + WORSE) * before && after * after - before * before > 0.05 {
-            worse.push(Worse { place, before, after });
-        }
-    }
-    worse
+    places.push(("all trials kept back".to_owned(), Vec::new()));
+    places
 }
 
 #[cfg(test)]

@@ -220,15 +220,7 @@ fn held_out(report: &Report) -> String {
         escape(&report.gap.held_out_trials.join(", ")),
     );
     for worse in &report.gap.worse_regions {
-        text += &verdict(
-            "notice",
-            &format!(
-                "Worse where {}: {} before, {} after, in noise floors.",
-                escape(&plain(&worse.place)),
-                number(worse.before),
-                number(worse.after)
-            ),
-        );
+        text += &verdict("notice", &escape(&plain(&format!("Worse: {worse}."))));
     }
     text
 }

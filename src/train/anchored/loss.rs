@@ -1,12 +1,12 @@
 //! What the anchored network is asked for, and the loss: Huber on errors without a dimension, of the force on each
-//! surface, of the net force, and of the place where each force acts.
+//! surface and its moment, and of the net force and moment.
 //!
 //! With the dynamic force `F_s` that the answer means and the one that was found, `e_s` their difference over the scale
 //! `S = W (u + f)^p` of the state, where `W` is the vehicle's weight and `u = q A / W` the dynamic pressure on the wet
-//! area over it; with the moment `m_s` of the found force at the answered place about the wet centroid, less the found
-//! moment, over `S L`:
-//! `mean over states of [sum_s h(e_s) + w_net h(sum_s e_s) + w_moment sum_s h(m_s)]`, `h` summed over components,
-//! `h(e) = e^2 / 2` up to `delta` and `delta (|e| - delta / 2)` beyond (Huber 1964).
+//! area over it; with `m_s` the difference of the moments about the wet centroid over `S L`, and `r_s` the way there from the
+//! center of mass over `L`:
+//! `mean over states of [sum_s h(e_s) + w_net h(sum_s e_s) + w_moment sum_s h(m_s) + w_net_moment h(sum_s (m_s + r_s x e_s))]`,
+//! `h` summed over components, `h(e) = e^2 / 2` up to `delta` and `delta (|e| - delta / 2)` beyond (Huber 1964).
 
 use nalgebra::{DMatrix, Vector3, convert};
 use serde::{Deserialize, Serialize};
@@ -24,8 +24,10 @@ use crate::wrench::Wrench;
 pub struct AnchoredLoss {
     /// Weight of the net force.
     pub net_weight: f64,
-    /// Weight of the place where forces act.
+    /// Weight of the moment of each force about its wet centroid.
     pub moment_weight: f64,
+    /// Weight of the net moment about the center of mass.
+    pub net_moment_weight: f64,
     /// Error up to which the loss is a square [-].
     pub delta: f64,
     /// Exponent of the scale: 0 judges errors in newtons, 1 in shares of the load.
@@ -36,7 +38,14 @@ pub struct AnchoredLoss {
 
 impl Default for AnchoredLoss {
     fn default() -> Self {
-        Self { net_weight: 10.0, moment_weight: 0.1, delta: 0.1, exponent: 0.5, floor: 0.01 }
+        Self {
+            net_weight: 10.0,
+            moment_weight: 1.0,
+            net_moment_weight: 10.0,
+            delta: 0.1,
+            exponent: 0.5,
+            floor: 0.01,
+        }
     }
 }
 
@@ -50,47 +59,43 @@ impl AnchoredLoss {
 }
 
 /// Numbers of a surface that the loss needs: see [`targets`].
-pub const TARGETS: usize = 19;
+pub const TARGETS: usize = 17;
 
-/// All that the loss needs of a surface besides the answer, lengths from the wet centroid [m], forces over the scale.
+/// All that the loss needs of a surface besides the answer, forces over the scale.
 ///
-/// drag x y z, unit, lateral 1 2, room to the low end of the wet box x y z, to the high end x y z, found force x y z, found
-/// moment about the wet centroid x y z [m], 1 over the length of the vehicle [1/m] or 0 where the moment is not known.
+/// drag x y z, unit, lateral 1 2, unit of a moment [m], way from the center of mass to the wet centroid x y z [m], found force
+/// x y z, found moment about the wet centroid x y z [m], 1 over the length of the vehicle [1/m]. A force of which no moment is
+/// known is taken to act at the wet centroid.
 pub fn targets(
     surface: &SurfaceReading,
     (force, moment): &(Vec3, Option<Vec3>),
-    (scale, length): (f64, f64),
+    prepared: &Prepared,
+    scale: f64,
 ) -> [f32; TARGETS] {
-    let wet = surface.wet_fraction > 0.0;
-    let [low, high] = surface.wet_box;
-    let (to_low, to_high) =
-        if wet { (surface.center - low, high - surface.center) } else { Default::default() };
-    let found =
-        moment.filter(|_| wet).map(|moment| about(&Wrench { force: *force, moment }, &surface.center));
-    let turn = found.unwrap_or_default() / scale;
-    let (drag, force) = (surface.drag / scale, force / scale);
-    let per_length = if found.is_some() { 1.0 / length } else { 0.0 };
+    let found = moment.filter(|_| surface.wet_fraction > 0.0);
+    let found = found.map(|moment| about(&Wrench { force: *force, moment }, &surface.center));
+    let (drag, force, turn) = (surface.drag / scale, force / scale, found.unwrap_or_default() / scale);
+    let way = surface.center - prepared.vehicle.center_of_mass;
     let [l0, l1] = surface.lateral;
+    let unit = surface.unit / scale;
     let row: [f64; TARGETS] = [
         drag.x,
         drag.y,
         drag.z,
-        surface.unit / scale,
+        unit,
         l0,
         l1,
-        to_low.x,
-        to_low.y,
-        to_low.z,
-        to_high.x,
-        to_high.y,
-        to_high.z,
+        unit * surface.arm,
+        way.x,
+        way.y,
+        way.z,
         force.x,
         force.y,
         force.z,
         turn.x,
         turn.y,
         turn.z,
-        per_length,
+        1.0 / prepared.vehicle.dimensions.length,
     ];
     row.map(|x| x as f32)
 }
@@ -106,21 +111,27 @@ pub fn loss<T: Real>(
     let mut gradient = DMatrix::zeros(output.nrows(), output.ncols());
     let mut sum = T::zero();
     let delta: T = convert(config.delta);
-    let [net_weight, moment_weight] = [config.net_weight, config.moment_weight].map(convert::<f64, T>);
+    let [net_weight, moment_weight, net_moment_weight] =
+        [config.net_weight, config.moment_weight, config.net_moment_weight].map(convert::<f64, T>);
     let share: T = convert(1.0 / counts.samples as f64);
     for first in (0..output.ncols()).step_by(batch.surfaces) {
-        let mut net = Vector3::zeros();
+        let (mut net, mut net_moment) = (Vector3::zeros(), Vector3::zeros());
         for column in first..first + batch.surfaces {
-            net += Answer::new(batch, output, column).force_error();
+            let answer = Answer::new(batch, output, column);
+            let error = answer.force_error();
+            net += error;
+            net_moment += answer.moment_error() + answer.way().cross(&error);
         }
         sum += net_weight * net.map(|e| huber(e, delta)).sum();
+        sum += net_moment_weight * net_moment.map(|e| huber(e, delta)).sum();
         let by_net = net.map(|e| slope(e, delta)) * net_weight;
+        let by_net_moment = net_moment.map(|e| slope(e, delta)) * net_moment_weight;
         for column in first..first + batch.surfaces {
             let answer = Answer::new(batch, output, column);
             let (error, turn) = (answer.force_error(), answer.moment_error());
             sum += error.map(|e| huber(e, delta)).sum() + moment_weight * turn.map(|e| huber(e, delta)).sum();
-            let by_force = error.map(|e| slope(e, delta)) + by_net;
-            let by_turn = turn.map(|e| slope(e, delta)) * moment_weight;
+            let by_force = error.map(|e| slope(e, delta)) + by_net + by_net_moment.cross(&answer.way());
+            let by_turn = turn.map(|e| slope(e, delta)) * moment_weight + by_net_moment;
             let values = answer.gradient(&(by_force * share), &(by_turn * share));
             gradient.column_mut(column).rows_mut(0, OUTPUTS).copy_from_slice(&values);
         }
@@ -138,7 +149,7 @@ fn slope<T: Real>(e: T, delta: T) -> T {
 }
 
 /// A surface's answer beside what was found; the same reading of the answer as `SurfaceReading::force` and
-/// `SurfaceReading::center_of_pressure`.
+/// `SurfaceReading::moment`.
 struct Answer<'a, T> {
     target: &'a [T],
     output: &'a [T],
@@ -160,39 +171,32 @@ impl<'a, T: Real> Answer<'a, T> {
     fn force_error(&self) -> Vector3<T> {
         let (unit, l0, l1) = (self.target[3], self.target[4], self.target[5]);
         let o = self.output;
-        self.vector(0) + Vector3::new(o[0], o[1] * l0 + o[3] * l1, o[2]) * unit - self.vector(12)
+        self.vector(0) + Vector3::new(o[0], o[1] * l0 + o[3] * l1, o[2]) * unit - self.vector(10)
     }
 
-    /// Hyperbolic tangents of the answered place, and the room that they are a share of.
-    fn place(&self) -> ([T; 3], [T; 3]) {
-        let tangent = [self.output[4], self.output[5], self.output[6]].map(|x| x.tanh());
-        let share = [tangent[0], tangent[1] * self.target[4], tangent[2]];
-        let room = [0, 1, 2].map(|i| self.target[if share[i] > T::zero() { 9 } else { 6 } + i]);
-        (tangent, room)
-    }
-
+    /// Over the length of the vehicle.
     fn moment_error(&self) -> Vector3<T> {
-        let (tangent, room) = self.place();
-        let arm =
-            Vector3::new(tangent[0] * room[0], tangent[1] * self.target[4] * room[1], tangent[2] * room[2]);
-        (arm.cross(&self.vector(12)) - self.vector(15)) * self.target[18]
+        let (unit, l0) = (self.target[6], self.target[4]);
+        let o = self.output;
+        (Vector3::new(o[4] * l0, o[5], o[6] * l0) * unit - self.vector(13)) * self.target[16]
+    }
+
+    /// From the center of mass to the wet centroid, over the length of the vehicle.
+    fn way(&self) -> Vector3<T> {
+        self.vector(7) * self.target[16]
     }
 
     fn gradient(&self, by_force: &Vector3<T>, by_turn: &Vector3<T>) -> [T; OUTPUTS] {
         let (unit, l0, l1) = (self.target[3], self.target[4], self.target[5]);
-        let (tangent, room) = self.place();
-        let by_arm = self.vector(12).cross(by_turn) * self.target[18];
-        let lateral = [T::one(), l0, T::one()];
-        let place =
-            [0, 1, 2].map(|i| by_arm[i] * room[i] * lateral[i] * (T::one() - tangent[i] * tangent[i]));
+        let by_turn = by_turn * (self.target[6] * self.target[16]);
         [
             by_force.x * unit,
             by_force.y * unit * l0,
             by_force.z * unit,
             by_force.y * unit * l1,
-            place[0],
-            place[1],
-            place[2],
+            by_turn.x * l0,
+            by_turn.y,
+            by_turn.z * l0,
         ]
     }
 }

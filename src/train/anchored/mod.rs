@@ -179,14 +179,13 @@ fn task(
 /// A row a surface: its static features, those that change, the standardised global ones.
 fn rows(state: &Known, prepared: &Prepared, form: &Anchored, config: &Config) -> Rows {
     let scale = config.anchored.loss.scale(state, prepared);
-    let length = prepared.vehicle.dimensions.length;
     let surfaces = &state.reading.surfaces;
     let loads = state.carried();
     let targets = surfaces.iter().zip(&loads);
     Rows {
         vehicle: state.vehicle,
         inputs: inputs(state, prepared, form),
-        targets: targets.flat_map(|(surface, load)| loss::targets(surface, load, (scale, length))).collect(),
+        targets: targets.flat_map(|(surface, load)| loss::targets(surface, load, prepared, scale)).collect(),
         dry: surfaces.iter().map(|surface| surface.wet_fraction == 0.0).collect(),
     }
 }
