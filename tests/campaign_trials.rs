@@ -6,6 +6,7 @@ mod common;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use serde_json::Value;
 use tempfile::TempDir;
 use wade::cfd::case::Settings;
 use wade::cfd::collect::{CASES_FILE, CaseSummary};
@@ -293,4 +294,40 @@ fn what_is_not_there_or_would_be_mixed_is_refused() {
     assert!(!out.exists());
     assert!(wade_of(&source, &["paper"], &out).status.success());
     refused(&["paper"], "holds files already");
+}
+
+#[test]
+fn what_outlasts_the_ramps_that_were_computed_is_named_and_brings_the_model_nearer() {
+    let folder = TempDir::new().expect("a folder");
+    let (trials, out) = (folder.path().join("trials"), folder.path().join("gap"));
+    let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("campaigns/warthog");
+    let output = wade(&campaign, &["--set", "unsteady"], &trials);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new(env!("CARGO_BIN_EXE_wade"))
+        .args(["gap", "--vehicle", "warthog", "--json", "--trials"])
+        .arg(&trials)
+        .arg("--out")
+        .arg(&out)
+        .env("WADE_VEHICLES", common::vehicles())
+        .output()
+        .expect("the program runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(report["verdict"], "named", "{}", report["summary"]);
+    let effect = &report["effects"][0];
+    assert_eq!(
+        (&effect["name"], report["effects"].as_array().map(Vec::len)),
+        (&"wave_memory".into(), Some(1))
+    );
+    // the steps of the force at the ramps' ends: 0.31 to 0.54 of the displaced water along, 0.9 to 1.2 across; half a second
+    for (name, [least, most]) in [("surge", [0.15, 0.6]), ("sway", [0.8, 2.0]), ("time_constant", [0.3, 0.9])]
+    {
+        let value = effect["parameters"][name]["value"].as_f64().expect("a number");
+        assert!((least..most).contains(&value), "{name}: {value}");
+    }
+    for component in ["fx", "fy"] {
+        let kept_back = &report["gap"]["held_out"][component];
+        let [before, after] = ["before", "after"].map(|key| kept_back[key].as_f64().expect("a number"));
+        assert!(after < 0.95 * before, "{component}: {before} to {after} N");
+    }
 }
