@@ -9,7 +9,8 @@ use crate::wrench::Wrench;
 pub struct SurfaceForce {
     /// Force [N]; exactly zero on a dry surface.
     pub force: Vec3,
-    /// Point of application [m]: the centroid of the wet part, or of the whole surface where it is dry.
+    /// Point of application [m]: of the paper's network the centroid of the wet part, of the `anchored` one the point at which the
+    /// force has the moment of its parts, where the water may reach; of a dry surface its centroid.
     pub point: Vec3,
     /// Share of the surface under water, 0 to 1.
     pub wetted_fraction: f64,

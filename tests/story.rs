@@ -1,5 +1,6 @@
 //! Promise: the story of the README ("What the model lacks") runs as it is written there on the trials that are shipped:
-//! the folder does not say what is hidden, it is named, the gap closes, and the served answer changes by it.
+//! the folder does not say what is hidden, it is named, the gap closes, and the served answer changes by it. So does the
+//! short way from force files to weights ("Learn from a data set").
 
 mod common;
 
@@ -23,11 +24,17 @@ fn text(path: &Path) -> String {
     std::fs::read_to_string(path).expect("readable")
 }
 
-/// The commands of the section's first block.
-fn commands() -> Vec<String> {
+/// A block of commands of a section of the README.
+fn block(section: &str, index: usize) -> String {
     let readme = text(&root().join("README.md"));
-    let (_, section) = readme.split_once("## What the model lacks").expect("the section");
-    let block = section.split("```").nth(1).expect("a block");
+    let (_, section) = readme.split_once(&format!("## {section}\n")).expect("the section");
+    let block = section.split("```sh\n").nth(index).expect("a block");
+    block.split("```").next().expect("its end").to_owned()
+}
+
+/// The commands of the story.
+fn commands() -> Vec<String> {
+    let block = block("What the model lacks", 1);
     block.lines().filter(|line| line.starts_with("wade ")).map(str::to_owned).collect()
 }
 
@@ -91,4 +98,38 @@ fn three_commands_name_the_effect_and_serve_it() {
     let net = |answer: &str| line(answer, "net force [N]").expect("a net force");
     assert!(line(&before, "+ ").is_none() && added[0] < -1.0, "{before}{after}");
     assert!((net(&after)[0] - net(&before)[0] - added[0]).abs() < 0.02, "{before}{after}");
+}
+
+#[test]
+fn a_few_committed_cases_become_weights_by_the_commands_of_the_readme() {
+    let place = TempDir::new().expect("a folder");
+    for name in ["tests", "campaigns"] {
+        std::os::unix::fs::symlink(root().join(name), place.path().join(name)).expect("linked");
+    }
+    // no link, through which the shipped bundles would be written
+    for vehicle in common::VEHICLES {
+        common::copy_folder(
+            &root().join("vehicles").join(vehicle),
+            &place.path().join("vehicles").join(vehicle),
+        );
+    }
+    let commands = block("Learn from a data set", 2);
+    let program = Path::new(env!("CARGO_BIN_EXE_wade")).parent().expect("a folder");
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").expect("a path"));
+    let output = Command::new("sh")
+        .args(["-e", "-c", &commands])
+        .current_dir(place.path())
+        .env("PATH", path)
+        .env_remove("WADE_VEHICLES")
+        .output()
+        .expect("a shell");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for page in ["three.html", "few.html", "few/index.html"] {
+        assert!(text(&place.path().join(page)).contains("<svg"), "{page}");
+    }
+    let version = |folder: &str| {
+        let file = text(&place.path().join(folder).join("husky/vehicle.toml"));
+        line(&file, "version =").expect("a version")[0]
+    };
+    assert_eq!(version("scratch"), version("vehicles") + 1.0, "the copy has the new weights, and it alone");
 }

@@ -61,7 +61,8 @@ Settings that a file (--config) leaves out are the paper's, and those below of -
   outside = 8                  # and on lines through any two cases and as far again beyond
   [anchored.loss]
   net_weight = 10.0
-  moment_weight = 0.1
+  moment_weight = 1.0          # of each surface's moment
+  net_moment_weight = 10.0
   delta = 0.1                  # error up to which the loss is a square
   exponent = 0.5               # 0 judges errors in newtons, 1 in shares of the load
   floor = 0.01

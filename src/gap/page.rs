@@ -22,7 +22,10 @@ impl Report {
             self.gap.held_out_trials.len(),
         );
         if let Some(how) = &self.generated {
-            body += &verdict("notice", &format!("<b>Not measured.</b> These trials are {}", escape(how)));
+            body += &verdict(
+                "notice",
+                &format!("<b>Generated, not measured.</b> These trials are {}", escape(how)),
+            );
         }
         let class = match self.verdict {
             Verdict::NothingMissing => "pass",
