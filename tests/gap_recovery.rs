@@ -714,6 +714,33 @@ fn the_hash_tells_columns_and_their_names_apart() {
 }
 
 #[test]
+fn a_region_says_which_surfaces_carry_its_gap_with_and_without_a_name() {
+    let shares = |report: &Report| {
+        let region = report.regions.first().unwrap_or_else(|| panic!("a region: {}", report.summary));
+        let whole: f64 = region.surfaces.values().sum();
+        // what carries next to nothing is left out
+        assert!((0.95..1.0 + 1e-9).contains(&whole), "{:?}", region.surfaces);
+        region.surfaces.clone()
+    };
+    // the drag of the flow that is met, on the sides that meet it
+    let named = run(&with(&["drag_coefficient_error"], 3.0, 11).0);
+    assert_eq!(names(&named), ["drag_coefficient_error"]);
+    let of_drag = shares(&named);
+    // upwards in shallow water alone
+    let motions = motions(TRIALS, SAMPLES, 21);
+    let lift =
+        |state: &State| if state.depth < 0.15 { 6.0 * NOISE[2] * (7.0 * state.v.x).sin() } else { 0.0 };
+    let load: Vec<Vec<[f64; 6]>> = motions
+        .iter()
+        .map(|motion| motion.iter().map(|s| [0.0, 0.0, lift(s), 0.0, 0.0, 0.0]).collect())
+        .collect();
+    let unnamed = run(&trials(&motions, &load, &Noise::white(NOISE), 21));
+    assert_eq!(unnamed.verdict, Verdict::NoCandidateFits, "{}", unnamed.summary);
+    let of_lift = shares(&unnamed);
+    assert_ne!(of_drag, of_lift);
+}
+
+#[test]
 fn a_force_of_no_effect_has_no_name() {
     for name in ["outside_sine", "outside_vibration"] {
         let report = run(&with(&[name], 3.0, 14).0);
@@ -853,8 +880,14 @@ fn a_channel_that_cannot_be_what_it_is_called_is_refused_with_its_trial() {
             |e: &GapError| matches!(e, GapError::Saturated { column: "fx", count, .. } if *count >= 20);
         assert!(result.as_ref().is_err_and(is_named), "{result:?}");
     }
-    let [_, everywhere] = refused(&|measured| measured.swap(0, 2));
-    assert_eq!(everywhere, Err(GapError::Swapped { column: "fx", other: "fz" }));
+    for (result, of) in refused(&|measured| measured.swap(0, 2)).iter().zip(PLACES) {
+        let swapped = GapError::Swapped { place: of.into(), column: "fx", other: "fz" };
+        assert_eq!(result.as_ref().err(), Some(&swapped));
+    }
+    for (result, of) in refused(&|measured| all(&mut measured[0], &|x| 1e-3 * x)).iter().zip(PLACES) {
+        let is_named = |e: &GapError| matches!(e, GapError::Unit { place, column: "fx", other: "kN", .. } if place == of);
+        assert!(result.as_ref().is_err_and(is_named), "{result:?}");
+    }
     // a zero that is off by the weight turns fz about, but not its changes
     let [_, everywhere] = refused(&|measured| all(&mut measured[2], &|x| x - planted::MASS * 9.81));
     assert!(everywhere.is_ok(), "{everywhere:?}");

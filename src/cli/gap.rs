@@ -397,11 +397,12 @@ fn regions(report: &Report) -> String {
     }
     let line = |region: &gap::Region| {
         format!(
-            "where {}: {:.0} % of the gap in {:.0} % of the samples, {} trials\n",
+            "where {}: {:.0} % of the gap in {:.0} % of the samples, {} trials; on {}\n",
             region.place,
             100.0 * region.share_of_gap,
             100.0 * region.share_of_samples,
-            region.trials
+            region.trials,
+            gap::in_shares(&region.surfaces)
         )
     };
     report.regions.iter().map(line).collect()

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use sha2::{Digest, Sha256};
 
 use super::candidates::Setting;
+use super::carriers::{carriers, of_region};
 use super::design::Design;
 use super::detect::{self, Excitation, GapSize};
 use super::effects_file::remarks;
@@ -13,14 +14,15 @@ use super::fit::{Fit, Parameter, fit};
 use super::gated::Gated;
 use super::holdout::{closures, explained, worse};
 use super::judge::{Judge, Member, Refusal};
+use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 use super::series::Series;
 use super::statistics::quantile;
 use super::verdict::{Found, STRUCTURE, Unfit};
-use super::{Named, locate, plausible};
+use super::{Named, plausible};
 use crate::condition::Condition;
-use crate::effects::{self, Effect, Kind, Memory, Part};
+use crate::effects::{Effect, Kind};
 use crate::files::hexadecimal;
 use crate::trials::{SIMULATED, Trials, WHEELS, WRENCH};
 
@@ -73,10 +75,13 @@ pub(super) fn compose(
         _ => Vec::new(),
     };
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
-    let (regions, regions_tried) = match found.verdict {
+    let (mut regions, regions_tried) = match found.verdict {
         Verdict::NothingMissing => (Vec::new(), 0),
         _ => locate::locate(all, &design.trials, gap_excess, found.gated, config),
     };
+    for region in &mut regions {
+        region.surfaces = of_region(region, &named, all, setting, judge.floors);
+    }
     let excitation =
         detect::excitations(design, all, setting, &trials.manifest, &found.residual, &named, config);
     let not_testable = excitation.iter().filter_map(not_testable).collect();
@@ -201,7 +206,7 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             share_of_gap: ((without - found.loss) / whole).clamp(0.0, 1.0),
             provisional: fitted.provisional[index],
             placebo: [placebo.0, placebo.1],
-            surfaces: surfaces(one, judge.all, judge.setting),
+            surfaces: carriers(std::slice::from_ref(one), judge.all, judge.setting, &OPEN),
             covariance: (0..count)
                 .map(|i| (0..count).map(|j| fitted.covariance[(first + i, first + j)]).collect())
                 .collect(),
@@ -213,38 +218,6 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
         first += count;
     }
     effects
-}
-
-/// Shares of the load of an effect by surface, over a sample of the bins; what acts on the hull as a whole is `hull`.
-fn surfaces(named: &Named, all: &[Series], setting: &Setting) -> BTreeMap<String, f64> {
-    let mut loads: BTreeMap<String, f64> = BTreeMap::new();
-    if named.effect.kind() != Kind::Physics {
-        return loads;
-    }
-    let base_drag = setting.base_drag.of(named.effect, &named.shape);
-    for series in all {
-        let mut memory = Memory::default();
-        for (index, bin) in series.bins.iter().enumerate() {
-            let input = series.input(bin.start, setting.body, base_drag);
-            if index > 0 {
-                let dt = series.t[bin.start] - series.t[series.bins[index - 1].start];
-                effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
-            }
-            effects::basis(named.effect, &named.shape, &memory, &input, |coefficient, part, load| {
-                let value =
-                    named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
-                let name = match part {
-                    Part::Panel(panel) => setting.body.panels[panel].name.clone(),
-                    Part::Hull => "hull".to_owned(),
-                };
-                *loads.entry(name).or_default() += (load.force * value).norm();
-            });
-        }
-    }
-    let whole: f64 = loads.values().sum();
-    loads.retain(|_, load| *load > 0.01 * whole);
-    loads.values_mut().for_each(|load| *load /= whole.max(f64::MIN_POSITIVE));
-    loads
 }
 
 /// What is not named: effects beside the set that was found, or each by itself where none holds.
@@ -533,7 +506,9 @@ fn summary(report: &Report, gated: Option<Gated>) -> String {
             let there = gated.map_or_else(String::new, |gated| {
                 format!(" It explains more of it where {} alone.", locate::in_words(&gated.limits))
             });
-            format!("What is missing is {}.{closed}{there}", names(&report.effects))
+            let worse = report.gap.worse_regions.first();
+            let worse = worse.map_or_else(String::new, |worse| format!(" But in a part of those {worse}."));
+            format!("What is missing is {}.{closed}{worse}{there}", names(&report.effects))
         }
         Verdict::Ambiguous => format!(
             "What is missing is {}, or {}: these trials cannot tell them apart.{closed}",

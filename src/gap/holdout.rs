@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::candidates::{Setting, columns};
-use super::features::{FEATURES, Features, of_bins};
-use super::locate::Region;
+use super::features::{Features, of_bins};
+use super::locate::{Limits, OPEN, Region, inside};
 use super::noise::Floor;
 use super::series::Series;
 use super::statistics::quantile;
@@ -145,9 +145,6 @@ pub(super) fn closures(
     closures
 }
 
-/// Feature, lower and upper limit.
-type Limits = Vec<(usize, f64, f64)>;
-
 impl std::fmt::Display for Worse {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { place, component, before, after } = self;
@@ -198,9 +195,7 @@ pub(super) fn worse(
     }
     let mut worse = Vec::new();
     for (place, limits) in places(&points, regions) {
-        let is_within =
-            |p: &&Point| limits.iter().all(|&(i, low, high)| p.features[i] > low && p.features[i] <= high);
-        let within: Vec<&Point> = points.iter().filter(is_within).collect();
+        let within: Vec<&Point> = points.iter().filter(|point| inside(&limits, &point.features)).collect();
         if within.len() < LEAST {
             continue;
         }
@@ -226,27 +221,19 @@ const LEAST: usize = 5;
 
 /// The regions, the thirds of depth and speed, and everywhere, in words and as limits.
 fn places(points: &[Point], regions: &[Region]) -> Vec<(String, Limits)> {
-    let mut places: Vec<(String, Limits)> = Vec::new();
-    for region in regions {
-        let limits: Limits = region
-            .conditions
-            .iter()
-            .filter_map(|c| {
-                let index = FEATURES.iter().position(|(name, _)| *name == c.quantity)?;
-                Some((index, c.above.unwrap_or(f64::NEG_INFINITY), c.at_most.unwrap_or(f64::INFINITY)))
-            })
-            .collect();
-        places.push((region.place.clone(), limits));
-    }
+    let mut places: Vec<(String, Limits)> =
+        regions.iter().map(|region| (region.place.clone(), region.limits)).collect();
     for (feature, name) in [(0, "depth"), (2, "speed")] {
         let mut values: Vec<f64> = points.iter().map(|point| point.features[feature]).collect();
         let cuts = [quantile(&mut values.clone(), 1.0 / 3.0), quantile(&mut values, 2.0 / 3.0)];
-        let limits = [(f64::NEG_INFINITY, cuts[0]), (cuts[0], cuts[1]), (cuts[1], f64::INFINITY)];
-        for (third, (low, high)) in ["lowest", "middle", "highest"].into_iter().zip(limits) {
-            places.push((format!("{third} third of {name}"), vec![(feature, low, high)]));
+        let thirds = [[f64::NEG_INFINITY, cuts[0]], cuts, [cuts[1], f64::INFINITY]];
+        for (third, range) in ["lowest", "middle", "highest"].into_iter().zip(thirds) {
+            let mut limits = OPEN;
+            limits[feature] = range;
+            places.push((format!("{third} third of {name}"), limits));
         }
     }
-    places.push(("all trials kept back".to_owned(), Vec::new()));
+    places.push(("all trials kept back".to_owned(), OPEN));
     places
 }
 

@@ -5,7 +5,7 @@
 //! must hold again, and tested by giving each trial the gaps of another. A region to which an effect was fitted (`gated`) stands
 //! beside them untested, since all trials took part in that.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -44,6 +44,11 @@ pub struct Region {
     /// Probability of such a contrast where the place means nothing; none where an effect was fitted to the region, on the
     /// same trials.
     pub p_value: Option<f64>,
+    /// Shares of the surfaces in the load there: of the named effects, or of what would carry such a gap where none is named.
+    pub surfaces: BTreeMap<String, f64>,
+    /// The conditions as limits.
+    #[serde(skip)]
+    pub(super) limits: Limits,
 }
 
 /// One condition of a region.
@@ -244,6 +249,8 @@ fn region(limits: &Limits, check: &[&Point], all: &[&Point]) -> Option<(Region, 
         trials: entered.len(),
         contrast: (here.max(0.0) / there.max(1e-6 * here)).sqrt(),
         p_value: None,
+        surfaces: BTreeMap::new(),
+        limits: *limits,
     };
     Some((region, here - there))
 }

@@ -7,12 +7,13 @@
 //! cannot be), `noise` (the floor), `candidates` (the
 //! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
 //! hold), `judge` (the gates), `select` and `rivals` (which effects), `shared` (noise of the motion in both), `nonlinear`,
-//! `general` and `lasting` (structure without a name), `features`, `gated` and `locate` (where), `verdict`, `fit`, `holdout`,
+//! `general` and `lasting` (structure without a name), `features`, `gated`, `locate` and `carriers` (where), `verdict`, `fit`, `holdout`,
 //! `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
 
 mod base_drag;
 mod calibrate;
 mod candidates;
+mod carriers;
 mod compose;
 mod config;
 mod design;
@@ -45,6 +46,7 @@ mod split;
 mod statistics;
 mod verdict;
 
+pub use carriers::in_shares;
 pub use config::Config;
 pub use detect::{Detectable, Excitation, GapSize};
 pub use effects_file::{NotApplicable, effects_file};
@@ -194,9 +196,11 @@ pub enum GapError {
     },
     /// Two channels, each of which is the other.
     #[error(
-        "columns {column} and {other} hold what is expected of each other: are their names exchanged? x is forward, y left, z up"
+        "columns {column} and {other} of {place} hold what is expected of each other: are their names exchanged? x is forward, y left, z up"
     )]
     Swapped {
+        /// The trial, or all of them.
+        place: String,
         /// The column.
         column: &'static str,
         /// The other.
@@ -204,9 +208,11 @@ pub enum GapError {
     },
     /// A load in another unit.
     #[error(
-        "column {column} of all trials is {ratio:.2e} of what is expected: is it in {other}? It must be in {unit}"
+        "column {column} of {place} is {ratio:.2e} of what is expected: is it in {other}? It must be in {unit}"
     )]
     Unit {
+        /// The trial, or all of them.
+        place: String,
         /// The column.
         column: &'static str,
         /// Measured over expected.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::carriers::in_shares;
 use super::judge::Refusal;
 use super::noise::FloorSource;
 use super::report::{NamedEffect, Report, Trace, Verdict};
@@ -148,14 +149,8 @@ fn effects(report: &Report) -> String {
         let _ = writeln!(text, "<p>Explains as much: {}.</p>", escape(&sets.join("; ")));
     }
     for effect in report.effects.iter().filter(|effect| effect.surfaces.keys().any(|name| name != "hull")) {
-        let of = |(name, share): (&String, &f64)| format!("{} {}", escape(name), percent(*share));
-        let surfaces: Vec<String> = effect.surfaces.iter().map(of).collect();
-        let _ = writeln!(
-            text,
-            "<p class=\"small\">{}, by surface: {}.</p>",
-            plain(effect.name),
-            surfaces.join(", ")
-        );
+        let surfaces = escape(&in_shares(&effect.surfaces));
+        let _ = writeln!(text, "<p class=\"small\">{}, by surface: {surfaces}.</p>", plain(effect.name));
     }
     text
 }
@@ -305,12 +300,14 @@ fn regions(report: &Report) -> String {
             region.trials.to_string(),
             number(region.contrast),
             region.p_value.map_or_else(|| "–".into(), number),
+            prose(&plain(&in_shares(&region.surfaces))),
         ]
     });
-    let heads = ["where", "share of gap", "share of samples", "trials", "times the gap elsewhere", "p"];
+    let heads = ["where", "share of gap", "share of samples", "trials", "times the gap elsewhere", "p", "on"];
     format!(
         "<h2>Where the gap is</h2>{}<p class=\"small\">Found on one half of the trials, estimated on the other; without a p \
-         fitted to all of them. {} splits were tried.</p>\n",
+         fitted to all of them. {} splits were tried. On: the surfaces that carry what is named there; where nothing is, those that \
+         meet the flow, or that the water lifts.</p>\n",
         table(&heads, NO_PAPER, rows),
         report.regions_tried
     )

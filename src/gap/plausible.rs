@@ -28,6 +28,9 @@ const LOUD: f64 = 4.0;
 /// ... where it is at most this share of the trials: more of them are another kind of trial.
 const FEW: f64 = 0.1;
 
+/// What all trials together are called.
+const ALL: &str = "every trial";
+
 /// What one component measured and what is expected of it.
 struct Channel<'a> {
     component: usize,
@@ -62,10 +65,7 @@ pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Res
     }
     for (index, a) in channels.iter().enumerate() {
         let rest = channels[index + 1..].iter().filter(|b| a.component / 3 == b.component / 3);
-        if let Some(b) = rest.into_iter().find(|b| a.is_swapped_with(b)) {
-            let (column, other) = (a.column(), b.column());
-            return Err(GapError::Swapped { column, other });
-        }
+        rest.into_iter().try_for_each(|b| a.check_apart(b))?;
     }
     Ok(())
 }
@@ -128,19 +128,26 @@ impl<'a> Channel<'a> {
     /// All trials together, then each alone.
     fn check(&self) -> Result<(), GapError> {
         let all: Vec<Pair> = self.trials.iter().flat_map(|(_, pairs)| pairs.iter().copied()).collect();
-        self.check_unit(&all)?;
-        self.check_pairs("every trial", &all)?;
-        self.trials.iter().try_for_each(|(name, pairs)| self.check_pairs(&format!("{name}.csv"), pairs))
+        self.check_unit(ALL, &all)?;
+        self.check_pairs(ALL, &all)?;
+        self.trials.iter().try_for_each(|(name, pairs)| {
+            let [_, _, pp] = products(pairs);
+            let place = format!("{name}.csv");
+            if pairs.len() >= ENOUGH && self.is_clear((pp / pairs.len() as f64).sqrt()) {
+                self.check_unit(&place, pairs)?;
+            }
+            self.check_pairs(&place, pairs)
+        })
     }
 
-    fn check_unit(&self, pairs: &[Pair]) -> Result<(), GapError> {
-        let (unit, larger, smaller) = self.units();
+    fn check_unit(&self, place: &str, pairs: &[Pair]) -> Result<(), GapError> {
+        let ((unit, larger, smaller), place) = (self.units(), place.to_owned());
         let [mm, mp, pp] = products(pairs);
         let ratio = mp.abs() / pp.max(f64::MIN_POSITIVE);
         let is_near = |factor: f64| is_about(ratio / factor);
         let other = [(THOUSAND, larger), (1.0 / THOUSAND, smaller)].into_iter().find(|(f, _)| is_near(*f));
         match other.filter(|_| mp.abs() > SAME * (mm * pp).sqrt()) {
-            Some((_, other)) => Err(GapError::Unit { column: self.column(), ratio, unit, other }),
+            Some((_, other)) => Err(GapError::Unit { place, column: self.column(), ratio, unit, other }),
             None => Ok(()),
         }
     }
@@ -191,18 +198,31 @@ impl<'a> Channel<'a> {
         })
     }
 
-    fn is_swapped_with(&self, other: &Self) -> bool {
-        let [mut apart, mut swapped, mut count] = [0.0; 3];
-        for ((_, ours), (_, theirs)) in self.trials.iter().zip(&other.trials) {
-            for ([a, expected_a], [b, expected_b]) in ours.iter().zip(theirs) {
-                apart += (a - expected_a).powi(2) + (b - expected_b).powi(2);
-                swapped += (a - expected_b).powi(2) + (b - expected_a).powi(2);
-                count += 1.0;
-            }
-        }
+    /// Refuses two channels that stand in for each other, in all trials or in one.
+    fn check_apart(&self, other: &Self) -> Result<(), GapError> {
         // within what noise makes of channels of which nothing is expected
-        let noise = (self.usual_noise().powi(2) + other.usual_noise().powi(2)) * count;
-        apart > SWAPPED * swapped.max(noise)
+        let noise = self.usual_noise().powi(2) + other.usual_noise().powi(2);
+        // how far the two are from what is expected of them, and from what is expected of each other
+        let sums = |(ours, theirs): (&[Pair], &[Pair])| {
+            ours.iter().zip(theirs).fold([0.0; 3], |[apart, swapped, least], ([a, of_a], [b, of_b])| {
+                let square = |x: f64, y: f64| x * x + y * y;
+                [apart + square(a - of_a, b - of_b), swapped + square(a - of_b, b - of_a), least + noise]
+            })
+        };
+        let of_trials: Vec<[f64; 3]> = self
+            .trials
+            .iter()
+            .zip(&other.trials)
+            .map(|((_, ours), (_, theirs))| sums((ours, theirs)))
+            .collect();
+        let all = of_trials.iter().fold([0.0; 3], |sum, of| std::array::from_fn(|i| sum[i] + of[i]));
+        let is_swapped = |[apart, swapped, least]: [f64; 3]| apart > SWAPPED * swapped.max(least);
+        let place = match of_trials.iter().position(|of| is_swapped(*of)) {
+            _ if is_swapped(all) => ALL.to_owned(),
+            Some(trial) => format!("{}.csv", self.trials[trial].0),
+            None => return Ok(()),
+        };
+        Err(GapError::Swapped { place, column: self.column(), other: other.column() })
     }
 }
 
