@@ -129,7 +129,7 @@ fn faults_behind_a_good_checksum_are_named() {
         (
             "network.safetensors",
             Box::new(header("windward drag", "standing drag")),
-            "what is left of archimedes + standing drag of the soaked part, not of archimedes + windward drag of the soaked part: train them anew",
+            "what is left of archimedes + standing drag of the soaked part, force and moment, not of archimedes + windward drag of the soaked part, force and moment: train them anew",
         ),
         ("vehicle.toml", Box::new(text(|t| t.replacen("format = 1", "format = 2", 1))), "newer"),
         (
