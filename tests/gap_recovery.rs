@@ -850,7 +850,7 @@ fn mirrored(mut trials: Trials) -> Trials {
 fn a_channel_that_cannot_be_what_it_is_called_is_refused_with_its_trial() {
     let good = with(&["squat"], 3.0, 16).0;
     let body = gap::body_of(&good).expect("a body");
-    let refused = |spoil: &dyn Fn(&mut [Option<Vec<f64>>; 6])| {
+    let refused = |spoil: &dyn Fn(&mut Channels)| {
         // one trial, then all
         [4..5, 0..TRIALS].map(|spoiled| {
             let mut trials = good.clone();
@@ -892,6 +892,9 @@ fn a_channel_that_cannot_be_what_it_is_called_is_refused_with_its_trial() {
     let [_, everywhere] = refused(&|measured| all(&mut measured[2], &|x| x - planted::MASS * 9.81));
     assert!(everywhere.is_ok(), "{everywhere:?}");
 }
+
+/// The measured components of a trial.
+type Channels = [Option<Vec<f64>>; 6];
 
 /// What one trial and all of them are called where a channel is refused.
 const PLACES: [&str; 2] = ["run04.csv", "every trial"];
