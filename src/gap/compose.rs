@@ -7,19 +7,19 @@ use sha2::{Digest, Sha256};
 use super::candidates::Setting;
 use super::carriers::{carriers, of_region};
 use super::design::Design;
-use super::detect::{self, Excitation, GapSize};
+use super::detect::{self, Excitation};
 use super::effects_file::remarks;
 use super::experiment::separating;
 use super::fit::{Fit, Parameter, fit};
-use super::gated::Gated;
 use super::holdout::{closures, explained, worse};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
+use super::sentences::{summary, unexplained};
 use super::series::Series;
 use super::statistics::quantile;
-use super::verdict::{Found, STRUCTURE, Unfit};
+use super::verdict::Found;
 use super::{Named, plausible};
 use crate::condition::Condition;
 use crate::effects::{Effect, Kind};
@@ -86,7 +86,7 @@ pub(super) fn compose(
         detect::excitations(design, all, setting, &trials.manifest, &found.residual, &named, config);
     let not_testable = excitation.iter().filter_map(not_testable).collect();
     let alternatives: Vec<Vec<&'static str>> = match holds {
-        true => found.alternatives.iter().map(|set| names(judge, set)).collect(),
+        true => found.alternatives.iter().map(|set| judge.names(set)).collect(),
         false => Vec::new(),
     };
     let separating_experiment = (holds && !found.alternatives.is_empty()).then(|| {
@@ -166,10 +166,6 @@ fn outside(all: &[Series]) -> Option<String> {
         all.len(),
         worst.name
     ))
-}
-
-fn names(judge: &Judge, set: &[Member]) -> Vec<&'static str> {
-    set.iter().map(|member| judge.effect(member).name()).collect()
 }
 
 fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) -> Vec<NamedEffect> {
@@ -261,65 +257,6 @@ fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
         ("explained", explained),
         ("unexplained", (1.0 - noise - explained).max(0.0)),
     ])
-}
-
-fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<String> {
-    let left = &found.left;
-    let whole = judge.missing();
-    let share = left.gain / whole;
-    let matters = match found.verdict {
-        Verdict::NothingMissing => false,
-        Verdict::NoCandidateFits => true,
-        _ => left.deviate > STRUCTURE && share > 0.05,
-    };
-    if !matters {
-        return None;
-    }
-    let functions: Vec<String> =
-        left.strongest.iter().map(|(name, share)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
-    let beyond = if found.verdict == Verdict::NoCandidateFits { "" } else { " beyond the named effects" };
-    let mut text = match (100.0 * share).clamp(0.0, 100.0).round() {
-        0.0 => "no smooth function of the state predicts the gap".to_owned(),
-        share => format!(
-            "{share:.0} % of the gap above the floor can be predicted from the state{beyond}; it goes most with {}",
-            functions.join(", ")
-        ),
-    };
-    if let Some(unfit) = found.unfit.filter(|_| found.verdict == Verdict::NoCandidateFits) {
-        let names = names(judge, &found.members).join(" and ").replace('_', " ");
-        text += &match unfit {
-            Unfit::Explains(share, asked) => format!(
-                "; nearest comes {names}, with {:.0} % of it, where {:.0} % are asked for",
-                100.0 * share.max(0.0),
-                100.0 * asked
-            ),
-            Unfit::Unresolved => {
-                format!("; nearest comes {names}, which would fade faster than these samples resolve")
-            }
-            Unfit::Imitates => format!("; nearest comes {names}, but one effect in a region explains more"),
-            Unfit::Leaves => format!("; nearest comes {names}, but much of what lasts is still there"),
-        };
-    }
-    if let Some(gated) = found.gated.filter(|_| found.verdict == Verdict::NoCandidateFits) {
-        text += &format!(
-            "; where {} it is like {}, and {:.0} % of it goes with that there",
-            locate::in_words(&gated.limits),
-            gated.effect.name().replace('_', " "),
-            100.0 * gated.share.min(1.0)
-        );
-    }
-    if let Some(share) = disproof {
-        let names = names(judge, &found.members).join(" and ").replace('_', " ");
-        text += &if share > 0.0 {
-            format!(
-                "; {names} would explain {:.0} % of the squared gap of the trials kept back",
-                100.0 * share
-            )
-        } else {
-            format!("; {names} would make the gap of the trials kept back larger")
-        };
-    }
-    Some(text)
 }
 
 /// Squared standardised gap of each bin less that of noise and of the zero of a trial.
@@ -441,88 +378,5 @@ fn trace(
         before: series.binned(|i| series.gap[i][component]),
         after: series.binned(|i| series.gap[i][component] - added[i][component]),
         noise: floors[component].sample / samples.sqrt(),
-    }
-}
-
-/// Says so where the gap is clearly larger than the noise: only the model's own error keeps it from counting, or nothing that
-/// the trials tell goes with it.
-fn hidden(report: &Report) -> Option<String> {
-    const CLEARLY: f64 = 2.0;
-    const BEYOND: f64 = 1.5;
-    let sizes = report.gap.floors.iter().filter_map(|(name, floor)| {
-        let size = report.gap.size.get(name)?;
-        Some((*name, *floor, size))
-    });
-    let most = |over: &dyn Fn(&Floor) -> f64, of: &dyn Fn(&(&str, Floor, &GapSize)) -> bool| {
-        let times =
-            |(_, floor, size): &(&str, Floor, &GapSize)| size.rms / over(floor).max(f64::MIN_POSITIVE);
-        sizes.clone().filter(|entry| of(entry)).max_by(|a, b| times(a).total_cmp(&times(b)))
-    };
-    let is_beyond = |(_, floor, size): &(&str, Floor, &GapSize)| {
-        size.above_floor && size.rms > BEYOND * floor.with_model()
-    };
-    if let Some((name, floor, size)) = most(&Floor::with_model, &is_beyond) {
-        return Some(format!(
-            ". Yet the gap of {name} is {:.3}, where {:.3} are expected of noise and model: it hangs together with nothing that these trials tell.",
-            size.rms,
-            floor.with_model(),
-        ));
-    }
-    let is_hidden = |(_, floor, size): &(&str, Floor, &GapSize)| {
-        floor.model > floor.total() && size.rms > CLEARLY * floor.total()
-    };
-    most(&Floor::total, &is_hidden).map(|(name, floor, size)| {
-        format!(
-            " and what the model states of itself. Of {name} the noise is {:.3} and the model's own error {:.3}: the gap of {:.3} may be either's.",
-            floor.total(),
-            floor.model,
-            size.rms,
-        )
-    })
-}
-
-fn summary(report: &Report, gated: Option<Gated>) -> String {
-    let names = |effects: &[NamedEffect]| {
-        effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
-    };
-    let held = report.gap.held_out.get("all");
-    let closed = held.and_then(|all| Some((all.closure?, all.interval))).map_or_else(String::new, |(c, interval)| {
-        match interval.filter(|[low, _]| *low <= 0.0 && c > 0.0) {
-            Some([low, high]) => format!(
-                " The trials that took no part are too few, or their gap too small, to show how much of it that closes ({:.0} to {:.0} %).",
-                100.0 * low,
-                100.0 * high
-            ),
-            None => format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c),
-        }
-    });
-    match report.verdict {
-        Verdict::NothingMissing => {
-            let within =
-                "Nothing is missing that these trials can show: the gap holds no structure beyond its noise";
-            hidden(report).map_or_else(|| format!("{within}."), |why| format!("{within}{why}"))
-        }
-        Verdict::Named => {
-            let there = gated.map_or_else(String::new, |gated| {
-                format!(" It explains more of it where {} alone.", locate::in_words(&gated.limits))
-            });
-            let worse = report.gap.worse_regions.first();
-            let worse = worse.map_or_else(String::new, |worse| format!(" But in a part of those {worse}."));
-            format!("What is missing is {}.{closed}{worse}{there}", names(&report.effects))
-        }
-        Verdict::Ambiguous => format!(
-            "What is missing is {}, or {}: these trials cannot tell them apart.{closed}",
-            names(&report.effects),
-            report
-                .alternatives
-                .iter()
-                .map(|set| set.join(" and ").replace('_', " "))
-                .collect::<Vec<_>>()
-                .join(", or "),
-        ),
-        Verdict::NoCandidateFits => {
-            "There is a gap with structure, and no effect of the library explains it; nothing is applied."
-                .into()
-        }
     }
 }

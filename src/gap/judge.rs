@@ -126,6 +126,11 @@ impl<'a> Judge<'a> {
         self.design.candidates[member.candidate].effect
     }
 
+    /// The names of a set.
+    pub fn names(&self, set: &[Member]) -> Vec<&'static str> {
+        set.iter().map(|member| self.effect(member).name()).collect()
+    }
+
     /// The best form of an effect beside a set, by every gate but the placebos.
     pub fn judge(&self, set: &[Member], effect: Effect) -> Option<Judged> {
         let ranked = self.ranked(set, effect)?;

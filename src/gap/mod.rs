@@ -8,7 +8,7 @@
 //! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
 //! hold), `judge` (the gates), `select` and `rivals` (which effects), `shared` (noise of the motion in both), `nonlinear`,
 //! `general` and `lasting` (structure without a name), `features`, `gated`, `locate` and `carriers` (where), `verdict`, `fit`, `holdout`,
-//! `detect` (what would have shown), `experiment`, `report`, `compose`, `page` and `effects_file`; `run` calls them.
+//! `detect` (what would have shown), `experiment`, `report`, `compose`, `sentences`, `page` and `effects_file`; `run` calls them.
 
 mod base_drag;
 mod calibrate;
@@ -39,6 +39,7 @@ mod rivals;
 mod robust;
 mod run;
 mod select;
+mod sentences;
 mod series;
 mod shared;
 mod smoothing;
