@@ -37,8 +37,8 @@ struct Channel<'a> {
     trials: Vec<(&'a str, Vec<Pair>)>,
     /// Root mean square of what is expected [N or N m].
     size: f64,
-    /// Noise of a sample of each trial [N or N m].
-    noises: Vec<f64>,
+    /// Noise of a sample that three quarters of the trials stay below [N or N m].
+    noise: f64,
 }
 
 /// Measured and expected [N or N m].
@@ -73,16 +73,16 @@ pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Res
 /// Few trials with far more noise than the others, which may hide what these show.
 pub(super) fn remarks(all: &[Series], components: &[usize]) -> Vec<String> {
     let of = |&component: &usize| {
-        let channel = Channel::new(all, component);
-        let usual = channel.usual_noise();
-        let most = channel.noises.iter().copied().fold(0.0, f64::max);
-        let loud = channel.noises.iter().filter(|noise| **noise > LOUD * usual).count();
-        let trial = channel.noises.iter().position(|noise| *noise == most)?;
+        let noises: Vec<f64> = all.iter().map(|series| sample_noise(series, component)).collect();
+        let usual = usual(&noises);
+        let most = noises.iter().copied().fold(0.0, f64::max);
+        let loud = noises.iter().filter(|noise| **noise > LOUD * usual).count();
+        let trial = noises.iter().position(|noise| *noise == most)?;
         let is_few = loud == 1 || loud as f64 <= FEW * all.len() as f64;
         (usual > 0.0 && loud > 0 && is_few).then(|| {
             format!(
                 "{}: {loud} of {} trials have up to {:.1} times the noise of the others, most of all {}: if their recording was damaged, leave them out",
-                channel.column(),
+                WRENCH[component],
                 all.len(),
                 most / usual,
                 all[trial].name,
@@ -102,17 +102,12 @@ impl<'a> Channel<'a> {
         let expected = trials.iter().flat_map(|(_, pairs)| pairs.iter().map(|[_, p]| p * p));
         let count = trials.iter().map(|(_, pairs)| pairs.len()).sum::<usize>().max(1);
         let size = (expected.sum::<f64>() / count as f64).sqrt();
-        let noises = all.iter().map(|series| sample_noise(series, component)).collect();
-        Self { component, trials, size, noises }
+        let noises: Vec<f64> = all.iter().map(|series| sample_noise(series, component)).collect();
+        Self { component, trials, size, noise: usual(&noises) }
     }
 
     fn column(&self) -> &'static str {
         WRENCH[self.component]
-    }
-
-    /// Noise of a sample that three quarters of the trials stay below [N or N m].
-    fn usual_noise(&self) -> f64 {
-        quantile(&mut self.noises.clone(), 0.75)
     }
 
     /// The unit, and those in which a number is a thousand times as large and as small.
@@ -122,7 +117,7 @@ impl<'a> Channel<'a> {
 
     /// True for a change of what is expected that a channel cannot but show.
     fn is_clear(&self, spread: f64) -> bool {
-        spread > CHANGES * self.size && spread > CLEARLY * self.usual_noise()
+        spread > CHANGES * self.size && spread > CLEARLY * self.noise
     }
 
     /// All trials together, then each alone.
@@ -201,7 +196,7 @@ impl<'a> Channel<'a> {
     /// Refuses two channels that stand in for each other, in all trials or in one.
     fn check_apart(&self, other: &Self) -> Result<(), GapError> {
         // within what noise makes of channels of which nothing is expected
-        let noise = self.usual_noise().powi(2) + other.usual_noise().powi(2);
+        let noise = self.noise.powi(2) + other.noise.powi(2);
         // how far the two are from what is expected of them, and from what is expected of each other
         let sums = |(ours, theirs): (&[Pair], &[Pair])| {
             ours.iter().zip(theirs).fold([0.0; 3], |[apart, swapped, least], ([a, of_a], [b, of_b])| {
@@ -224,6 +219,11 @@ impl<'a> Channel<'a> {
         };
         Err(GapError::Swapped { place, column: self.column(), other: other.column() })
     }
+}
+
+/// The noise that three quarters of some trials stay below.
+fn usual(noises: &[f64]) -> f64 {
+    quantile(&mut noises.to_vec(), 0.75)
 }
 
 /// Sums of squares and products: measured, both, expected.
