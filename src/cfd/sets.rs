@@ -85,8 +85,9 @@ impl Plan {
         Ok(free)
     }
 
-    /// Ramps of the speed at three depths, up and down, gentle and hard; head-on, and one broadside. And from rest, where
-    /// neither drag nor waves hide what the acceleration does: below Fr_h = 1 at every depth, within 60 degrees of ahead.
+    /// Ramps of the speed at three depths, up and down, gentle and hard; head-on, and one broadside. And from rest and to it, where
+    /// neither drag nor waves hide what the acceleration does: below Fr_h = 1 at every depth, the last four below the speed at
+    /// which a channel chokes, within 60 degrees of ahead.
     fn surges(&self) -> Vec<Case> {
         let Table { speed_mps, depth_m, .. } = self.campaign.table;
         let depth = |share: f64| depth_m.min + share * (depth_m.max - depth_m.min);
@@ -99,11 +100,21 @@ impl Plan {
             (slow, fast, 1.0, 90.0),
         ];
         let from_rest = [(0.0, slow, 1.0, 0.0), (0.0, slow, 0.5, 0.0), (0.0, slow, 1.0, 60.0)];
+        let creep = 0.5 * slow;
+        let gentle = [
+            (0.0, creep, 0.5, 0.0),
+            (creep, 0.0, 0.5, 0.0),
+            (0.0, creep, 0.5, 60.0),
+            (creep, 0.0, 0.5, 30.0),
+        ];
         let depths = [0.33, 0.67, 1.0].map(depth);
-        let moving = depths.iter().flat_map(|depth| moving.map(|ramp| (*depth, ramp)));
-        let from_rest = depths.iter().flat_map(|depth| from_rest.map(|ramp| (*depth, ramp)));
-        moving
-            .chain(from_rest)
+        let at_each = |ramps: &[(f64, f64, f64, f64)]| {
+            depths.iter().flat_map(|depth| ramps.iter().map(|ramp| (*depth, *ramp))).collect::<Vec<_>>()
+        };
+        // later ramps at the end: a case keeps its number
+        [at_each(&moving), at_each(&from_rest), at_each(&gentle)]
+            .concat()
+            .into_iter()
             .enumerate()
             .map(|(i, (depth, (from, to, ramp_s, heading_deg)))| Case {
                 end_speed_mps: to,

@@ -5,7 +5,7 @@ use super::measurement::rolling_direction;
 use super::series::Series;
 use crate::effects::{self, Body, Effect, MAX_COEFFICIENTS, Memory, Shape};
 use crate::frame::{GRAVITY, Vec3};
-use crate::trials::{Manifest, Method};
+use crate::trials::Manifest;
 
 /// Half the distance over which the prediction is differentiated for a delay [s]: further than noise that stands in both
 /// the gap and the prediction reaches, which would pass for a delay.
@@ -65,16 +65,6 @@ pub(super) fn unavailable(
     }
 }
 
-/// True where the wrench of the trials was computed by a resolved flow.
-pub(super) fn is_computed(manifest: &Manifest) -> bool {
-    manifest.measured.method == Some(Method::Cfd)
-}
-
-/// True where the wrench of the trials rests on inertia and drive.
-pub(super) fn is_inferred(manifest: &Manifest) -> bool {
-    manifest.measured.method == Some(Method::InverseDynamics)
-}
-
 /// Shapes among which an effect's is first looked for.
 pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<Shape> {
     match effect {
@@ -85,7 +75,7 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
             let mut shapes = Vec::new();
             for tau in [1.0, 2.5, 6.0, 15.0] {
                 let of = |frequency: f64, form: f64| [tau * period, frequency / period, form];
-                shapes.extend([of(0.0, 0.0), of(1.0, 0.0), of(2.0, 0.0)]);
+                shapes.extend([of(0.0, 0.0), of(0.5, 0.0), of(1.0, 0.0), of(2.0, 0.0)]);
                 shapes.extend([of(0.5, 1.0), of(1.0, 1.0), of(2.0, 1.0)]);
             }
             shapes

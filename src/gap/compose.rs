@@ -11,7 +11,7 @@ use super::detect::{self, Excitation};
 use super::effects_file::remarks;
 use super::experiment::separating;
 use super::fit::{Fit, Parameter, fit};
-use super::holdout::{closures, explained, worse};
+use super::holdout::{as_naming_saw_it, closures, explained, worse};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
@@ -58,7 +58,8 @@ pub(super) fn compose(
     let closures_of = |named: &[Named]| closures(named, all, &held, setting, &held_floors, config);
     let mut held_out = closures_of(&named);
     let is_fault = found.members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
-    let disproof = held_out.get("all").and_then(|all| all.disproof(config.coverage, is_fault));
+    let seen = held_out.get("all").map(|closure| as_naming_saw_it(*closure, &named, all, &held, judge));
+    let disproof = seen.and_then(|closure| closure.disproof(config.coverage, is_fault));
     // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows; a fault is
     // exact or is none
     let disproof =
@@ -190,7 +191,9 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
                 Parameter { value, std, unit: spec.unit, interval, literature: spec.literature },
             );
         }
-        for (axis, &(name, unit)) in one.effect.shape_names().iter().enumerate() {
+        // one that is 0 has no place in the law that was found, such as a frequency in a memory that only fades
+        let shape = one.effect.shape_names().iter().enumerate().filter(|(axis, _)| one.shape[*axis] != 0.0);
+        for (axis, &(name, unit)) in shape {
             let (value, std) = (one.shape[axis], fitted.shape_std[index][axis]);
             let interval = [value - 1.645 * std, value + 1.645 * std];
             parameters.insert(name, Parameter { value, std, unit, interval, literature: None });

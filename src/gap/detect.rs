@@ -202,7 +202,9 @@ fn signal(
             let weight = design.noise.bin[component].powi(-2);
             for run in series.runs.iter().filter(|run| run.len() >= 6) {
                 let values = &values[run.clone()];
-                noise += weight * white_variance(values) * values.len() as f64;
+                if !setting.computed {
+                    noise += weight * white_variance(values) * values.len() as f64;
+                }
                 total += weight * values.iter().map(|v| v * v).sum::<f64>();
                 by_trial[trial] += weight * mean_square(&smooth[run.clone()]);
             }

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::candidates::{Setting, columns};
+use super::candidates::{Column, Setting, columns};
+use super::design::{Rows, to_rows};
 use super::features::{Features, of_bins};
+use super::judge::Judge;
 use super::locate::{Limits, OPEN, Region, inside};
 use super::noise::Floor;
+use super::rates::mean_square;
 use super::series::Series;
 use super::statistics::quantile;
 use super::{Config, Named};
@@ -16,6 +19,9 @@ use crate::trials::WRENCH;
 
 /// Fewest trials over which a bootstrap says how far a closure may be off.
 pub(super) const ENOUGH: usize = 3;
+/// Floors that a gap must have before a share of what stands above is said: a floor is no better known, and a closure of
+/// hundreds of per cent tells nobody anything.
+const ABOVE: f64 = 1.1;
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
@@ -28,7 +34,7 @@ pub struct Closure {
     pub after: f64,
     /// What noise alone would show.
     pub noise_floor: f64,
-    /// `(before - after) / (before - noise_floor)`; none where before is not above the floor.
+    /// `(before - after) / (before - noise_floor)`; none where before is not a tenth above the floor.
     pub closure: Option<f64>,
     /// 90 % interval of the closure, by a bootstrap over the trials kept back; none of fewer than three.
     pub interval: Option<[f64; 2]>,
@@ -127,7 +133,7 @@ pub(super) fn closures(
             (rms(&|s, c| s.before[c]), rms(&|s, c| s.after[c]))
         };
         let share = |(before, after): (f64, f64)| {
-            (before > 1.02 * floor).then(|| (before - after) / (before - floor))
+            (before > ABOVE * floor).then(|| (before - after) / (before - floor))
         };
         let (before, after) = sizes(&sums);
         let mut found: Vec<f64> = draws.iter().filter_map(|draw| share(sizes(draw))).collect();
@@ -143,6 +149,33 @@ pub(super) fn closures(
     let floor = (squares / setting.components.len().max(1) as f64).sqrt();
     closures.insert("all", closure(&setting.components, floor, false));
     closures
+}
+
+/// A closure with the sizes of the gap as naming saw it, where the model states how far it may be off: without the share that its
+/// own error, a load that stays and one that goes with the square of the speed, has in each trial. What was named is held to
+/// nothing that its naming did not look at.
+pub(super) fn as_naming_saw_it(
+    closure: Closure,
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    judge: &Judge,
+) -> Closure {
+    let (noise, setting) = (&judge.design.noise, judge.setting);
+    if !held.iter().any(|&trial| noise.model[trial].iter().any(|std| *std > 0.0)) {
+        return closure;
+    }
+    let components = &setting.components;
+    let rows = Rows::new(all, held, components, judge.config.block_s);
+    let of = |value: &dyn Fn(usize) -> Column| {
+        mean_square(&to_rows(all, &rows, held, components, noise, value)).sqrt()
+    };
+    let after = |trial: usize| {
+        let added = explained(named, &all[trial], trial, setting);
+        let less = |(gap, added): (&[f64; 6], &[f64; 6])| std::array::from_fn(|c| gap[c] - added[c]);
+        all[trial].gap.iter().zip(&added).map(less).collect()
+    };
+    Closure { before: of(&|trial| all[trial].gap.clone()), after: of(&after), ..closure }
 }
 
 impl std::fmt::Display for Worse {

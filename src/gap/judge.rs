@@ -474,7 +474,7 @@ impl<'a> Judge<'a> {
         beta: &[f64],
         residual: &DVector<f64>,
     ) -> Option<usize> {
-        if own.len() < 2 || lives_on_a_rate(effect) {
+        if self.setting.computed || own.len() < 2 || lives_on_a_rate(effect) {
             return None;
         }
         let outlasts = |i: usize| {
@@ -486,7 +486,11 @@ impl<'a> Judge<'a> {
         (0..own.len()).find(|&i| !outlasts(i))
     }
 
+    /// False for what agrees with the gap no better than the noise of the motion would; that of a computed flow has none.
     fn outlasts_noise(&self, set: &[Member], member: &Member) -> Option<bool> {
+        if self.setting.computed {
+            return Some(true);
+        }
         let (design, base) = (self.design, self.columns(set));
         let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
         let all: Vec<usize> = base.iter().chain(&own).copied().collect();

@@ -12,7 +12,7 @@ use super::GapError;
 use super::rates::mean_step;
 use crate::frame::{GRAVITY, Vec3};
 use crate::signal::interpolate;
-use crate::trials::{Method, Trial, Trials, component_of};
+use crate::trials::{Manifest, Method, Trial, Trials, component_of};
 
 /// Speed below which rolling resistance fades out [m/s].
 const ROLLING_SPEED: f64 = 0.05;
@@ -69,6 +69,16 @@ pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<M
 /// Which way wheels roll: the sign of the speed ahead [m/s], 0 at rest.
 pub(super) fn rolling_direction(speed: f64) -> f64 {
     speed / speed.hypot(ROLLING_SPEED)
+}
+
+/// True where the wrench of the trials was computed by a resolved flow.
+pub(super) fn is_computed(manifest: &Manifest) -> bool {
+    manifest.measured.method == Some(Method::Cfd)
+}
+
+/// True where the wrench of the trials rests on inertia and drive.
+pub(super) fn is_inferred(manifest: &Manifest) -> bool {
+    manifest.measured.method == Some(Method::InverseDynamics)
 }
 
 /// True where the wrench is inferred from the trial's own motion; false where it was measured, or comes inferred.

@@ -2,7 +2,7 @@
 
 use super::Named;
 use super::candidates::Setting;
-use super::design::Design;
+use super::design::{Candidate, Design};
 use super::holdout::explained;
 use super::judge::Member;
 use super::series::Series;
@@ -58,14 +58,13 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
                 .flat_map(|(_, member)| member.columns.iter().map(|(column, _)| *column))
                 .collect();
             let member = &members[index];
-            match design.candidates[member.candidate].effect {
+            let effect = design.candidates[member.candidate].effect;
+            match effect {
                 Effect::Current | Effect::SensorDelay => iterate(design, all, setting, member, &others),
                 Effect::HullFlooding
                 | Effect::WaterEntrySlamming
                 | Effect::Squat
-                | Effect::ChannelBlockage => {
-                    search(design, all, setting, member, &others, &[0]);
-                }
+                | Effect::ChannelBlockage => search(design, all, setting, member, &others, &[0]),
                 Effect::WaveMemory => search(design, all, setting, member, &others, &[0, 1]),
                 _ => {}
             }
@@ -137,7 +136,8 @@ pub(super) fn is_too_short(effect: Effect, shape: &Shape, setting: &Setting) -> 
     effect == Effect::WaveMemory && shape[0] < SHORTEST_STEP * shortest_memory(setting)
 }
 
-/// Coordinate search over the nonlinear parameters of a member, by factors that shrink.
+/// Coordinate search over the nonlinear parameters of a member, from its own shape and the best of the others that its effect
+/// is looked for in: two numbers of a memory go together, and a search along one and the other stops on the way.
 fn search(
     design: &mut Design,
     all: &[Series],
@@ -146,13 +146,30 @@ fn search(
     others: &[usize],
     axes: &[usize],
 ) {
-    const TRIES: usize = 8;
+    /// Shapes from which two numbers are looked for.
+    const STARTS: usize = 3;
     let coefficients: Vec<usize> = member.columns.iter().map(|(_, coefficient)| *coefficient).collect();
+    let Candidate { effect, shape: own, .. } = design.candidates[member.candidate];
     let loss = |shape: &Shape| design.loss_with(all, setting, member.candidate, shape, &coefficients, others);
-    let effect = design.candidates[member.candidate].effect;
+    let mut starts = vec![own];
+    if axes.len() > 1 {
+        let alike = |candidate: &&Candidate| candidate.effect == effect && candidate.shape != own;
+        let forms = design.candidates.iter().filter(alike);
+        let mut forms: Vec<(f64, Shape)> = forms.map(|form| (loss(&form.shape), form.shape)).collect();
+        forms.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.extend(forms.into_iter().map(|(_, shape)| shape).take(STARTS));
+    }
     let shortest = if effect == Effect::WaveMemory { shortest_memory(setting) } else { 0.0 };
-    let mut shape = design.candidates[member.candidate].shape;
-    let mut best = loss(&shape);
+    let found = starts.into_iter().map(|start| descend(start, axes, shortest, &loss));
+    if let Some((_, shape)) = found.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        design.reshape(all, setting, member.candidate, shape);
+    }
+}
+
+/// Goes down along one number after the other by factors that shrink; the first of them not below `shortest`.
+fn descend(start: Shape, axes: &[usize], shortest: f64, loss: &dyn Fn(&Shape) -> f64) -> (f64, Shape) {
+    const TRIES: usize = 8;
+    let (mut best, mut shape) = (loss(&start), start);
     for step in [1.5, 1.15, 1.05, SHORTEST_STEP] {
         for &axis in axes {
             for factor in [step, 1.0 / step] {
@@ -172,5 +189,5 @@ fn search(
             }
         }
     }
-    design.reshape(all, setting, member.candidate, shape);
+    (best, shape)
 }

@@ -38,6 +38,13 @@ impl Coherence {
         self.signal * self.count > LEAST_SIGNAL * self.power
     }
 
+    /// Of a motion without noise.
+    pub fn exact(values: impl ExactSizeIterator<Item = f64>) -> Self {
+        let count = values.len() as f64;
+        let power = values.map(|value| value * value).sum::<f64>();
+        Self { power, covariance: power, signal: power / count.max(1.0), count }
+    }
+
     /// Of the samples of a trial, in pieces without a hole.
     pub fn of(t: &[f64], pieces: &[Range<usize>], value: impl Fn(usize) -> f64) -> Self {
         let values: Vec<f64> = (0..t.len()).map(value).collect();

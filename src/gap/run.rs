@@ -2,16 +2,18 @@
 
 use super::base_drag::BaseDrag;
 use super::calibrate::calibrate;
-use super::candidates::{Setting, is_computed, is_inferred, shapes, unavailable};
+use super::candidates::{Setting, shapes, unavailable};
 use super::compose::compose;
 use super::design::{Design, Rows};
 use super::general::General;
 use super::judge::Judge;
+use super::measurement::{is_computed, is_inferred};
 use super::noise::{floors, row_noise};
 use super::nonlinear::{refine, settle, through_sensors};
 use super::plausible;
 use super::report::Report;
 use super::series::{Series, one_clock, series};
+use super::smoothing::Smoothing;
 use super::split::hold_out;
 use super::statistics::median;
 use super::verdict::{Found, floor_loss};
@@ -80,7 +82,7 @@ pub fn run(
         let (blocks, block_s, folds) = (rows.blocks, config.block_s, config.folds);
         return Err(GapError::TooShort { blocks, block_s, folds });
     }
-    let smoothing = calibrate(&mut all);
+    let smoothing = if setting.computed { Smoothing::default() } else { calibrate(&mut all) };
     let noise = row_noise(&all, &naming, &setting.components, (&floors, &trials.manifest), smoothing);
     let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
     settle(&mut design, &all, &setting);

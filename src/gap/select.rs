@@ -136,7 +136,9 @@ impl Judge<'_> {
         /// gain of the drive and one of the water for the product of mass and acceleration, is free of that noise.
         const NOISE: f64 = 0.1;
         let now = self.set_score(set);
-        let on_rates = set.iter().any(|member| lives_on_a_rate(self.effect(member)));
+        // the motion of a computed flow is prescribed, and has no noise
+        let on_rates =
+            !self.setting.computed && set.iter().any(|member| lives_on_a_rate(self.effect(member)));
         let explained = (self.design.empty_loss() - now).max(0.0);
         let kept = if on_rates { NOISE * explained } else { 1e-6 * now.abs() };
         let pair = self.best_pair(&[], library);

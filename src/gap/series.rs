@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::measurement::{Measurement, Motion, measurement, of_columns};
+use super::measurement::{Measurement, Motion, is_computed, measurement, of_columns};
 use super::rates::{Coherence, mean_step, rates, smooth_rates, wetting_rate};
 use super::{Config, GapError, Predicted};
 use crate::condition::Condition;
@@ -204,16 +204,23 @@ fn of_trial(
         conditions.push(condition);
     }
     let pieces = pieces(&trial.t);
+    // the motion of a computed flow is prescribed: what changes within a sample is no noise
+    let exact = is_computed(&trials.manifest);
     // before anything is smoothed, or noise would hang together as well
     let mut coherence = [Coherence::default(); 10];
     for axis in 0..3 {
-        let of = |value: &dyn Fn(usize) -> f64| Coherence::of(&trial.t, &pieces, value);
+        let of = |value: &dyn Fn(usize) -> f64| match exact {
+            true => Coherence::exact((0..count).map(value)),
+            false => Coherence::of(&trial.t, &pieces, value),
+        };
         coherence[axis] = of(&|i| rates(&conditions[i])[axis]);
         coherence[axis + 3] = of(&|i| rates(&conditions[i])[axis + 3]);
         coherence[axis + 7] = of(&|i| conditions[i].angular_velocity[axis]);
     }
     let recorded_rates = conditions.iter().map(rates).collect();
-    smooth_rates(&trial.t, &pieces, &mut conditions);
+    if !exact {
+        smooth_rates(&trial.t, &pieces, &mut conditions);
+    }
     let wetting_rate = wetting_rate(&trial.t, &pieces, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, &pieces, |i| wetting_rate[i]);
     let known = of_columns(&trial.known_loads, count);

@@ -159,19 +159,33 @@ const UNEXCITING: [(Plan, &[Effect]); 3] = [
 ];
 
 /// Effects that no measured component or nothing else in a set mimics, for sets.
-const SETTABLE: [Effect; 12] = [
+const SETTABLE: [Effect; 16] = [
     Effect::AddedMass,
+    Effect::LinearDamping,
     Effect::DragCoefficientError,
     Effect::Rotation,
     Effect::Current,
     Effect::WaterLevelOffset,
     Effect::HullFlooding,
+    Effect::WaterEntrySlamming,
     Effect::WaveMemory,
+    Effect::Squat,
     Effect::WheelPaddleThrust,
     Effect::SensorDelay,
+    Effect::SensorBias,
     Effect::SensorBiasStep,
     Effect::SensorDrift,
     Effect::AxisMisalignment,
+];
+
+/// Effects that act in every region of the gated cases.
+const GATED: [Effect; 6] = [
+    Effect::DragCoefficientError,
+    Effect::LinearDamping,
+    Effect::SensorBias,
+    Effect::Rotation,
+    Effect::Current,
+    Effect::WaterLevelOffset,
 ];
 
 /// Cases of some families, `count` of each, but for timing, of which there is one.
@@ -231,9 +245,8 @@ fn case(family: Family, index: usize, random: &mut Random) -> Case {
         }
         Family::Confounded => confound(&mut case, index, random),
         Family::Gated => {
-            let effects = [Effect::DragCoefficientError, Effect::LinearDamping, Effect::SensorBias];
-            case.hidden = vec![Hidden::draw(effects[index % 3], random)];
-            case.gate = Some(match index / 3 % 3 {
+            case.hidden = vec![Hidden::draw(GATED[index % GATED.len()], random)];
+            case.gate = Some(match index / GATED.len() % 3 {
                 0 => Region::above(Feature::Depth, 0.15),
                 1 => Region::above(Feature::Froude, 0.8),
                 _ => Region::above(Feature::Speed, 0.4).and_below(Feature::Depth, 0.15),
