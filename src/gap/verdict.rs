@@ -123,10 +123,14 @@ impl Found {
     }
 }
 
-/// True where much of what lasts of the gap is still there after the named effects.
+/// True where much of what lasts of the gap is still there after the named effects, beyond what the zeros of the trials leave: a
+/// zero of a stated deviation is one square in the rows of a trial, as each of their noises is, and it lasts.
 fn leaves_much(design: &Design, residual: &DVector<f64>) -> bool {
     let (before, after) = (lasting(design, &design.y), lasting(design, residual));
-    f64::min(before.most.deviate, after.most.deviate) > LASTS && after.energy > MUCH * before.energy
+    let zeros = design.trials.iter().flat_map(|&trial| design.noise.offset[trial]);
+    let of_zeros = zeros.filter(|zero| *zero > 0.0).count() as f64;
+    f64::min(before.most.deviate, after.most.deviate) > LASTS
+        && after.energy - of_zeros > MUCH * before.energy
 }
 
 /// Predictable from the state, or lasting in a trial, and large enough to matter.
