@@ -173,8 +173,16 @@ fn change(folder: &Path, from: &str, to: &str) {
 #[test]
 fn a_damaged_file_refuses_the_bundle_and_names_the_field() {
     for (from, to, expected) in [
-        ("format = 1", "format = 2", "newer"),
-        ("format = 1", "format = 1\ncolour = 3", "colour"),
+        ("format = 2", "format = 3", "newer"),
+        ("format = 2", "format = 2\ncolour = 3", "colour"),
+        ("covariance = [[0.00005", "covariance = [[0.5", "between added_mass and linear_damping"),
+        ("covariance = [[0.00005", "covariance = [[nan", "between added_mass and linear_damping"),
+        ("covariance = [[0.00005, ", "covariance = [[", "a row each coefficient"),
+        (
+            "effects = [\"added_mass\", \"linear_damping\"]",
+            "effects = [\"added_mass\", \"added_mass\"]",
+            "of two effects of the file",
+        ),
         ("vehicle = \"husky\"", "vehicle = \"warthog\"", "vehicle = \"warthog\""),
         ("name = \"added_mass\"", "name = \"antigravity\"", "antigravity"),
         ("name = \"added_mass\"", "name = \"sensor_bias\"", "measuring chain"),

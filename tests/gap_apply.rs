@@ -89,13 +89,17 @@ fn gaussian(random: &mut Random) -> f64 {
 /// Trials of the Warthog that speed up and slow down straight ahead in three depths: the model's force, the planted
 /// effect by a formula of its own, and noise.
 fn write_trials(folder: &Path, surge: f64) {
-    write_trials_of(folder, surge, |_| true);
+    write_trials_of(folder, surge, |_| true, None);
 }
 
-/// The same, of which only some change their speed.
-fn write_trials_of(folder: &Path, surge: f64, changes_speed: impl Fn(u32) -> bool) {
+/// The same, of which only some change their speed; with a control, the same flow without the effect, both so many newtons off
+/// along x from what the model says.
+fn write_trials_of(folder: &Path, surge: f64, changes_speed: impl Fn(u32) -> bool, control: Option<f64>) {
     std::fs::create_dir_all(folder).expect("made");
-    let manifest = "vehicle = \"warthog\"\ngenerated = \"for a test\"\n[sensor_noise]\nfx = 8.0\nfz = 8.0\n";
+    let sim_is = if control.is_some() { "[measured]\nsim_is = \"control\"\n" } else { "" };
+    let manifest = format!(
+        "vehicle = \"warthog\"\ngenerated = \"for a test\"\n{sim_is}[sensor_noise]\nfx = 8.0\nfz = 8.0\n"
+    );
     std::fs::write(folder.join("trials.toml"), manifest).expect("written");
     let model = common::model("warthog");
     let vehicle = model.vehicle();
@@ -107,16 +111,20 @@ fn write_trials_of(folder: &Path, surge: f64, changes_speed: impl Fn(u32) -> boo
         let swing = f64::from(u8::from(changes_speed(trial)));
         let plane = Condition::level(Vec3::zeros(), depth).water_plane(vehicle.z0);
         let volume = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &Vec3::zeros()).displaced_volume;
-        let mut text = String::from("t,vx,vy,vz,wx,wy,wz,depth,ax,ay,az,fx,fz\n");
+        let mut text = String::from("t,vx,vy,vz,wx,wy,wz,depth,ax,ay,az,fx,fz");
+        text.push_str(if control.is_some() { ",sim_fx,sim_fz\n" } else { "\n" });
         for sample in 0..400 {
             let t = 0.02 * f64::from(sample);
             let v = 0.5 * top * (1.0 - swing * (rate * t).cos());
             let a = 0.5 * top * swing * rate * (rate * t).sin();
             let state = Condition::level(Vec3::new(v, 0.0, 0.0), depth);
             model.evaluate(&state, &mut workspace, &mut forces);
-            let fx = forces.wrench.force.x - surge * 1000.0 * volume * a + NOISE * gaussian(&mut random);
-            let fz = forces.wrench.force.z + NOISE * gaussian(&mut random);
-            writeln!(text, "{t},{v},0,0,0,0,0,{depth},{a},0,0,{fx},{fz}").expect("a string");
+            let (sim_fx, sim_fz) = (forces.wrench.force.x + control.unwrap_or(0.0), forces.wrench.force.z);
+            let fx = sim_fx - surge * 1000.0 * volume * a + NOISE * gaussian(&mut random);
+            let fz = sim_fz + NOISE * gaussian(&mut random);
+            write!(text, "{t},{v},0,0,0,0,0,{depth},{a},0,0,{fx},{fz}").expect("a string");
+            let simulated = control.map_or_else(String::new, |_| format!(",{sim_fx},{sim_fz}"));
+            writeln!(text, "{simulated}").expect("a string");
         }
         std::fs::write(folder.join(format!("run{trial:02}.csv")), text).expect("written");
     }
@@ -173,7 +181,7 @@ fn what_is_named_is_added_and_taken_back() {
 #[test]
 fn what_one_condition_shows_is_added_where_that_is_asked_for() {
     let place = Place::new();
-    write_trials_of(&place.path("trials"), SURGE, |trial| [3, 7].contains(&trial));
+    write_trials_of(&place.path("trials"), SURGE, |trial| [3, 7].contains(&trial), None);
     let bundle = place.bundle();
     let refused = place.gap("trials", &[]);
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
@@ -188,6 +196,36 @@ fn what_one_condition_shows_is_added_where_that_is_asked_for() {
     assert_eq!(place.query()["effects"][0]["name"], "added_mass");
     let file = std::fs::read_to_string(place.path("gap/effects.toml")).expect("written");
     assert!(file.contains("provisional = true"), "{file}");
+}
+
+#[test]
+fn what_differs_from_a_control_is_added_and_what_another_simulator_lacks_is_not() {
+    let place = Place::new();
+    write_trials_of(&place.path("trials"), SURGE, |_| true, Some(150.0));
+    let bundle = place.bundle();
+    let manifest = place.path("trials").join("trials.toml");
+    let text = std::fs::read_to_string(&manifest).expect("written");
+    std::fs::write(&manifest, text.replace("sim_is = \"control\"", "")).expect("written");
+    let output = place.gap("trials", &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("another simulator's"), "{said}");
+    assert_eq!(place.bundle(), bundle);
+
+    std::fs::write(&manifest, &text).expect("written");
+    let output = place.gap("trials", &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("are a control"), "{said}");
+    let answer = place.query();
+    assert_eq!(answer["effects"][0]["name"], "added_mass", "{answer:#}");
+
+    // a control that is not there
+    write_trials(&place.path("alone"), SURGE);
+    std::fs::write(place.path("alone").join("trials.toml"), &text).expect("written");
+    let bundle = place.bundle();
+    let output = place.gap("alone", &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && said.contains("measured.sim_is"), "{said}");
+    assert_eq!(place.bundle(), bundle);
 }
 
 #[test]

@@ -385,6 +385,61 @@ fn a_computed_wrench_has_no_fault_of_a_sensor_and_what_lies_above_the_model_s_er
     assert!(bias.why.contains("computed"), "{}", bias.why);
 }
 
+/// Ramps of the speed at three depths as a solver's means of a tenth of a second hold them: the motion is exact, and the
+/// acceleration comes and goes from one row to the next. Load: an added mass of 0.3 and a memory of 0.4 over 0.7 s, a ramp's in
+/// closed form, `z = a T (1 - exp(-t / T))`.
+fn computed_ramps() -> Trials {
+    const TIME_CONSTANT: f64 = 0.7;
+    let motion = |index: usize| -> Vec<(State, [f64; 6])> {
+        let depth = [0.1, 0.2, 0.25][index % 3];
+        let (length, to) = ([0.5, 1.0, 2.0][index / 3 % 3], [0.5, 1.0][index / 9]);
+        let rate = to / length;
+        let mass = planted::RHO * planted::VOLUME / planted::DRAFT * depth;
+        let at = |row: usize| {
+            let t = 0.1 * row as f64 + 0.05;
+            let since = t - 0.5;
+            let within = since.clamp(0.0, length);
+            let pushed = (0.0..length).contains(&since);
+            let grown = rate * TIME_CONSTANT * (1.0 - (-within / TIME_CONSTANT).exp());
+            let memory = grown * (-(since - within).max(0.0) / TIME_CONSTANT).exp();
+            let acceleration = if pushed { rate } else { 0.0 };
+            let force = -mass * (0.3 * acceleration + 0.4 * (9.81 / planted::LENGTH).sqrt() * memory);
+            let state = State {
+                t,
+                v: Vec3::new(rate * within, 0.0, 0.0),
+                w: Vec3::zeros(),
+                a: Vec3::new(acceleration, 0.0, 0.0),
+                al: Vec3::zeros(),
+                depth,
+                depth_rate: 0.0,
+                yaw: 0.0,
+            };
+            // at the center of buoyancy
+            (state, [force, 0.0, 0.0, 0.0, (0.5 * depth - 0.1) * force, 0.0])
+        };
+        (0..45).map(at).collect()
+    };
+    let (motions, loads): (Vec<_>, Vec<_>) = (0..18).map(|index| motion(index).into_iter().unzip()).unzip();
+    let noise = Noise { velocity: 0.0, depth: 0.0, acceleration: 0.0, ..Noise::white([0.3; 6]) };
+    let mut trials = trials(&motions, &loads, &noise, 31);
+    trials.manifest.measured.method = Some(Method::Cfd);
+    trials
+}
+
+#[test]
+fn the_step_and_the_memory_of_a_computed_ramp_are_told_apart_since_its_motion_is_exact() {
+    let report = run(&computed_ramps());
+    assert_eq!(names(&report), ["added_mass", "wave_memory"], "{} {:?}", report.summary, report.rejected);
+    for (effect, name, truth) in [(0, "surge", 0.3), (1, "surge", 0.4), (1, "time_constant", 0.7)] {
+        let value = report.effects[effect].parameters[name].value;
+        assert!((value / truth - 1.0).abs() < 0.1, "{name}: {value}, planted {truth}");
+    }
+    // a memory that only fades has no frequency to state
+    assert!(!report.effects[1].parameters.contains_key("frequency"));
+    let closure = report.gap.held_out["all"].closure.expect("a gap");
+    assert!(closure > 0.9, "{closure}");
+}
+
 #[test]
 fn an_effect_whose_fitted_shape_makes_it_impossible_is_not_named() {
     // more water than the hull displaces: through the openings that are looked at first less of it would do

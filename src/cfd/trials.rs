@@ -22,7 +22,7 @@ use crate::effects;
 use crate::frame::{GRAVITY, Vec3};
 use crate::train::TrainError;
 use crate::train::label::{labels, order};
-use crate::trials::{Columns, Manifest, Measured, Method, SIMULATED, WHEELS, WRENCH};
+use crate::trials::{Columns, Manifest, Measured, Method, SIMULATED, SimIs, WHEELS, WRENCH};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
@@ -132,6 +132,8 @@ pub fn trials(
         measured: Measured {
             columns: Some(FORCES.map(str::to_owned).into()),
             method: Some(Method::Cfd),
+            // the parked flow is what the vehicle's model learnt
+            sim_is: if pairs.is_some() { SimIs::Control } else { SimIs::Simulator },
             ..Measured::default()
         },
         sensor_noise: noise.of_a_section(),

@@ -13,7 +13,7 @@ use wade::forces::Forces;
 use wade::frame::Vec3;
 use wade::gap::{self, Config, GapError, NotApplicable, Predicted, Report, effects_file};
 use wade::model::{Model, Workspace};
-use wade::trials::Trials;
+use wade::trials::{SimIs, Trials};
 
 use super::gap_bench::GapBench;
 use super::running::Running;
@@ -58,7 +58,8 @@ const SETTINGS: &str =
 OUT holds report.json and index.html, with --apply effects.toml too: the physical effects with their standard errors and the
 ranges in which they were seen. Faults of sensors and drive are never in it. --apply writes it into the bundle as the next
 version, in the place of effects from before, and keeps the version before it; only a verdict of `named` is applied. The gap of
-another simulator (sim_ columns) is not the bundle's, so effects.toml is all that is written of it.
+another simulator (sim_ columns) is not the bundle's, so effects.toml is all that is written of it; that of a control, the same
+trial without what is looked for, is no simulator's, and is applied.
 
 Trials: a folder of CSV files, one a trial, in SI units and body axes (forward, left, up), and trials.toml.
   t vx vy vz wx wy wz depth                needed: time, velocity over ground, angular velocity, water over the ground
@@ -74,6 +75,7 @@ Trials: a folder of CSV files, one a trial, in SI units and body axes (forward, 
   method = \"load_cell\"                   inverse_dynamics, cfd
   columns = [\"fx\"]                       repeats = [[\"run01\", \"run07\"]]   dry_twins = {{ run03 = \"dry03\" }}
   other_forces = [\"drive_fx\"]            columns of known forces, for inverse_dynamics
+  sim_is = \"control\"                     the sim_ columns are the same trial without what is looked for [default: simulator]
   known_loads = [\"hung_fz\"]              columns of loads that the cell bears besides the water's, such as known weights
   [sensor_noise]  [trial_offset]           standard deviation of a sample and of the zero from run to run: fx = 4.0
   [trial_offsets.run07]                    the same of a run whose zero wanders more or less than that of the others
@@ -216,7 +218,7 @@ impl Source {
             Err(_) => trials.remarks().iter().for_each(|remark| eprintln!("{remark}")),
         }
         let mut report = report.with_context(|| folder.display().to_string())?;
-        report.sources.model = if is_simulated(&trials) {
+        report.sources.model = if is_anothers(&trials) || !bundle.is_dir() {
             "the sim_ columns of the trials".into()
         } else {
             bundle_hash(&bundle)?
@@ -270,7 +272,7 @@ impl Source {
         let page = report.page()?;
         let effects = apply.map(|apply| effects_file(&report, &trials, apply.provisional));
         let bundle = self.vehicles.bundle(&report.vehicle);
-        let bundle = Some(bundle).filter(|bundle| bundle.is_dir() && !is_simulated(&trials));
+        let bundle = Some(bundle).filter(|bundle| bundle.is_dir() && !is_anothers(&trials));
         if let (Some(Ok(effects)), Some(bundle), Some(apply)) = (&effects, &bundle, apply) {
             check_loss(effects, bundle, apply.replace)?;
         }
@@ -312,8 +314,10 @@ impl Source {
     }
 }
 
-fn is_simulated(trials: &Trials) -> bool {
-    trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some))
+/// True where the gap is another simulator's, and what explains it has no place in a bundle.
+fn is_anothers(trials: &Trials) -> bool {
+    let simulated = trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some));
+    simulated && trials.manifest.measured.sim_is == SimIs::Simulator
 }
 
 /// Effects that other trials gave must not go unnoticed because these trials do not show them.

@@ -11,8 +11,9 @@ use super::library::{Effect, Kind, MAX_COEFFICIENTS, Shape};
 use super::validity::Validity;
 use crate::frame::Vec3;
 
-/// Version of the file's format that this program writes, and the newest that it reads.
-pub const FORMAT: u32 = 1;
+/// Newest version of the file's format that this program reads. What no older program would read is written in it, and everything
+/// else as version 1.
+pub const FORMAT: u32 = 2;
 
 /// The whole file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,6 +29,19 @@ pub struct EffectsFile {
     /// The effects; at least one, each once.
     #[serde(rename = "effect")]
     pub effects: Vec<ActiveEffect>,
+    /// Covariances between effects that were fitted together; since format 2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    between: Vec<Between>,
+}
+
+/// Covariance between the coefficients of two effects.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Between {
+    /// The two.
+    pub effects: [Effect; 2],
+    /// A row each coefficient of the first, in it a number each coefficient of the second, in the product of their units.
+    pub covariance: Vec<Vec<f64>>,
 }
 
 /// What a fit rests on.
@@ -154,7 +168,18 @@ pub enum EffectsFileError {
 impl EffectsFile {
     /// A file of this program's format.
     pub fn new(vehicle: String, evidence: Evidence, validity: Validity, effects: Vec<ActiveEffect>) -> Self {
-        Self { format: FORMAT, vehicle, evidence, validity, effects }
+        Self { format: 1, vehicle, evidence, validity, effects, between: Vec::new() }
+    }
+
+    /// The same with the covariances between its effects.
+    pub fn with_between(self, between: Vec<Between>) -> Self {
+        let format = if between.is_empty() { self.format } else { FORMAT };
+        Self { format, between, ..self }
+    }
+
+    /// Covariances between effects that were fitted together.
+    pub fn between(&self) -> &[Between] {
+        &self.between
     }
 
     /// Reads the file of a vehicle and checks everything in it.
@@ -192,7 +217,32 @@ impl EffectsFile {
             }
             effect.check()?;
         }
-        Ok(())
+        self.between.iter().try_for_each(|between| self.check_between(between))
+    }
+
+    /// Both effects are there, a number each pair of their coefficients, none larger than the two allow.
+    fn check_between(&self, between: &Between) -> Result<(), EffectsFileError> {
+        let [first, second] = between.effects;
+        let of = |name: Effect| self.effects.iter().find(|effect| effect.name == name);
+        let sound = match (of(first), of(second)) {
+            (Some(a), Some(b)) if first != second => {
+                let possible = |i: usize, j: usize, value: f64| {
+                    value * value <= (1.0 + 1e-6) * a.covariance[i][i] * b.covariance[j][j]
+                };
+                between.covariance.len() == a.coefficients.len()
+                    && between.covariance.iter().enumerate().all(|(i, row)| {
+                        let mut each = row.iter().enumerate();
+                        row.len() == b.coefficients.len() && each.all(|(j, value)| possible(i, j, *value))
+                    })
+            }
+            _ => false,
+        };
+        if sound {
+            return Ok(());
+        }
+        let (effect, field) = (first.name(), format!("between {} and {}", first.name(), second.name()));
+        let expected = "of two effects of the file, a row each coefficient of the first, a number each of the second, none beyond what their variances allow";
+        Err(EffectsFileError::Field { effect, field, expected: expected.to_owned() })
     }
 
     /// The text of the file.

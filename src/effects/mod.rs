@@ -41,7 +41,7 @@ pub use active::{ActiveEffects, Answer, Circumstances, EffectLoad, EffectLoads, 
 pub use added_mass::{coefficients as added_mass_coefficients, matrix as added_mass_matrix};
 pub use body::{Block, Body, Panel};
 pub use channel_flow::is_choked;
-pub use file::{ActiveEffect, EffectsFile, EffectsFileError, Evidence, ParameterValue};
+pub use file::{ActiveEffect, Between, EffectsFile, EffectsFileError, Evidence, ParameterValue};
 pub use hull_flooding::level_after;
 pub use immersion::{Immersion, WetPanel};
 pub use input::{BaseDrag, Input, Memory, Part};

@@ -24,7 +24,7 @@ use super::{Named, plausible};
 use crate::condition::Condition;
 use crate::effects::{Effect, Kind};
 use crate::files::hexadecimal;
-use crate::trials::{SIMULATED, Trials, WHEELS, WRENCH};
+use crate::trials::{SIMULATED, SimIs, Trials, WHEELS, WRENCH};
 
 fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
     let mut values = fit.values.iter();
@@ -59,7 +59,8 @@ pub(super) fn compose(
     let mut held_out = closures_of(&named);
     let is_fault = found.members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
     let seen = held_out.get("all").map(|closure| as_naming_saw_it(*closure, &named, all, &held, judge));
-    let disproof = seen.and_then(|closure| closure.disproof(config.coverage, is_fault));
+    let grows = held_out.get("all").and_then(|all| all.disproof(0.0, false));
+    let disproof = seen.and_then(|closure| closure.disproof(config.coverage, is_fault)).or(grows);
     // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows; a fault is
     // exact or is none
     let disproof =
@@ -96,6 +97,11 @@ pub(super) fn compose(
         separating(&sets.map(effects).collect::<Vec<_>>())
     });
     let mut said: Vec<String> = trials.remarks().iter().map(ToString::to_string).collect();
+    if trials.manifest.measured.sim_is == SimIs::Control {
+        said.push(
+            "the sim_ columns are a control: the gap is what differs from it, not that of the vehicle's model".into(),
+        );
+    }
     said.extend(outside(all));
     if !setting.computed {
         said.extend(plausible::remarks(all, &setting.components));
@@ -172,10 +178,16 @@ fn outside(all: &[Series]) -> Option<String> {
 fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) -> Vec<NamedEffect> {
     let design = judge.design;
     let whole = judge.missing();
-    let mut first = 0;
     let mut effects = Vec::new();
+    let counts = || found.members.iter().map(|member| member.columns.len());
+    let starts: Vec<usize> = (0..found.members.len()).map(|index| counts().take(index).sum()).collect();
     for (index, (member, one)) in found.members.iter().zip(named).enumerate() {
-        let count = member.columns.len();
+        let (first, count) = (starts[index], member.columns.len());
+        let with = |other: usize| -> Vec<Vec<f64>> {
+            let (start, width) = (starts[other], found.members[other].columns.len());
+            let row = |i: usize| (0..width).map(|j| fitted.covariance[(first + i, start + j)]).collect();
+            (0..count).map(row).collect()
+        };
         let others: Vec<Member> =
             found.members.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, m)| m.clone()).collect();
         let without = design.solve(&judge.columns(&others)).map_or(found.loss, |(_, loss)| loss);
@@ -206,15 +218,13 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             provisional: fitted.provisional[index],
             placebo: [placebo.0, placebo.1],
             surfaces: carriers(std::slice::from_ref(one), judge.all, judge.setting, &OPEN),
-            covariance: (0..count)
-                .map(|i| (0..count).map(|j| fitted.covariance[(first + i, first + j)]).collect())
-                .collect(),
+            covariance: with(index),
+            covariance_with: (index + 1..named.len()).map(|j| (named[j].effect.name(), with(j))).collect(),
             coefficients: one.coefficients.iter().map(|&(c, _)| specs[c].name).collect(),
             effect: one.effect,
             shape: one.shape,
             base_drag: judge.setting.base_drag.of(one.effect, &one.shape).into(),
         });
-        first += count;
     }
     effects
 }

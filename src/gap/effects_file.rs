@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::holdout::Worse;
 use super::report::{NamedEffect, Report, Verdict};
-use crate::effects::{ActiveEffect, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
+use crate::effects::{ActiveEffect, Between, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
 use crate::trials::{Manifest, Trials};
 
 /// Why nothing of a report may be added to a model.
@@ -63,8 +63,19 @@ pub fn effects_file(
     if !provisional.is_empty() && !with_provisional {
         return Err(NotApplicable::Provisional { effects: provisional.join(" and ") });
     }
-    let effects = physical.into_iter().map(|effect| active(effect, trials)).collect();
-    Ok(EffectsFile::new(report.vehicle.clone(), evidence(report, trials), validity(report), effects))
+    let effects = physical.iter().map(|effect| active(effect, trials)).collect();
+    let file = EffectsFile::new(report.vehicle.clone(), evidence(report, trials), validity(report), effects);
+    Ok(file.with_between(between(&physical)))
+}
+
+/// Covariances between each two of the effects.
+fn between(physical: &[&NamedEffect]) -> Vec<Between> {
+    let pairs = physical.iter().enumerate().flat_map(|(i, a)| physical[i + 1..].iter().map(move |b| (a, b)));
+    let of = |(a, b): (&&NamedEffect, &&NamedEffect)| {
+        let covariance = a.covariance_with.get(b.name)?.clone();
+        Some(Between { effects: [a.effect, b.effect], covariance })
+    };
+    pairs.filter_map(of).collect()
 }
 
 fn evidence(report: &Report, trials: &Trials) -> Evidence {
@@ -122,6 +133,10 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         let (value, unit) = (possible(effect.effect, name, parameter.value), parameter.unit.to_owned());
         ((*name).to_owned(), ParameterValue { value, std: parameter.std, unit })
     });
+    // the report states those alone that have a place in the law
+    let nothing =
+        |(_, unit): &(&str, &str)| ParameterValue { value: 0.0, std: 0.0, unit: (*unit).to_owned() };
+    let shape = effect.effect.shape_names().iter().map(|one| (one.0.to_owned(), nothing(one)));
     ActiveEffect {
         name: effect.effect,
         equation: effect.effect.equation().to_owned(),
@@ -132,7 +147,7 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         channel_width: trials.manifest.channel_width.or_else(|| narrowest(&trials.manifest)),
         coefficients: effect.coefficients.iter().map(|name| (*name).to_owned()).collect(),
         covariance: effect.covariance.clone(),
-        parameters: parameters.collect::<BTreeMap<_, _>>(),
+        parameters: shape.chain(parameters).collect::<BTreeMap<_, _>>(),
     }
 }
 

@@ -19,9 +19,9 @@ use crate::trials::WRENCH;
 
 /// Fewest trials over which a bootstrap says how far a closure may be off.
 pub(super) const ENOUGH: usize = 3;
-/// Floors that a gap must have before a share of what stands above is said: a floor is no better known, and a closure of
-/// hundreds of per cent tells nobody anything.
-const ABOVE: f64 = 1.1;
+/// Floors that a gap must have before a share of what stands above is said, and what is left after: where much less is left the
+/// floor is none, and hundreds of per cent of what stands above it tell nobody anything.
+const FLOORS: [f64; 2] = [1.02, 0.9];
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
@@ -34,7 +34,7 @@ pub struct Closure {
     pub after: f64,
     /// What noise alone would show.
     pub noise_floor: f64,
-    /// `(before - after) / (before - noise_floor)`; none where before is not a tenth above the floor.
+    /// `(before - after) / (before - noise_floor)`; none where before is not above the floor, or after far below it.
     pub closure: Option<f64>,
     /// 90 % interval of the closure, by a bootstrap over the trials kept back; none of fewer than three.
     pub interval: Option<[f64; 2]>,
@@ -133,7 +133,8 @@ pub(super) fn closures(
             (rms(&|s, c| s.before[c]), rms(&|s, c| s.after[c]))
         };
         let share = |(before, after): (f64, f64)| {
-            (before > ABOVE * floor).then(|| (before - after) / (before - floor))
+            (before > FLOORS[0] * floor && after > FLOORS[1] * floor)
+                .then(|| (before - after) / (before - floor))
         };
         let (before, after) = sizes(&sums);
         let mut found: Vec<f64> = draws.iter().filter_map(|draw| share(sizes(draw))).collect();

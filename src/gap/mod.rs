@@ -121,6 +121,14 @@ pub enum GapError {
         /// The vehicle.
         vehicle: String,
     },
+    /// A control that is not there.
+    #[error(
+        "{trial}.csv has no sim_ column, which measured.sim_is = \"control\" of trials.toml calls a control: leave the key out, or add the columns"
+    )]
+    NoControl {
+        /// Name of the trial.
+        trial: String,
+    },
     /// No component to compare.
     #[error(
         "{trial}.csv has no measured component that is predicted: it needs one of fx, fy, fz, mx, my, mz, or method = \"inverse_dynamics\" with the columns of the other forces"

@@ -45,6 +45,8 @@ pub struct NamedEffect {
     pub surfaces: BTreeMap<String, f64>,
     /// Covariance of the coefficients in the order of `coefficients`.
     pub covariance: Vec<Vec<f64>>,
+    /// Covariance with the coefficients of the effects after it, by name: a row each own coefficient.
+    pub covariance_with: BTreeMap<&'static str, Vec<Vec<f64>>>,
     /// Names of the coefficients.
     pub coefficients: Vec<&'static str>,
     /// Which effect.

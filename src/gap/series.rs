@@ -9,7 +9,7 @@ use crate::condition::Condition;
 use crate::effects::{Body, Immersion, Input};
 use crate::frame::{GRAVITY, Vec3};
 use crate::signal::pieces;
-use crate::trials::{Trial, Trials, WRENCH};
+use crate::trials::{SimIs, Trial, Trials, WRENCH};
 use crate::wrench::Wrench;
 
 /// Nothing wades where the water is as many times as deep as its hull is high.
@@ -107,6 +107,10 @@ pub(super) fn series(
     let mut all = Vec::new();
     let mut common: Option<[bool; 6]> = None;
     let simulated = |trial: &Trial| trial.simulated.iter().any(Option::is_some);
+    let controlled = trials.manifest.measured.sim_is == SimIs::Control;
+    if let Some(trial) = used.iter().find(|trial| controlled && !simulated(trial)) {
+        return Err(GapError::NoControl { trial: trial.name.clone() });
+    }
     if let Some(trial) = used.iter().find(|trial| simulated(trial) != simulated(used[0])) {
         return Err(GapError::Predictions { trial: trial.name.clone(), other: used[0].name.clone() });
     }

@@ -48,7 +48,8 @@ fn by_excitation(signatures: &[[f64; 6]]) -> Vec<(usize, usize)> {
     order
 }
 
-/// Trials for naming and those kept back. A kind of excitation that fewer than three trials have stays with naming. Trials that
+/// Trials for naming and those kept back. A kind of excitation that fewer than three trials have stays with naming, and so do trials
+/// in states that the model did not learn, where there are enough others. Trials that
 /// repeat each other are kept back together, or what was named would be tested on what it was named by; a group that is more
 /// than what is to be kept back stays with naming.
 pub(super) fn hold_out(all: &[Series], repeats: &[Vec<String>], config: &Config) -> (Vec<usize>, Vec<usize>) {
@@ -64,8 +65,12 @@ pub(super) fn hold_out(all: &[Series], repeats: &[Vec<String>], config: &Config)
             |&other: &usize| other == trial || groups.iter().any(|group| group.contains(name(other)));
         (0..all.len()).filter(is_one).collect()
     };
+    // where the model did not learn the states, what is kept back would try the model and not what was named
+    let learnt =
+        |trial: usize| 2 * all[trial].outside.iter().filter(|outside| **outside).count() < all[trial].t.len();
+    let many_learnt = (0..all.len()).filter(|&trial| learnt(trial)).count() > wanted;
     let sizes: Vec<usize> = (0..6).map(|class| order.iter().filter(|(c, _)| *c == class).count()).collect();
-    let fits = |trial: usize| together(trial).len() <= wanted;
+    let fits = |trial: usize| together(trial).len() <= wanted && (learnt(trial) || !many_learnt);
     let free: Vec<usize> =
         order.iter().filter(|(class, i)| sizes[*class] >= 3 && fits(*i)).map(|(_, i)| *i).collect();
     let any =

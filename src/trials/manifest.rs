@@ -80,6 +80,8 @@ pub struct Measured {
     pub dry_twins: BTreeMap<String, String>,
     /// Columns of known other forces, for inverse dynamics.
     pub other_forces: Vec<String>,
+    /// What the `sim_` columns are.
+    pub sim_is: SimIs,
     /// Columns of loads that a load cell bears besides the water's, such as known weights hung on it. A trial without the
     /// column bears none.
     pub known_loads: Vec<String>,
@@ -94,6 +96,18 @@ impl Measured {
     fn is_default(&self) -> bool {
         *self == Self::default()
     }
+}
+
+/// What stands in the `sim_` columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SimIs {
+    /// Another simulator's prediction: the gap is that simulator's.
+    #[default]
+    Simulator,
+    /// The same trial without what is looked for, measured or computed as the wrench was: the gap is that alone, and what explains it
+    /// may be added to the vehicle's own model.
+    Control,
 }
 
 /// How a wrench was measured.

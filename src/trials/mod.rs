@@ -19,7 +19,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 pub use glitch::Glitch;
-pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method, component_of};
+pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method, SimIs, component_of};
 pub use table::{Table, csv_text};
 pub use trial::{Gap, SIMULATED, Trial, WHEELS, WRENCH};
 pub use write::{Columns, write};

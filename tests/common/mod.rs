@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use wade::bundle;
 use wade::client::{Client, GrpcClient, Method, Reply, ShmClient};
 use wade::config::Config;
-use wade::effects::{ActiveEffect, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
+use wade::effects::{ActiveEffect, Between, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity};
 use wade::model::Model;
 use wade::model::kernel::Isa;
 use wade::served::ServedVehicle;
@@ -82,10 +82,14 @@ pub fn effects_file(vehicle: &str, effects: Vec<ActiveEffect>) -> EffectsFile {
     EffectsFile::new(vehicle.into(), evidence, validity, effects)
 }
 
-/// Every physical effect of the library.
+/// Every physical effect of the library, the first two as if they had been fitted together.
 pub fn every_effect(vehicle: &str) -> EffectsFile {
     let physics = Effect::ALL.into_iter().filter(|effect| effect.kind() == Kind::Physics);
-    effects_file(vehicle, physics.map(|name| effect(name, 0.15)).collect())
+    let effects: Vec<ActiveEffect> = physics.map(|name| effect(name, 0.15)).collect();
+    let [rows, columns] = [0, 1].map(|index: usize| effects[index].coefficients.len());
+    let together =
+        Between { effects: [effects[0].name, effects[1].name], covariance: vec![vec![5e-5; columns]; rows] };
+    effects_file(vehicle, effects).with_between(vec![together])
 }
 
 /// The shipped bundle with effects, in memory.
