@@ -333,8 +333,8 @@ fn left(report: &Value, component: &str) -> f64 {
     size("after") / size("before")
 }
 
-// the force steps by 0.1 to 0.35 of the displaced water along the hull, and by 0.5 to 1.0 across it, where a ramp begins and ends;
-// 0.15 s later it is 0.3 to 0.6 and 0.9 to 1.8, and half a second after the ramp most of that is gone
+// the force steps by 0.1 to 0.35 of the displaced water along the hull, and by 0.2 to 0.8 across it, where a ramp begins and ends;
+// 0.15 s later it is 0.3 to 0.7 and 0.9 to 1.8, and half a second after the ramp most of that is gone
 
 #[test]
 fn the_water_that_the_husky_moves_and_its_waves_are_named_from_computed_ramps() {

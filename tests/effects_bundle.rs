@@ -181,7 +181,7 @@ fn a_damaged_file_refuses_the_bundle_and_names_the_field() {
         (
             "effects = [\"added_mass\", \"linear_damping\"]",
             "effects = [\"added_mass\", \"added_mass\"]",
-            "of two effects of the file",
+            "of two effects of a file of format 2",
         ),
         ("vehicle = \"husky\"", "vehicle = \"warthog\"", "vehicle = \"warthog\""),
         ("name = \"added_mass\"", "name = \"antigravity\"", "antigravity"),

@@ -147,9 +147,8 @@ fn as_fitted(served: &ServedVehicle, motion: &[(Condition, f64)], told: &Circums
                 channel_width: effect.channel_width,
                 wheel_speeds: told.wheel_speeds.unwrap().map(Some),
             };
-            if sample > 0 {
-                effects::advance(effect.name, &effect.shape, memory, &input, *step);
-            }
+            let since = if sample > 0 { *step } else { 0.0 };
+            effects::advance(effect.name, &effect.shape, memory, &input, since);
             let mut sum = Wrench::default();
             effects::basis(effect.name, &effect.shape, memory, &input, |coefficient, _, load| {
                 sum += load * effect.parameters[effect.name.coefficients()[coefficient].name].value;

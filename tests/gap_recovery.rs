@@ -320,15 +320,36 @@ fn within_the_model_s_error(name: &str, bias: f64) -> (Report, f64) {
 }
 
 /// The workflow with a model that states six noises of itself.
-fn run_with_doubts(mut trials: Trials) -> Report {
+fn run_with_doubts(trials: Trials) -> Report {
+    run_outside(trials, f64::INFINITY)
+}
+
+/// The same with a model that learnt nothing of water deeper than this.
+fn run_outside(mut trials: Trials, deepest: f64) -> Report {
     trials.trials.iter_mut().for_each(|trial| trial.simulated = Default::default());
     let body = gap::body_of(&trials).expect("a body");
     let mut model = |condition: &Condition| {
         let [fx, fy, fz, mx, my, mz] = planted::simulate_at(condition.velocity, condition.depth);
         let wrench = Wrench { force: Vec3::new(fx, fy, fz), moment: Vec3::new(mx, my, mz) };
-        Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise), outside: false }
+        Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise), outside: condition.depth > deepest }
     };
     gap::run(&trials, &body, &mut model, &Config::default()).expect("runs")
+}
+
+#[test]
+fn trials_that_the_model_did_not_learn_are_kept_back_only_where_there_are_too_few_others() {
+    let deep = |name: &str| name.trim_start_matches("run").parse::<usize>().expect("a number") % 3 == 2;
+    let kept_back = |deepest: f64| {
+        let report = run_outside(with(&["added_mass"], 3.0, 33).0, deepest);
+        assert_eq!(names(&report), ["added_mass"], "{}", report.summary);
+        report.gap.held_out_trials
+    };
+    // a third of the trials go as deep as 0.25 m
+    let held = kept_back(0.22);
+    assert!(held.len() == 4 && !held.iter().any(|name| deep(name)), "{held:?}");
+    assert!(kept_back(f64::INFINITY).iter().any(|name| deep(name)));
+    // none is learnt: some must be kept back all the same
+    assert_eq!(kept_back(0.0).len(), 4);
 }
 
 #[test]

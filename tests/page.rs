@@ -177,3 +177,46 @@ fn the_picture_shows_the_hull_and_follows_the_state() {
     let colors: BTreeSet<[u8; 3]> = middle(&narrow, [0.2, 0.8], [0.15, 0.4]).into_iter().collect();
     assert!(colors.len() > 300, "{}", colors.len());
 }
+
+/// What a browser finds wrong with the layout of a page that was written to a file, told in its title.
+const LAYOUT: &str = "<script>
+const drawn = [...document.querySelectorAll('svg')].map(svg => svg.getBoundingClientRect());
+const empty = drawn.filter(box => box.width < 20 || box.height < 5).length;
+const beyond = document.documentElement.scrollWidth - window.innerWidth;
+document.title = `${drawn.length} pictures, ${empty} empty, ${Math.max(beyond, 0)} beyond the window`;
+</script>";
+
+#[test]
+fn the_page_of_a_gap_report_says_its_verdict_and_fits_a_window_and_a_telephone() {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let trials = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/wading");
+    let output = Command::new(env!("CARGO_BIN_EXE_wade"))
+        .args(["gap", "--vehicle", "husky", "--trials"])
+        .args([trials.as_path(), "--out".as_ref(), folder.path()])
+        .env("WADE_VEHICLES", common::vehicles())
+        .output()
+        .expect("the program runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report = std::fs::read(folder.path().join("report.json")).expect("written");
+    let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
+    let summary = report["summary"].as_str().expect("a sentence");
+    let path = folder.path().join("index.html");
+    let text = std::fs::read_to_string(&path).expect("written");
+    std::fs::write(&path, text + LAYOUT).expect("written");
+    let url = format!("file://{}", path.display());
+    for (name, width) in [("gap-1280.png", 1280), ("gap-420.png", 420)] {
+        let Some(output) = browse(&["--dump-dom".into(), format!("--window-size={width},2000"), url.clone()])
+        else {
+            return;
+        };
+        let page = String::from_utf8(output.stdout).expect("text");
+        assert!(page.contains(summary), "{summary}");
+        let title = &page[page.find("<title>").expect("a title")..page.find("</title>").expect("a title")];
+        let pictures = title.trim_start_matches("<title>").split(' ').next().expect("a number");
+        assert!(pictures.parse::<usize>().is_ok_and(|count| count >= 3), "{title}");
+        assert!(title.ends_with(", 0 empty, 0 beyond the window"), "{width}: {title}");
+        let picture = picture(&url, name, width, 2000).expect("the browser is there");
+        let colors: BTreeSet<[u8; 3]> = picture.into_iter().flatten().collect();
+        assert!(colors.len() > 30, "a blank picture has few colors: {}", colors.len());
+    }
+}

@@ -59,7 +59,7 @@ OUT holds report.json and index.html, with --apply effects.toml too: the physica
 ranges in which they were seen. Faults of sensors and drive are never in it. --apply writes it into the bundle as the next
 version, in the place of effects from before, and keeps the version before it; only a verdict of `named` is applied. The gap of
 another simulator (sim_ columns) is not the bundle's, so effects.toml is all that is written of it; that of a control, the same
-trial without what is looked for, is no simulator's, and is applied.
+trial without what is looked for, is added to the bundle; what trials of another kind gave cannot stand beside it.
 
 Trials: a folder of CSV files, one a trial, in SI units and body axes (forward, left, up), and trials.toml.
   t vx vy vz wx wy wz depth                needed: time, velocity over ground, angular velocity, water over the ground
@@ -274,7 +274,7 @@ impl Source {
         let bundle = self.vehicles.bundle(&report.vehicle);
         let bundle = Some(bundle).filter(|bundle| bundle.is_dir() && !is_anothers(&trials));
         if let (Some(Ok(effects)), Some(bundle), Some(apply)) = (&effects, &bundle, apply) {
-            check_loss(effects, bundle, apply.replace)?;
+            check_loss(effects, bundle, apply.replace, has_control(&trials))?;
         }
         std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
         write(&out.join("report.json"), Some(&json))?;
@@ -302,7 +302,12 @@ impl Source {
                 Ok(ExitCode::SUCCESS)
             }
             (Some(Ok(_)), None, _) => {
-                eprintln!("the gap is another simulator's: {}", out.join("effects.toml").display());
+                let why = if is_anothers(&trials) {
+                    "the gap is another simulator's"
+                } else {
+                    "there is no bundle"
+                };
+                eprintln!("{why}: {}", out.join("effects.toml").display());
                 Ok(ExitCode::SUCCESS)
             }
             (Some(Err(why)), ..) => {
@@ -317,11 +322,15 @@ impl Source {
 /// True where the gap is another simulator's, and what explains it has no place in a bundle.
 fn is_anothers(trials: &Trials) -> bool {
     let simulated = trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some));
-    simulated && trials.manifest.measured.sim_is == SimIs::Simulator
+    simulated && !has_control(trials)
+}
+
+fn has_control(trials: &Trials) -> bool {
+    trials.manifest.measured.sim_is == SimIs::Control
 }
 
 /// Effects that other trials gave must not go unnoticed because these trials do not show them.
-fn check_loss(effects: &EffectsFile, directory: &Path, replace: bool) -> Result<()> {
+fn check_loss(effects: &EffectsFile, directory: &Path, replace: bool, has_control: bool) -> Result<()> {
     let Some(before) = bundle::read(directory)?.effects.filter(|_| !replace) else { return Ok(()) };
     let stays = |name| effects.effects.iter().any(|effect| effect.name == name);
     let lost: Vec<&str> =
@@ -329,8 +338,10 @@ fn check_loss(effects: &EffectsFile, directory: &Path, replace: bool) -> Result<
     if lost.is_empty() || before.evidence.trials_sha256 == effects.evidence.trials_sha256 {
         return Ok(());
     }
+    // trials with a control and others cannot lie in one folder
+    let way_out = if has_control { "" } else { "put all trials into one folder, or " };
     bail!(
-        "{}: {} came from other trials ({}), and these do not name it: put all trials into one folder, or take it out with --replace",
+        "{}: {} came from other trials ({}), and these do not name it: {way_out}take it out with --replace",
         directory.join("effects.toml").display(),
         lost.join(" and "),
         before.evidence.trials.join(", ")

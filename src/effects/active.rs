@@ -264,9 +264,7 @@ impl ActiveEffects {
             let memory = match session.as_deref_mut().filter(|_| entry.effect.has_memory()) {
                 Some(session) => {
                     let memory = session.memory(entry.effect);
-                    if circumstances.time_step > 0.0 {
-                        advance(entry.effect, &entry.shape, memory, &input, circumstances.time_step);
-                    }
+                    advance(entry.effect, &entry.shape, memory, &input, circumstances.time_step);
                     *memory
                 }
                 None => Memory::default(),

@@ -166,7 +166,7 @@ pub enum EffectsFileError {
 }
 
 impl EffectsFile {
-    /// A file of this program's format.
+    /// A file of effects by themselves, which is of format 1.
     pub fn new(vehicle: String, evidence: Evidence, validity: Validity, effects: Vec<ActiveEffect>) -> Self {
         Self { format: 1, vehicle, evidence, validity, effects, between: Vec::new() }
     }
@@ -224,8 +224,10 @@ impl EffectsFile {
     fn check_between(&self, between: &Between) -> Result<(), EffectsFileError> {
         let [first, second] = between.effects;
         let of = |name: Effect| self.effects.iter().find(|effect| effect.name == name);
+        let is_same = |other: &&Between| other.effects == [first, second] || other.effects == [second, first];
+        let once = self.format > 1 && self.between.iter().filter(is_same).count() == 1;
         let sound = match (of(first), of(second)) {
-            (Some(a), Some(b)) if first != second => {
+            (Some(a), Some(b)) if first != second && once => {
                 let possible = |i: usize, j: usize, value: f64| {
                     value * value <= (1.0 + 1e-6) * a.covariance[i][i] * b.covariance[j][j]
                 };
@@ -241,7 +243,7 @@ impl EffectsFile {
             return Ok(());
         }
         let (effect, field) = (first.name(), format!("between {} and {}", first.name(), second.name()));
-        let expected = "of two effects of the file, a row each coefficient of the first, a number each of the second, none beyond what their variances allow";
+        let expected = "of two effects of a file of format 2, once, a row each coefficient of the first, a number each of the second, none beyond what their variances allow";
         Err(EffectsFileError::Field { effect, field, expected: expected.to_owned() })
     }
 

@@ -112,4 +112,6 @@ pub struct Memory {
     pub real: Vec3,
     /// Out-of-phase part of the memory.
     pub imaginary: Vec3,
+    /// Rate of the velocity through the water at the state before [m/s2]; none before the first.
+    pub motion: Option<Vec3>,
 }

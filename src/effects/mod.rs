@@ -87,10 +87,10 @@ pub fn basis(
     }
 }
 
-/// Advances the state of an effect with memory by `dt` [s]; the others have none.
+/// Advances the state of an effect with memory by `dt` [s], of the first state of a run by 0; the others have none.
 pub fn advance(effect: Effect, shape: &Shape, memory: &mut Memory, input: &Input, dt: f64) {
     match effect {
-        Effect::HullFlooding => hull_flooding::advance(shape, memory, input, dt),
+        Effect::HullFlooding if dt > 0.0 => hull_flooding::advance(shape, memory, input, dt),
         Effect::WaveMemory => wave_memory::advance(shape, memory, input, dt),
         _ => {}
     }

@@ -147,8 +147,9 @@ fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, co
         if effect == Effect::AddedMass {
             input.condition = &series.calibrated[sample];
         }
-        if effect.has_memory() && sample > 0 {
-            effects::advance(effect, shape, &mut memory, &input, t - series.t[sample - 1]);
+        if effect.has_memory() {
+            let since = if sample > 0 { t - series.t[sample - 1] } else { 0.0 };
+            effects::advance(effect, shape, &mut memory, &input, since);
         }
         effects::basis(effect, shape, &memory, &input, |coefficient, _, load| {
             let sum = &mut columns[coefficient][sample];

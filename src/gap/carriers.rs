@@ -30,10 +30,11 @@ pub(super) fn carriers(
             let (features, mut memory) = (of_bins(series), Memory::default());
             for (index, bin) in series.bins.iter().enumerate() {
                 let input = series.input(bin.start, setting.body, base_drag);
-                if index > 0 {
-                    let dt = series.t[bin.start] - series.t[series.bins[index - 1].start];
-                    effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
-                }
+                let dt = match index.checked_sub(1) {
+                    Some(before) => series.t[bin.start] - series.t[series.bins[before].start],
+                    None => 0.0,
+                };
+                effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
                 if !inside(limits, &features[index]) {
                     continue;
                 }

@@ -19,9 +19,11 @@ use crate::trials::WRENCH;
 
 /// Fewest trials over which a bootstrap says how far a closure may be off.
 pub(super) const ENOUGH: usize = 3;
-/// Floors that a gap must have before a share of what stands above is said, and what is left after: where much less is left the
-/// floor is none, and hundreds of per cent of what stands above it tell nobody anything.
-const FLOORS: [f64; 2] = [1.02, 0.9];
+/// Floors that a gap must have before a share of what stands above is said.
+const ABOVE: f64 = 1.02;
+/// Floors below which a gap hardly stands above them, and what must be left then: where less is, the floor is none, and hundreds of per
+/// cent of what stands above it tell nobody anything.
+const NEAR: [f64; 2] = [1.5, 0.9];
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
@@ -34,7 +36,8 @@ pub struct Closure {
     pub after: f64,
     /// What noise alone would show.
     pub noise_floor: f64,
-    /// `(before - after) / (before - noise_floor)`; none where before is not above the floor, or after far below it.
+    /// `(before - after) / (before - noise_floor)`; none where before is not above the floor, or hardly, and after
+    /// far below it.
     pub closure: Option<f64>,
     /// 90 % interval of the closure, by a bootstrap over the trials kept back; none of fewer than three.
     pub interval: Option<[f64; 2]>,
@@ -133,15 +136,16 @@ pub(super) fn closures(
             (rms(&|s, c| s.before[c]), rms(&|s, c| s.after[c]))
         };
         let share = |(before, after): (f64, f64)| {
-            (before > FLOORS[0] * floor && after > FLOORS[1] * floor)
-                .then(|| (before - after) / (before - floor))
+            (before > ABOVE * floor).then(|| (before - after) / (before - floor))
         };
         let (before, after) = sizes(&sums);
+        let is_told = before > NEAR[0] * floor || after > NEAR[1] * floor;
+        let closed = share((before, after)).filter(|_| is_told);
         let mut found: Vec<f64> = draws.iter().filter_map(|draw| share(sizes(draw))).collect();
-        let interval = share((before, after))
+        let interval = closed
             .filter(|_| sums.len() >= ENOUGH && found.len() * 2 > draws.len())
             .map(|_| [quantile(&mut found.clone(), 0.05), quantile(&mut found, 0.95)]);
-        Closure { before, after, noise_floor: floor, closure: share((before, after)), interval }
+        Closure { before, after, noise_floor: floor, closure: closed, interval }
     };
     let mut closures: BTreeMap<&'static str, Closure> =
         setting.components.iter().map(|&c| (WRENCH[c], closure(&[c], floors[c].total(), true))).collect();
@@ -154,7 +158,7 @@ pub(super) fn closures(
 
 /// A closure with the sizes of the gap as naming saw it, where the model states how far it may be off: without the share that its
 /// own error, a load that stays and one that goes with the square of the speed, has in each trial. What was named is held to
-/// nothing that its naming did not look at.
+/// nothing that its naming did not look at. Sizes in noises of a row, which hold the model's error.
 pub(super) fn as_naming_saw_it(
     closure: Closure,
     named: &[Named],

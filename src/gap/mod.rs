@@ -123,7 +123,7 @@ pub enum GapError {
     },
     /// A control that is not there.
     #[error(
-        "{trial}.csv has no sim_ column, which measured.sim_is = \"control\" of trials.toml calls a control: leave the key out, or add the columns"
+        "{trial}.csv has no sim_ column, which measured.sim_is = \"control\" of trials.toml calls a control: add the columns to every trial, or leave the key out"
     )]
     NoControl {
         /// Name of the trial.

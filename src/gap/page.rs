@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::carriers::in_shares;
+use super::holdout::Closure;
 use super::judge::Refusal;
 use super::noise::FloorSource;
 use super::report::{NamedEffect, Report, Trace, Verdict};
@@ -199,6 +200,11 @@ fn against(band: [f64; 2], value: f64, around: [f64; 2]) -> String {
     )
 }
 
+/// In the place of a closure: no gap above the floor, or one of which no share can be said.
+fn nothing(closure: &Closure) -> &'static str {
+    if closure.before > closure.noise_floor { "–" } else { "no gap" }
+}
+
 fn held_out(report: &Report) -> String {
     let rows = report.gap.held_out.iter().map(|(name, closure)| {
         vec![
@@ -206,7 +212,7 @@ fn held_out(report: &Report) -> String {
             number(closure.before),
             number(closure.after),
             number(closure.noise_floor),
-            closure.closure.map_or("no gap".into(), percent),
+            closure.closure.map_or_else(|| nothing(closure).into(), percent),
             closure.interval.map_or("–".into(), |around| interval(around, percent)),
         ]
     });

@@ -68,14 +68,20 @@ pub(super) fn hold_out(all: &[Series], repeats: &[Vec<String>], config: &Config)
     // where the model did not learn the states, what is kept back would try the model and not what was named
     let learnt =
         |trial: usize| 2 * all[trial].outside.iter().filter(|outside| **outside).count() < all[trial].t.len();
-    let many_learnt = (0..all.len()).filter(|&trial| learnt(trial)).count() > wanted;
-    let sizes: Vec<usize> = (0..6).map(|class| order.iter().filter(|(c, _)| *c == class).count()).collect();
-    let fits = |trial: usize| together(trial).len() <= wanted && (learnt(trial) || !many_learnt);
-    let free: Vec<usize> =
-        order.iter().filter(|(class, i)| sizes[*class] >= 3 && fits(*i)).map(|(_, i)| *i).collect();
+    let many_learnt = (0..all.len()).filter(|&trial| learnt(trial)).count() >= 2 * wanted;
+    let may = |trial: usize| learnt(trial) || !many_learnt;
+    let fits = |trial: usize| together(trial).len() <= wanted;
+    let of_class = |class: usize| order.iter().filter(|(c, i)| *c == class && may(*i)).count();
+    let sizes: Vec<usize> = (0..6).map(of_class).collect();
     let any =
         |keep: &dyn Fn(usize) -> bool| order.iter().map(|(_, i)| *i).filter(|&i| keep(i)).collect::<Vec<_>>();
-    let free = if free.len() > wanted { free } else { any(&fits) };
+    let free: Vec<usize> = order
+        .iter()
+        .filter(|(class, i)| sizes[*class] >= 3 && fits(*i) && may(*i))
+        .map(|(_, i)| *i)
+        .collect();
+    let free = if free.len() > wanted { free } else { any(&|i| fits(i) && may(i)) };
+    let free = if free.is_empty() { any(&fits) } else { free };
     let free = if free.is_empty() { any(&|_| true) } else { free };
     let stride = free.len() as f64 / wanted as f64;
     let start = Random::new(config.seed ^ 0x4e1d).unit();

@@ -127,8 +127,13 @@ impl Found {
 /// zero of a stated deviation is one square in the rows of a trial, as each of their noises is, and it lasts.
 fn leaves_much(design: &Design, residual: &DVector<f64>) -> bool {
     let (before, after) = (lasting(design, &design.y), lasting(design, residual));
-    let zeros = design.trials.iter().flat_map(|&trial| design.noise.offset[trial]);
-    let of_zeros = zeros.filter(|zero| *zero > 0.0).count() as f64;
+    // what the rows keep of a zero of z noises, of n rows: n z^2 / (1 + n z^2)
+    let kept = |(&trial, rows): (&usize, &std::ops::Range<usize>)| -> f64 {
+        let count = (rows.len() / design.rows.width) as f64;
+        let squares = design.noise.offset[trial].iter().zip(design.noise.bin).map(|(zero, bin)| zero / bin);
+        squares.map(|z| count * z * z / (1.0 + count * z * z)).sum()
+    };
+    let of_zeros: f64 = design.trials.iter().zip(&design.rows.of_trial).map(kept).sum();
     f64::min(before.most.deviate, after.most.deviate) > LASTS
         && after.energy - of_zeros > MUCH * before.energy
 }

@@ -5,7 +5,7 @@ pub mod plot;
 pub use plot::PlotError;
 
 /// The look of every page.
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;margin:24px auto;padding:0 10px;color:#1f2328}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;margin:24px auto;padding:0 10px;color:#1f2328;overflow-wrap:break-word}\
 h1{font-size:22px;margin:0 0 4px}h2{font-size:18px;margin:30px 0 4px}h3{font-size:15px;margin:18px 0 2px}p{margin:4px 0 8px}\
 .verdict{padding:10px 14px;border-left:6px solid #1d5fb0;background:#eef4fb;margin:12px 0}.verdict ul{margin:4px 0;padding-left:20px}\
 .pass{border-color:#2a8c4a;background:#eef8f0}.fail{border-color:#b91c1c;background:#fdf0f0}\

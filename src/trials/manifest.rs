@@ -81,6 +81,7 @@ pub struct Measured {
     /// Columns of known other forces, for inverse dynamics.
     pub other_forces: Vec<String>,
     /// What the `sim_` columns are.
+    #[serde(skip_serializing_if = "SimIs::is_default")]
     pub sim_is: SimIs,
     /// Columns of loads that a load cell bears besides the water's, such as known weights hung on it. A trial without the
     /// column bears none.
@@ -108,6 +109,12 @@ pub enum SimIs {
     /// The same trial without what is looked for, measured or computed as the wrench was: the gap is that alone, and what explains it
     /// may be added to the vehicle's own model.
     Control,
+}
+
+impl SimIs {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// How a wrench was measured.
