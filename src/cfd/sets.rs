@@ -289,8 +289,8 @@ mod tests {
         for set in [Set::Check, Set::Ahead, Set::Unsteady, Set::Check] {
             plan.extend(set, 0, 1, 0.378).unwrap();
         }
-        // at rest and four speeds, two finer meshes, eight ramps
-        assert_eq!(plan.cases.len(), 1 + 4 + 2 + 8);
+        // at rest and four speeds, two finer meshes, twelve ramps
+        assert_eq!(plan.cases.len(), 1 + 4 + 2 + 12);
         assert!(plan.cases.iter().any(|case| case.id == "warthog-check-0010"), "numbers as of many depths");
     }
 
