@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::service::{grpc, http, shm};
+use crate::service::{grpc, health, http, shm};
 
 /// Settings of `wade serve`: the file deploy/wade.toml shows every key with its default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,6 +24,8 @@ pub struct Config {
     pub shm: shm::Config,
     /// The page, queries as JSON, metrics and probes.
     pub http: http::Config,
+    /// When the server calls itself ready.
+    pub ready: health::Config,
     /// Logs.
     pub log: Log,
 }
@@ -38,6 +40,7 @@ impl Default for Config {
             grpc: grpc::Config::default(),
             shm: shm::Config::default(),
             http: http::Config::default(),
+            ready: health::Config::default(),
             log: Log::default(),
         }
     }
@@ -127,6 +130,8 @@ impl Config {
         let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
         let named = (1..=64).contains(&namespace.len()) && namespace.bytes().all(plain);
         range(named, "shm.namespace", namespace, "1 to 64 letters, digits, - or _")?;
+        let can_be_ready = self.shm.enabled || !self.ready.require.contains(&health::Part::Shm);
+        range(can_be_ready, "shm.enabled", &false, "true where ready.require names \"shm\"")?;
         let silent = grpc.listen.is_empty() && grpc.unix_socket.as_os_str().is_empty() && !self.shm.enabled;
         range(!silent, "shm.enabled", &false, "true where grpc.listen and grpc.unix_socket are both empty")
     }

@@ -88,6 +88,11 @@ struct VehicleLabels {
     vehicle: String,
 }
 
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct UpLabels {
+    transport: &'static str,
+}
+
 const RELOAD_OUTCOMES: [&str; 2] = ["accepted", "refused"];
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -215,6 +220,7 @@ pub struct Metrics {
     refusals: Family<RefusalLabels, Counter>,
     bundle_version: Family<VehicleLabels, Gauge>,
     reloads: Family<ReloadLabels, Counter>,
+    transport_up: Family<UpLabels, Gauge>,
 }
 
 impl Default for Metrics {
@@ -252,6 +258,12 @@ impl Metrics {
             Family::clone(&bundle_version),
         );
         registry.register("reloads", "Bundles read from disk while serving", Family::clone(&reloads));
+        let transport_up = Family::default();
+        registry.register(
+            "transport_up",
+            "1 where the transport answers the server's own question, else 0",
+            Family::clone(&transport_up),
+        );
         Self {
             registry,
             recorders: Default::default(),
@@ -260,6 +272,7 @@ impl Metrics {
             refusals,
             bundle_version,
             reloads,
+            transport_up,
         }
     }
 
@@ -301,6 +314,11 @@ impl Metrics {
     pub fn count_reload(&self, accepted: bool) {
         let outcome = RELOAD_OUTCOMES[usize::from(!accepted)];
         self.reloads.get_or_create(&ReloadLabels { outcome }).inc();
+    }
+
+    /// States whether a transport answers.
+    pub fn set_transport_up(&self, transport: &'static str, up: bool) {
+        self.transport_up.get_or_create(&UpLabels { transport }).set(i64::from(up));
     }
 
     /// Begins a new window; to be called at a steady period by somebody who owns a clock.

@@ -16,8 +16,9 @@ use crate::metrics::Metrics;
 use crate::model::kernel::Isa;
 use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
+use crate::service::health::{Health, Part, State};
 use crate::service::http::{self, HttpError};
-use crate::service::shm::{ShmError, ShmServer};
+use crate::service::shm::ShmServer;
 use crate::service::shm_remains;
 
 /// Why the server did not start.
@@ -29,9 +30,6 @@ pub enum StartError {
     /// HTTP.
     #[error(transparent)]
     Http(#[from] HttpError),
-    /// Shared memory.
-    #[error(transparent)]
-    Shm(#[from] ShmError),
     /// The bundles.
     #[error(transparent)]
     Load(#[from] LoadError),
@@ -39,6 +37,16 @@ pub enum StartError {
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
 }
+
+/// Longest wait at the start for shared memory, which is served as soon as it can be.
+const SHM_PATIENCE: Duration = Duration::from_millis(500);
+
+/// Pause before shared memory is opened again: the first, and the longest after it was doubled at each failure.
+const FIRST_SHM_PAUSE: Duration = Duration::from_millis(250);
+const LAST_SHM_PAUSE: Duration = Duration::from_secs(30);
+
+/// How often a pause looks whether the server is to stop.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// A server that runs on threads of its own. Dropping it stops it.
 #[derive(Debug)]
@@ -48,7 +56,7 @@ pub struct Running {
     grpc: Arc<grpc::Server>,
     listeners: Arc<Listeners>,
     http_address: Option<SocketAddr>,
-    ready: Arc<AtomicBool>,
+    health: Arc<Health>,
     stop: watch::Sender<bool>,
     /// Probes are answered until everything else has ended.
     stop_http: watch::Sender<bool>,
@@ -76,13 +84,14 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         reloader: Arc::clone(&reloader),
         window_s: config.latency_window_s,
     };
+    let health = Arc::new(Health::new(&config.ready, Arc::clone(&metrics)));
     let runtime = runtime()?;
     let (stop, stopped) = watch::channel(false);
     let (stop_http, http_stopped) = watch::channel(false);
     let mut running = Running {
         grpc: Arc::new(runtime.block_on(grpc::Server::new(config.grpc.clone(), shared.clone()))),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
-        ready: Arc::new(AtomicBool::new(false)),
+        health: Arc::clone(&health),
         stop_shm: Arc::new(AtomicBool::new(false)),
         drain: Duration::from_secs_f64(config.drain_s),
         threads: Vec::new(),
@@ -98,12 +107,18 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     for _ in 0..config.grpc.threads {
         running.spawn_grpc(stopped.clone())?;
     }
+    if running.grpc_address().is_some() || running.unix_path().is_some() {
+        health.set(Part::Grpc, State::Ok);
+    }
+    if running.http_address.is_some() {
+        health.set(Part::Http, State::Ok);
+    }
     let window = Duration::from_secs_f64(config.latency_window_s);
     let shared = http::Shared {
         hosts: config.http.hosts.clone(),
         grpc: shared,
         requests: Arc::clone(running.grpc.requests()),
-        ready: Arc::clone(&running.ready),
+        health: Arc::clone(&health),
     };
     running.spawn_housekeeping(http_listener, shared, window, http_stopped)?;
     running.reloader.load_all()?;
@@ -111,7 +126,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         running.spawn_shm(config, engine)?;
     }
     running.runtime.block_on(running.grpc.set_serving());
-    running.ready.store(true, Ordering::Relaxed);
+    running.health.set_serving(true);
     Ok(running)
 }
 
@@ -140,6 +155,11 @@ impl Running {
         &self.reloader
     }
 
+    /// Which transports answer.
+    pub fn health(&self) -> &Arc<Health> {
+        &self.health
+    }
+
     /// What is counted.
     pub fn metrics(&self) -> &Arc<Metrics> {
         &self.metrics
@@ -152,7 +172,7 @@ impl Running {
 
     fn stop_all(&mut self) {
         let start = Instant::now();
-        self.ready.store(false, Ordering::Relaxed);
+        self.health.set_serving(false);
         self.runtime.block_on(self.grpc.set_not_serving());
         self.runtime.block_on(self.grpc.end_health_watches());
         self.stop_shm.store(true, Ordering::Relaxed);
@@ -226,22 +246,36 @@ impl Running {
         Ok(())
     }
 
+    /// Opens shared memory on a thread of its own and waits a moment for it; where it cannot be opened, everything else is
+    /// served and the thread tries again.
     fn spawn_shm(&mut self, config: &Config, engine: Arc<Engine>) -> Result<(), StartError> {
         let (settings, metrics) = (config.shm.clone(), Arc::clone(&self.metrics));
-        let stop = Arc::clone(&self.stop_shm);
-        // ports stay with the thread that made them, so it says whether it could
-        let (report, opened) = std::sync::mpsc::channel();
-        let thread = self.spawn("wade-shm", move || match ShmServer::new(settings, engine, metrics) {
-            Ok(server) => {
-                let _ = report.send(Ok(()));
-                server.run(&stop);
-            }
-            Err(error) => {
-                let _ = report.send(Err(error));
+        let (stop, health) = (Arc::clone(&self.stop_shm), Arc::clone(&self.health));
+        health.set(Part::Shm, State::Starting);
+        let thread = self.spawn("wade-shm", move || {
+            let mut pause = FIRST_SHM_PAUSE;
+            while !stop.load(Ordering::Relaxed) {
+                match ShmServer::new(settings.clone(), Arc::clone(&engine), Arc::clone(&metrics)) {
+                    Ok(server) => {
+                        health.set(Part::Shm, State::Ok);
+                        server.run(&stop);
+                    }
+                    Err(error) => {
+                        health.set(Part::Shm, State::Unavailable(error.to_string()));
+                        let end = Instant::now() + pause;
+                        while Instant::now() < end && !stop.load(Ordering::Relaxed) {
+                            std::thread::sleep(LOOK);
+                        }
+                        pause = (2 * pause).min(LAST_SHM_PAUSE);
+                    }
+                }
             }
         })?;
         self.threads.push(thread);
-        opened.recv().unwrap_or_else(|_| Err(ShmError::new("the thread")(&"it ended")))?;
+        let end = Instant::now() + SHM_PATIENCE;
+        while self.health.state(Part::Shm) == State::Starting && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(1));
+        }
         // nothing depends on it, and it may take minutes: it is not waited for at the end either
         let stop = Arc::clone(&self.stop_shm);
         let clearing = std::thread::Builder::new().name("wade-shm-remains".into());
@@ -253,7 +287,7 @@ impl Running {
         let guard = Guard {
             name: name.to_owned(),
             stop: self.stop.subscribe(),
-            ready: Arc::clone(&self.ready),
+            health: Arc::clone(&self.health),
             failed: Arc::clone(&self.failed),
         };
         let body = move || {
@@ -273,7 +307,7 @@ impl Running {
 struct Guard {
     name: String,
     stop: watch::Receiver<bool>,
-    ready: Arc<AtomicBool>,
+    health: Arc<Health>,
     failed: Arc<AtomicBool>,
 }
 
@@ -281,7 +315,7 @@ impl Drop for Guard {
     fn drop(&mut self) {
         if !*self.stop.borrow() {
             tracing::error!(thread = self.name, "ended unasked: no longer ready");
-            self.ready.store(false, Ordering::Relaxed);
+            self.health.set_serving(false);
             self.failed.store(true, Ordering::Relaxed);
         }
     }

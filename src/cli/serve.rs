@@ -2,13 +2,17 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use tokio::runtime::Runtime;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 use wade::config::{Config, Log};
 use wade::cores;
-use wade::server;
+use wade::server::{self, Running};
+use wade::service::admin::Reload;
 use wade::service::shm::Wait;
 
 /// Serve vehicles over gRPC, a Unix socket and shared memory
@@ -35,6 +39,9 @@ pub struct Serve {
     /// Address of metrics and probes; empty for none
     #[arg(long, value_name = "ADDR")]
     http: Option<String>,
+    /// First part of the names in shared memory; servers beside each other need one each
+    #[arg(long, value_name = "NAME")]
+    namespace: Option<String>,
     /// Shared memory: how the server waits for requests
     #[arg(long, value_enum)]
     shm: Option<Shm>,
@@ -60,7 +67,7 @@ enum Shm {
 }
 
 impl Serve {
-    /// Serves until SIGTERM or SIGINT.
+    /// Serves until SIGTERM, SIGINT or SIGQUIT.
     pub fn run(self) -> Result<ExitCode> {
         if self.with_parent {
             nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM)?;
@@ -69,6 +76,8 @@ impl Serve {
         config.validate()?;
         start_log(&config.log)?;
         cores::pin_to(&config.cpus).context("cpus")?;
+        // before anything is served, so that no signal meets a server that does not expect it
+        let mut signals = Signals::new()?;
         let running = server::start(&config)?;
         tracing::info!(
             grpc = running.grpc_address().map(tracing::field::display),
@@ -78,7 +87,7 @@ impl Serve {
             "serving"
         );
         notify(&[sd_notify::NotifyState::Ready]);
-        wait_for_signal(&running)?;
+        signals.wait(&running);
         let failed = running.has_failed();
         notify(&[sd_notify::NotifyState::Stopping]);
         running.shutdown();
@@ -93,6 +102,7 @@ impl Serve {
         set(&mut config.http.listen, self.http);
         set(&mut config.cpus, self.cpus);
         set(&mut config.log.filter, self.log);
+        set(&mut config.shm.namespace, self.namespace);
         match self.shm {
             Some(Shm::Off) => config.shm.enabled = false,
             Some(Shm::Block) => (config.shm.enabled, config.shm.wait) = (true, Wait::Block),
@@ -136,23 +146,81 @@ fn notify(states: &[sd_notify::NotifyState]) {
 /// How often the server is looked at for a thread that has ended.
 const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// Returns at SIGTERM or SIGINT, or when the server has failed and is best restarted.
-fn wait_for_signal(running: &server::Running) -> Result<()> {
-    use tokio::signal::unix::{SignalKind, signal};
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    runtime.block_on(async {
-        let (mut terminate, mut interrupt) =
-            (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
-        let failed = async {
-            while !running.has_failed() {
-                tokio::time::sleep(LOOK).await;
+/// Every signal that would end the process if nobody expected it.
+struct Signals {
+    runtime: Runtime,
+    end: [(Signal, &'static str); 3],
+    reload: Signal,
+    status: [Signal; 2],
+}
+
+impl Signals {
+    fn new() -> Result<Self> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let _entered = runtime.enter();
+        let end = [
+            (signal(SignalKind::terminate())?, "SIGTERM"),
+            (signal(SignalKind::interrupt())?, "SIGINT"),
+            (signal(SignalKind::quit())?, "SIGQUIT"),
+        ];
+        let reload = signal(SignalKind::hangup())?;
+        let status = [signal(SignalKind::user_defined1())?, signal(SignalKind::user_defined2())?];
+        drop(_entered);
+        Ok(Self { runtime, end, reload, status })
+    }
+
+    /// Returns at SIGTERM, SIGINT or SIGQUIT, or when the server has failed and is best restarted. SIGHUP reloads every
+    /// bundle, SIGUSR1 and SIGUSR2 log the state of the server.
+    fn wait(&mut self, running: &Running) {
+        let Self { runtime, end: [terminate, interrupt, quit], reload, status: [first, second] } = self;
+        runtime.block_on(async {
+            loop {
+                let end = tokio::select! {
+                    _ = terminate.0.recv() => terminate.1,
+                    _ = interrupt.0.recv() => interrupt.1,
+                    _ = quit.0.recv() => quit.1,
+                    _ = reload.recv() => {
+                        start_reload(running);
+                        continue;
+                    }
+                    _ = first.recv() => { log_status(running); continue }
+                    _ = second.recv() => { log_status(running); continue }
+                    () = tokio::time::sleep(LOOK) => {
+                        if !running.has_failed() { continue }
+                        tracing::error!("ending, to be restarted");
+                        return;
+                    }
+                };
+                tracing::info!("{end}: draining");
+                return;
             }
-        };
-        tokio::select! {
-            _ = terminate.recv() => tracing::info!("SIGTERM"),
-            _ = interrupt.recv() => tracing::info!("SIGINT"),
-            () = failed => tracing::error!("ending, to be restarted"),
+        });
+    }
+}
+
+/// Reads every bundle again on a thread of its own: a signal that ends the server does not wait for it.
+fn start_reload(running: &Running) {
+    let reloader = Arc::clone(running.reloader());
+    let reloading = std::thread::Builder::new().name("wade-reload".into()).spawn(move || {
+        tracing::info!("SIGHUP: reading every bundle again");
+        match reloader.reload("") {
+            Ok(reloads) => {
+                for Reload { vehicle, served_version, refusal } in reloads {
+                    let refusal = refusal.map(|refusal| refusal.to_string());
+                    tracing::info!(vehicle, version = served_version, refusal, "serves");
+                }
+            }
+            Err(error) => tracing::warn!(%error, "nothing was reloaded"),
         }
-        Ok(())
-    })
+    });
+    if let Err(error) = reloading {
+        tracing::warn!(%error, "SIGHUP: cannot start a thread; nothing was reloaded");
+    }
+}
+
+fn log_status(running: &Running) {
+    let report = running.health().report();
+    let vehicles = running.reloader().names().join(" ");
+    let (ready, grpc, http, shared_memory) = (report.ready, report.grpc, report.http, report.shared_memory);
+    tracing::info!(ready, grpc, http, shared_memory, vehicles, "status");
 }

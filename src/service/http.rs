@@ -11,7 +11,6 @@ mod rejection;
 
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use axum::Router;
 use axum::extract::State;
@@ -22,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 
 use super::grpc;
+use super::health::Health;
 use crate::engine::Admission;
 use rejection::Rejection;
 
@@ -85,8 +85,8 @@ pub struct Shared {
     pub grpc: grpc::Shared,
     /// The places that gRPC's requests take.
     pub requests: Arc<Admission>,
-    /// Whether queries are answered.
-    pub ready: Arc<AtomicBool>,
+    /// Which transports answer.
+    pub health: Arc<Health>,
 }
 
 /// Serves until `stop` turns true.
@@ -116,9 +116,9 @@ async fn metrics(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
 }
 
 async fn readyz(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
-    if shared.ready.load(Ordering::Relaxed) {
-        (StatusCode::OK, "ready\n")
-    } else {
-        (StatusCode::SERVICE_UNAVAILABLE, "not ready\n")
-    }
+    let report = shared.health.report();
+    let status = if report.ready { StatusCode::OK } else { StatusCode::SERVICE_UNAVAILABLE };
+    // strings and a truth value alone: serialising cannot fail
+    let body = serde_json::to_string(&report).unwrap_or_default() + "\n";
+    (status, [(header::CONTENT_TYPE, "application/json")], body)
 }

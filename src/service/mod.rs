@@ -2,6 +2,7 @@
 
 pub mod admin;
 pub mod grpc;
+pub mod health;
 pub mod http;
 mod sessions;
 pub mod shm;
