@@ -57,7 +57,9 @@ fn modules() -> Vec<(String, PathBuf, String)> {
 fn layer(module: &str) -> usize {
     let found = LAYERS.iter().position(|layer| layer.contains(&module));
     found.unwrap_or_else(|| {
-        panic!("module {module} has no layer: add it to tests/layers.rs and ARCHITECTURE.md")
+        panic!(
+            "module {module} has no layer: add it to tests/layers.rs and docs/src/developer/architecture.md"
+        )
     })
 }
 

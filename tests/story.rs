@@ -1,6 +1,6 @@
 //! Promise: the story of the README ("What the model lacks") runs as it is written there on the trials that are shipped:
 //! the folder does not say what is hidden, it is named, the gap closes, and the served answer changes by it. So does the
-//! short way from force files to weights ("Learn from a data set").
+//! short way from force files to weights (docs/src/guide/training.md, "Try the whole chain").
 
 mod common;
 
@@ -24,17 +24,17 @@ fn text(path: &Path) -> String {
     std::fs::read_to_string(path).expect("readable")
 }
 
-/// A block of commands of a section of the README.
-fn block(section: &str, index: usize) -> String {
-    let readme = text(&root().join("README.md"));
-    let (_, section) = readme.split_once(&format!("## {section}\n")).expect("the section");
-    let block = section.split("```sh\n").nth(index).expect("a block");
+/// The first block of commands of a section of a document.
+fn block(document: &str, section: &str) -> String {
+    let document = text(&root().join(document));
+    let (_, section) = document.split_once(&format!("## {section}\n")).expect("the section");
+    let (_, block) = section.split_once("```sh\n").expect("a block");
     block.split("```").next().expect("its end").to_owned()
 }
 
 /// The commands of the story.
 fn commands() -> Vec<String> {
-    let block = block("What the model lacks", 1);
+    let block = block("README.md", "What the model lacks");
     block.lines().filter(|line| line.starts_with("wade ")).map(str::to_owned).collect()
 }
 
@@ -101,7 +101,7 @@ fn three_commands_name_the_effect_and_serve_it() {
 }
 
 #[test]
-fn a_few_committed_cases_become_weights_by_the_commands_of_the_readme() {
+fn a_few_committed_cases_become_weights_by_the_commands_of_the_guide() {
     let place = TempDir::new().expect("a folder");
     for name in ["tests", "campaigns"] {
         std::os::unix::fs::symlink(root().join(name), place.path().join(name)).expect("linked");
@@ -113,7 +113,7 @@ fn a_few_committed_cases_become_weights_by_the_commands_of_the_readme() {
             &place.path().join("vehicles").join(vehicle),
         );
     }
-    let commands = block("Learn from a data set", 2);
+    let commands = block("docs/src/guide/training.md", "Try the whole chain");
     let program = Path::new(env!("CARGO_BIN_EXE_wade")).parent().expect("a folder");
     let path = format!("{}:{}", program.display(), std::env::var("PATH").expect("a path"));
     let output = Command::new("sh")

@@ -21,7 +21,7 @@ use super::{Vehicles, check_report_folder, emit, usage_error};
 
 /// The form of `--config`, with what holds without one; besides `library`, which names all effects.
 const SETTINGS: &str =
-    "  # library = [\"added_mass\", \"current\"]   of CONVENTIONS.md; all of them otherwise
+    "  # library = [\"added_mass\", \"current\"]   names of docs/src/concepts/effects.md; all of them otherwise
   ground_contact = \"wetted\"    # or \"dry\": whether predictions have water under the tires
   seed = 1
   bin_s = 0.1                  # over which samples are averaged [s]

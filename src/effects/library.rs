@@ -391,11 +391,11 @@ mod tests {
     }
 
     #[test]
-    fn the_conventions_list_every_effect_with_its_parameters() {
-        let conventions = include_str!("../../CONVENTIONS.md");
+    fn the_documentation_lists_every_effect_with_its_parameters() {
+        let page = include_str!("../../docs/src/concepts/effects.md");
         for effect in Effect::ALL {
             let row = format!("| `{}` |", effect.name());
-            let row = conventions.lines().find(|line| line.starts_with(&row)).unwrap_or_default();
+            let row = page.lines().find(|line| line.starts_with(&row)).unwrap_or_default();
             let coefficients = effect.coefficients().iter().map(|c| c.name);
             for name in coefficients.chain(effect.shape_names().iter().map(|(name, _)| *name)) {
                 let is_component = matches!(name, "fy" | "fz" | "mx" | "my");

@@ -2,6 +2,10 @@
 //! behind their figures.
 
 mod licenses;
+mod links;
+mod prose;
+mod readme;
+mod results;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -21,4 +25,18 @@ fn output(program: &str, arguments: &[&str]) -> String {
     let output = output.unwrap_or_else(|error| panic!("{program} cannot be run: {error}"));
     assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
+}
+
+/// Files that git tracks or would track, relative to the root.
+fn files() -> Vec<PathBuf> {
+    let listed = output("git", &["ls-files", "--cached", "--others", "--exclude-standard"]);
+    let found: Vec<PathBuf> =
+        listed.lines().map(PathBuf::from).filter(|path| root().join(path).exists()).collect();
+    assert!(found.len() > 100, "git lists the files");
+    found
+}
+
+/// Every document in Markdown.
+fn documents() -> Vec<PathBuf> {
+    files().into_iter().filter(|path| path.extension().is_some_and(|kind| kind == "md")).collect()
 }

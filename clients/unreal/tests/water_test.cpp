@@ -54,7 +54,7 @@ TEST(the_depth_rate_is_the_rate_of_the_depth) {
   EXPECT_NEAR(immerse(c.body, c.motion, c.water, c.z0).depth_rate, (after - before) / (2.0 * h), 1e-8);
 }
 
-// Roll of 0.1 rad to the right, then none: up = (-sin pitch, sin roll cos pitch, cos roll cos pitch), CONVENTIONS.md.
+// Roll of 0.1 rad to the right, then none: up = (-sin pitch, sin roll cos pitch, cos roll cos pitch), docs/src/developer/conventions.md.
 TEST(gravity_leans_as_the_conventions_say) {
   Motion motion;
   motion.attitude = turn(Vec3{0.0, 0.2, 0.0}) * turn(Vec3{0.1, 0.0, 0.0});

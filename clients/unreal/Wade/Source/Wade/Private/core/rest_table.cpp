@@ -14,7 +14,7 @@ wade_state at_rest(double depth, float roll, float pitch) {
   wade_state state = wade_default_state();
   state.depth_m = static_cast<float>(depth);
   state.density_kgpm3 = static_cast<float>(asked_density);
-  // up = (-sin pitch, sin roll cos pitch, cos roll cos pitch), see CONVENTIONS.md
+  // up = (-sin pitch, sin roll cos pitch, cos roll cos pitch), see docs/src/developer/conventions.md
   state.gravity_direction[0] = std::sin(pitch);
   state.gravity_direction[1] = -std::sin(roll) * std::cos(pitch);
   state.gravity_direction[2] = -std::cos(roll) * std::cos(pitch);
