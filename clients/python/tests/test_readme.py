@@ -1,8 +1,12 @@
-"""The README's ten lines work over every transport, and print what the server says, in the form that it shows."""
+"""The README's ten lines work over every transport, and print what the server says, in the form that it shows.
+
+So do the lines of Python in the README of the repository.
+"""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 from readme import printed, ten_lines
@@ -33,3 +37,12 @@ def test_the_ten_lines(server: Server) -> None:
         np.testing.assert_allclose(numbers[3:6], expected["wrench"]["moment"], atol=0.051)
         assert numbers[6:] == [1024, 3]
         assert str(expected["in_domain"]) in text
+
+
+def test_the_lines_of_the_repositorys_readme(server: Server) -> None:
+    readme = (Path(__file__).resolve().parents[3] / "README.md").read_text()
+    code = readme.split("```python\n")[1].split("```")[0]
+    text = printed(code, f'GrpcClient("{server.address}"')
+    expected = query("husky", ["--speed=0.8", "--depth=0.18"])
+    numbers = [float(number) for number in NUMBER.findall(text)]
+    np.testing.assert_allclose(numbers, expected["wrench"]["force"], atol=0.051)
