@@ -6,6 +6,8 @@
 #![allow(unsafe_code, reason = "the peak of the core is measured behind a CPU check")]
 
 mod common;
+#[path = "../tests/common/paper.rs"]
+mod paper_weights;
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -37,12 +39,17 @@ fn model(vehicle: &str, isa: Isa) -> Model {
     load(&vehicles().join(vehicle), isa)
 }
 
-/// The version that is kept with the paper's network.
+/// The vehicle with the paper's network.
 fn paper(vehicle: &str, isa: Isa) -> Model {
-    let kept = bundle::kept(&vehicles().join(vehicle)).expect("the shipped versions are sound");
-    let paper = kept.iter().find(|kept| kept.weights.as_ref().is_some_and(|(form, _)| *form == "paper"));
-    let version = paper.expect("the paper's weights are shipped").version.to_string();
-    load(&vehicles().join(format!("{vehicle}.versions")).join(version).join(vehicle), isa)
+    let copy = tempfile::TempDir::new().expect("a temporary folder");
+    let bundle = copy.path().join(vehicle);
+    std::fs::create_dir(&bundle).expect("a folder");
+    for entry in std::fs::read_dir(vehicles().join(vehicle)).expect("readable") {
+        let entry = entry.expect("readable");
+        std::fs::copy(entry.path(), bundle.join(entry.file_name())).expect("copied");
+    }
+    paper_weights::put_into(&bundle);
+    load(&bundle, isa)
 }
 
 /// Deep enough that every surface is wet.

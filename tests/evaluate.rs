@@ -58,7 +58,7 @@ fn planted(vehicle: &str, moments: bool, wrench: impl Fn(&Condition) -> (Vec3, V
 
 fn fit(vehicle: &str, states: &[State]) -> [Baseline; 3] {
     let bundle = bundles().remove(vehicle).unwrap();
-    Baseline::fit(&bundle.vehicle, &bundle.distance, &states.iter().collect::<Vec<_>>()).unwrap()
+    Baseline::fit(&bundle.vehicle, &states.iter().collect::<Vec<_>>()).unwrap()
 }
 
 #[test]

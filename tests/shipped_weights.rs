@@ -1,6 +1,5 @@
 //! The shipped weights come from the committed CFD, were never shown the cases that their record holds out, and are worth
-//! there what the README says: the `anchored` ones, which are in place, nearer than the paper's, which are the version
-//! before.
+//! there what the README says: the `anchored` ones, which are shipped, nearer than the paper's on the same data.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +8,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{VEHICLES, copy_folder, copy_of_vehicles, model, paper_bundle, paper_on, vehicles};
+use common::{VEHICLES, copy_of_vehicles, model, paper, paper_on, vehicles};
 use serde_json::Value;
 use tempfile::TempDir;
 use wade::files::sha256_of;
@@ -74,9 +73,7 @@ fn on_cases_that_neither_has_seen_the_shipped_weights_are_nearer_than_the_papers
     let data = data(folder.path());
     let papers = copy_of_vehicles();
     for vehicle in VEHICLES {
-        let place = papers.path().join(vehicle);
-        std::fs::remove_dir_all(&place).unwrap();
-        copy_folder(&paper_bundle(vehicle), &place);
+        paper::put_into(&papers.path().join(vehicle));
     }
     let anchored = evaluate(&data, &vehicles(), "anchored");
     let paper = evaluate(&data, papers.path(), "paper");

@@ -5,7 +5,7 @@
 //! | `vehicle.toml` | name, version, reference lengths, mass, surfaces, contact patches, training domain, provenance |
 //! | `hull.stl` | the watertight hull in the body frame, binary STL |
 //! | `patches.safetensors` | `face_surface` u16 `[faces]` |
-//! | `sdf.safetensors` | `distance` i16 `[nx, ny, nz]` in steps given, with origin and spacing, in the metadata |
+//! | `sdf.safetensors` | `distance` i16 `[nx, ny, nz]` in steps given, with origin and spacing, in the metadata; only with `wade vehicle build --sdf` |
 //! | `submergence.safetensors` | `points`, `normals` f32 `[n, 3]` by rising z within a surface, `offsets` u32 `[K + 1]` |
 //! | `network.safetensors` | weights and statistics; absent until the vehicle is trained |
 //! | `effects.toml` | the effects that are switched on, see `effects`; may be absent |
@@ -32,10 +32,10 @@ use crate::model::kernel::Isa;
 use crate::model::{Model, Weights};
 use crate::served::ServedVehicle;
 use crate::vehicle::{Vehicle, VehicleError};
-use tensors::TensorError;
 use vehicle_file::VehicleFile;
 
 pub use history::{Kept, apply, kept, roll_back, succeed, succeed_together};
+pub use tensors::TensorError;
 
 /// The file that makes a folder a bundle.
 pub const VEHICLE_FILE: &str = "vehicle.toml";
@@ -59,7 +59,7 @@ const FILES: [&str; 9] = [
     SUMS_FILE,
 ];
 /// Files that a bundle may do without.
-const OPTIONAL: [&str; 3] = [NETWORK_FILE, EFFECTS_FILE, SPEC_FILE];
+const OPTIONAL: [&str; 4] = [SDF_FILE, NETWORK_FILE, EFFECTS_FILE, SPEC_FILE];
 
 /// Format of the bundles that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;
@@ -76,8 +76,8 @@ pub struct Bundle {
     pub version: u32,
     /// The weights and the domain in which they were learnt; none until the vehicle is trained.
     pub trained: Option<(Weights, Domain)>,
-    /// Signed distance to the hull.
-    pub distance: SignedDistanceGrid,
+    /// Signed distance to the hull, where the bundle was built with it: nothing that is served needs it.
+    pub distance: Option<SignedDistanceGrid>,
     /// The effects that are switched on; only with the weights that they were fitted to.
     pub effects: Option<EffectsFile>,
     /// The vehicle file that it was built from.
@@ -280,9 +280,16 @@ impl Files {
             vehicle,
             version: vehicle_file.version,
             trained,
-            distance: self.parse(SDF_FILE, tensors::read_distance)?,
+            distance: self.distance()?,
             spec: self.files.get(SPEC_FILE).map(|bytes| String::from_utf8_lossy(bytes).into_owned()),
         })
+    }
+
+    fn distance(&self) -> Result<Option<SignedDistanceGrid>, BundleError> {
+        if !self.files.contains_key(SDF_FILE) {
+            return Ok(None);
+        }
+        self.parse(SDF_FILE, tensors::read_distance).map(Some)
     }
 
     fn trained(&self, file: &VehicleFile) -> Result<Option<(Weights, Domain)>, BundleError> {
@@ -334,7 +341,7 @@ pub fn names_in(directory: &Path) -> std::io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// Reads the model without its effects; the signed distance grid is verified but not unpacked.
+/// Reads the model without its effects; a signed distance grid is verified but not unpacked.
 pub fn load(directory: &Path, isa: Isa) -> Result<Model, BundleError> {
     Ok(load_parts(directory, isa)?.0)
 }
@@ -402,9 +409,11 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
         (VEHICLE_FILE, VehicleFile::new(bundle).to_toml().into_bytes()),
         (HULL_FILE, write_stl(&bundle.vehicle.hull.mesh)),
         (PATCHES_FILE, tensors::write_patches(&bundle.vehicle.hull.face_surface)),
-        (SDF_FILE, tensors::write_distance(&bundle.distance)),
         (SUBMERGENCE_FILE, tensors::write_samples(&bundle.vehicle.samples)),
     ]);
+    if let Some(grid) = &bundle.distance {
+        files.insert(SDF_FILE, tensors::write_distance(grid));
+    }
     if let Some((weights, _)) = &bundle.trained {
         files.insert(NETWORK_FILE, tensors::write_weights(weights));
     }
@@ -425,6 +434,16 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
     };
     stage().map_err(|error| at(&staged)(error.into()))?;
     Ok(staged)
+}
+
+/// A signed distance grid in the form that a bundle holds it in.
+pub fn distance_bytes(grid: &SignedDistanceGrid) -> Vec<u8> {
+    tensors::write_distance(grid)
+}
+
+/// Reads a grid back from [`distance_bytes`].
+pub fn distance_of(bytes: &[u8]) -> Result<SignedDistanceGrid, TensorError> {
+    tensors::read_distance(bytes)
 }
 
 fn staging_of(directory: &Path, name: &str) -> PathBuf {

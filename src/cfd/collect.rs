@@ -311,7 +311,7 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
     }
     dataset.samples.sort_by(|a, b| a.case.cmp(&b.case).then(a.section.cmp(&b.section)));
     // the data set first: a summary without its sections would never be computed again
-    dataset::write(&path, &dataset)?;
+    dataset::write_compact(&path, &dataset)?;
     collected.write(folder)?;
     Ok(fresh.len())
 }

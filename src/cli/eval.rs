@@ -12,13 +12,12 @@ use wade::dataset::split;
 use wade::evaluate::contest::{Contest, Contestants, enter};
 use wade::evaluate::report::{About, Report, VehicleReport};
 use wade::evaluate::{held_out, paper};
-use wade::geometry::distance::SignedDistanceGrid;
 use wade::model::Model;
 use wade::model::kernel::Isa;
 use wade::train::report::Record;
 use wade::train::{self, Config, Published, Sides, Source, Trained, Variant};
 
-use super::train::{Data, Loaded, Progress, Rule, Served};
+use super::train::{Data, Progress, Rule, Served};
 use super::{PROGRAM, begin_page, emit, usage_error};
 
 /// Judge the weights of the bundles by the states that their training held out
@@ -100,7 +99,7 @@ impl Eval {
             }
             false => record.config.clone(),
         };
-        self.enter(&mut contest, &source, sides, &of_paper, (&loaded, &models))?;
+        self.enter(&mut contest, &source, sides, &of_paper, &models)?;
         let mut settings = self.ablation_settings(&of_paper);
         settings.insert(record.variant.clone(), record.config);
         let about = About {
@@ -138,7 +137,7 @@ impl Eval {
                     models.entry(name).or_default().push(model);
                 }
             }
-            self.enter(&mut contest, &source, sides, &of_paper, (&loaded, &models))?;
+            self.enter(&mut contest, &source, sides, &of_paper, &models)?;
         }
         let splits = splits.iter().map(|split| split.name.clone()).collect();
         let about = About {
@@ -163,7 +162,7 @@ impl Eval {
         source: &Source,
         sides: Sides<'_>,
         of_paper: &Config,
-        (loaded, models): (&Loaded, &BTreeMap<String, Vec<Model>>),
+        models: &BTreeMap<String, Vec<Model>>,
     ) -> Result<()> {
         let mut ablations = Vec::new();
         if self.ablations {
@@ -171,9 +170,7 @@ impl Eval {
                 ablations.push(learn(source, sides, variant, of_paper)?);
             }
         }
-        let distances: BTreeMap<String, &SignedDistanceGrid> =
-            loaded.bundles.iter().map(|(name, bundle)| (name.clone(), &bundle.distance)).collect();
-        let contestants = Contestants { models, distances: &distances, ablations: &ablations };
+        let contestants = Contestants { models, ablations: &ablations };
         Ok(enter(contest, source, sides.split, &contestants)?)
     }
 }

@@ -1,6 +1,7 @@
 //! `wade vehicle`.
 
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -12,9 +13,11 @@ use wade::bundle::{self, Bundle, Kept};
 use wade::condition::FRESH_WATER;
 use wade::domain::Quantity;
 use wade::effects::ActiveEffect;
+use wade::files::StagedFile;
 use wade::frame::WaterPlane;
 use wade::geometry::distance::SignedDistanceGrid;
 use wade::geometry::hydrostatics::hydrostatics;
+use wade::geometry::mesh::Mesh;
 use wade::vehicle::build::build_reporting;
 use wade::vehicle::shipped;
 use wade::vehicle::spec::VehicleSpec;
@@ -54,6 +57,9 @@ enum Command {
         /// Replace leaky and double-skinned parts by their convex hulls
         #[arg(long)]
         seal: bool,
+        /// Also write the paper's signed distance grid into the bundle, which takes seconds and megabytes; no command needs it
+        #[arg(long)]
+        sdf: bool,
     },
     /// Make the bundle of a vehicle that comes with wade, from its dimensions
     #[command(after_help = "Example: wade vehicle generate husky --out vehicles/husky")]
@@ -99,6 +105,20 @@ enum Command {
         #[command(flatten)]
         running: Running,
     },
+    /// Write the source paper's signed distance grid of a hull: longest edge over 64, 0.5 m around it
+    ///
+    /// A safetensors file: `distance` i16 [nx, ny, nz], x fastest, negative inside; origin, spacing and metres a step are
+    /// in its metadata.
+    #[command(after_help = "Example: wade vehicle sdf husky --out husky-sdf.safetensors")]
+    Sdf {
+        /// Name of the vehicle
+        name: String,
+        /// File to write [default: <NAME>-sdf.safetensors]
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        vehicles: Vehicles,
+    },
     /// Have a running server read a bundle again; exit status 1 where it refuses and keeps the version that it serves
     #[command(after_help = "Examples:
   wade vehicle reload husky
@@ -134,10 +154,10 @@ impl Vehicle {
     /// Runs the subcommand.
     pub fn run(self) -> Result<ExitCode> {
         match self.command {
-            Command::Build { stl, spec, out, seal } => {
+            Command::Build { stl, spec, out, seal, sdf } => {
                 let text = std::fs::read_to_string(&spec).with_context(|| spec.display().to_string())?;
                 let bytes = std::fs::read(&stl).with_context(|| stl.display().to_string())?;
-                build(&text, &bytes, &out, seal)
+                build(&text, &bytes, &out, Made { seal, sdf })
                     .with_context(|| format!("{} with {}", stl.display(), spec.display()))?;
             }
             Command::Generate { vehicle, out } => {
@@ -145,7 +165,7 @@ impl Vehicle {
                     Shipped::Husky => (shipped::husky()?, shipped::HUSKY_SPEC),
                     Shipped::Warthog => (shipped::warthog()?, shipped::WARTHOG_SPEC),
                 };
-                build(text, &shipped.stl(), &out, false)?;
+                build(text, &shipped.stl(), &out, Made::default())?;
             }
             Command::Check { bundle, json } => return Ok(check(&bundle, json)),
             Command::List { vehicles, json } => {
@@ -161,6 +181,10 @@ impl Vehicle {
                 println!("{name}: version {version} is in its place again");
                 running.reload(&name);
             }
+            Command::Sdf { name, out, vehicles } => {
+                let out = out.unwrap_or_else(|| format!("{name}-sdf.safetensors").into());
+                sdf(&bundle::read_without_weights(&vehicles.existing(&name)?)?.vehicle.hull.mesh, &out)?;
+            }
             Command::Reload { name, running } => {
                 let served = running.ask(name.as_deref().unwrap_or_default())?;
                 return Ok(if served { ExitCode::SUCCESS } else { ExitCode::FAILURE });
@@ -174,25 +198,25 @@ impl Vehicle {
     }
 }
 
-fn build(spec_text: &str, stl: &[u8], out: &Path, seal: bool) -> Result<()> {
+/// What a build does besides.
+#[derive(Debug, Clone, Copy, Default)]
+struct Made {
+    seal: bool,
+    sdf: bool,
+}
+
+fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let spec: VehicleSpec = toml::from_str(spec_text)?;
     bundle::check_place(out, &spec.name)?;
     let before = match out.exists() {
         true => Some(bundle::read(out).context("the bundle in place cannot be read; move it away first")?),
         false => None,
     };
-    let (vehicle, sealing) = build_reporting(&spec, stl, seal)?;
+    let (vehicle, sealing) = build_reporting(&spec, stl, made.seal)?;
     if let Some(sealing) = sealing {
         eprintln!("sealed: {sealing:?}");
     }
-    let bar = ProgressBar::new(0)
-        .with_message("signed distance")
-        .with_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} slices, {eta} left")?);
-    let distance = SignedDistanceGrid::build(&vehicle.hull.mesh, &|done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-    })?;
-    bar.finish_and_clear();
+    let distance = if made.sdf { Some(signed_distance(&vehicle.hull.mesh)?) } else { None };
     let vehicle_translation = vehicle.translation;
     let spec = Some(spec_text.to_owned());
     let bundle = Bundle { vehicle, version: 0, trained: None, effects: None, distance, spec };
@@ -203,6 +227,36 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, seal: bool) -> Result<()> {
         println!("version {version} is kept: wade vehicle rollback {} puts it back", vehicle.name);
     }
     println!("body frame = axes and scale of the STL, then moved by ({:.4}, {:.4}, {:.4}) m", t.x, t.y, t.z);
+    Ok(())
+}
+
+/// The paper's grid, with a progress bar on a terminal.
+fn signed_distance(mesh: &Mesh) -> Result<SignedDistanceGrid> {
+    let bar = ProgressBar::new(0)
+        .with_message("signed distance")
+        .with_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} slices, {eta} left")?);
+    let grid = SignedDistanceGrid::build(mesh, &|done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(grid)
+}
+
+fn sdf(mesh: &Mesh, out: &Path) -> Result<()> {
+    let mut file = StagedFile::new(out).with_context(|| format!("cannot write {}", out.display()))?;
+    let grid = signed_distance(mesh)?;
+    let written = file.write_all(&bundle::distance_bytes(&grid)).and_then(|()| file.finish());
+    written.with_context(|| out.display().to_string())?;
+    let ([nx, ny, nz], o) = (grid.shape, grid.origin);
+    println!(
+        "{}: {nx} x {ny} x {nz} points, {:.4} m apart, from ({:.4}, {:.4}, {:.4}) m in the body frame",
+        out.display(),
+        grid.spacing,
+        o.x,
+        o.y,
+        o.z
+    );
     Ok(())
 }
 

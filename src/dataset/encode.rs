@@ -22,8 +22,17 @@ const FRAME: &str = "body frame: right-handed, x forward, y left, z up, origin a
                      box; velocities are the vehicle's; forces are those of the water on the vehicle, moments about \
                      the body origin";
 
+/// How the columns of loads are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Loads {
+    /// By a dictionary. A file that is written again has the bytes, and so the digest, that provenances of weights state.
+    Dictionary,
+    /// As they are: nearly every load is another, and a dictionary of them makes the file half as large again.
+    Plain,
+}
+
 /// Writes the whole file; the data set has been checked.
-pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset) -> Result<(), Fault> {
+pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset, loads: Loads) -> Result<(), Fault> {
     let units: BTreeMap<_, _> = schema::units().collect();
     let pairs = [
         (FORMAT_KEY, FORMAT.to_string()),
@@ -31,12 +40,17 @@ pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset) -> Result<
         (UNITS_KEY, serde_json::to_string(&units)?),
         (FRAME_KEY, FRAME.to_owned()),
     ];
-    let properties = WriterProperties::builder()
+    let mut properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(format!("wade {}", env!("CARGO_PKG_VERSION")))
-        .set_key_value_metadata(Some(pairs.map(|(key, value)| KeyValue::new(key.to_owned(), value)).into()))
-        .build();
-    let mut writer = SerializedFileWriter::new(to, Arc::new(message()?), Arc::new(properties))?;
+        .set_key_value_metadata(Some(pairs.map(|(key, value)| KeyValue::new(key.to_owned(), value)).into()));
+    // those at rest repeat from section to section
+    let moving = LOADS.iter().filter(|column| loads == Loads::Plain && !column.names[0].starts_with("rest"));
+    for name in moving.flat_map(|column| column.names) {
+        properties = properties.set_column_dictionary_enabled(name.into(), false);
+    }
+    let properties = Arc::new(properties.build());
+    let mut writer = SerializedFileWriter::new(to, Arc::new(message()?), properties)?;
     let mut group = writer.next_row_group()?;
     let text = |text: &str| ByteArray::from(text.as_bytes().to_vec());
     for column in &TEXTS {

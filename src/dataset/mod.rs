@@ -31,7 +31,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 pub use check::Flaw;
-pub use file::{DatasetError, FORMAT, Fault, read, write};
+pub use file::{DatasetError, FORMAT, Fault, read, write, write_compact};
 pub use lines::{CutOff, LineError};
 pub use merge::MergeError;
 

@@ -8,7 +8,7 @@ use super::states::State;
 use crate::anchor::{Anchor, Reading};
 use crate::condition::Condition;
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
-use crate::geometry::distance::SignedDistanceGrid;
+use crate::geometry::distance::signed_distances;
 use crate::geometry::hydrostatics::hydrostatics;
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
@@ -66,15 +66,11 @@ pub enum Baseline {
 
 impl Baseline {
     /// All three.
-    pub fn fit(
-        vehicle: &Vehicle,
-        distance: &SignedDistanceGrid,
-        training: &[&State],
-    ) -> Result<[Self; 3], BaselineError> {
+    pub fn fit(vehicle: &Vehicle, training: &[&State]) -> Result<[Self; 3], BaselineError> {
         if training.is_empty() {
             return Err(BaselineError::NoStates { vehicle: vehicle.name.clone() });
         }
-        let pontoons = pontoons(vehicle, distance, training);
+        let pontoons = pontoons(vehicle, training);
         let pontoons = pontoons.ok_or_else(|| BaselineError::NoPontoon { vehicle: vehicle.name.clone() })?;
         Ok([archimedes(vehicle, training), pontoons, fossen(vehicle, training)])
     }
@@ -183,7 +179,7 @@ fn archimedes(vehicle: &Vehicle, training: &[&State]) -> Baseline {
     Baseline::Archimedes { drag: factor(training.iter().map(pair)) }
 }
 
-fn pontoons(vehicle: &Vehicle, distance: &SignedDistanceGrid, training: &[&State]) -> Option<Baseline> {
+fn pontoons(vehicle: &Vehicle, training: &[&State]) -> Option<Baseline> {
     let bounds = vehicle.hull.mesh.bounds()?;
     let size = bounds.max - bounds.min;
     let cell = size.min() / CELLS;
@@ -193,10 +189,11 @@ fn pontoons(vehicle: &Vehicle, distance: &SignedDistanceGrid, training: &[&State
         let (nx, ny) = (counts.x as usize, counts.y as usize);
         let place = Vec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64);
         let center = bounds.min + (place.add_scalar(0.5)).component_div(&counts).component_mul(&size);
-        if distance.sample(&center).is_some_and(|distance| distance < 0.0) {
-            centers.push(center);
-        }
+        centers.push(center);
     }
+    let inside = signed_distances(&vehicle.hull.mesh, &centers).ok()?;
+    let mut inside = inside.into_iter().map(|distance| distance < 0.0);
+    centers.retain(|_| inside.next().unwrap_or(false));
     let under = WaterPlane::level(vehicle.z0, 10.0 * size.norm());
     let volume = hydrostatics(&vehicle.hull.mesh, &under, 1.0, &Vec3::zeros()).displaced_volume;
     if centers.is_empty() {

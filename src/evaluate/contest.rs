@@ -8,7 +8,6 @@ use super::baseline::{self, Baseline};
 use super::predict::{Prediction, by_trainer, served};
 use super::states::{State, states};
 use crate::dataset::split::Split;
-use crate::geometry::distance::SignedDistanceGrid;
 use crate::model::Model;
 use crate::train::{Published, Source, Trained};
 
@@ -38,8 +37,6 @@ pub type Contest = BTreeMap<String, Heat>;
 pub struct Contestants<'a> {
     /// The models of each vehicle, as they are served; the first of each is the one under evaluation.
     pub models: &'a BTreeMap<String, Vec<Model>>,
-    /// Signed distance to each hull, for the pontoons.
-    pub distances: &'a BTreeMap<String, &'a SignedDistanceGrid>,
     /// Networks that cannot be served.
     pub ablations: &'a [Trained<Published>],
 }
@@ -59,7 +56,6 @@ pub fn enter(
         }
         let no_model = || EvaluateError::NoModel { vehicle: name.clone() };
         let models = contestants.models.get(name).ok_or_else(no_model)?;
-        let distance = contestants.distances.get(name).ok_or_else(no_model)?;
         let name_of = |model: &Model| model.weights().form.name().to_owned();
         let mut entries: Vec<_> =
             models.iter().map(|model| (name_of(model), served(model, &held_out))).collect();
@@ -67,7 +63,7 @@ pub fn enter(
         let learnt: Vec<&State> = training.iter().filter(|state| state.vehicle == *name).collect();
         // a vehicle that is held out as a whole leaves nothing to fit its simple models to
         if !learnt.is_empty() {
-            for baseline in Baseline::fit(vehicle, distance, &learnt)? {
+            for baseline in Baseline::fit(vehicle, &learnt)? {
                 entries.push((baseline.name().to_owned(), baseline.predict(vehicle, &held_out)));
             }
         }

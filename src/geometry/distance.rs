@@ -67,6 +67,12 @@ pub struct SignedDistanceGrid {
     pub values: Vec<f32>,
 }
 
+/// Signed distances of points to a closed mesh [m], negative inside.
+pub fn signed_distances(mesh: &Mesh, points: &[Vec3]) -> Result<Vec<f64>, GridError> {
+    let solid = Solid::new(mesh).ok_or(GridError::Empty)?;
+    Ok(points.iter().map(|point| solid.signed_distance(point)).collect())
+}
+
 impl SignedDistanceGrid {
     /// The grid of the source paper: spacing of the longest edge over 64, 0.5 m around the bounding box.
     ///

@@ -1,6 +1,8 @@
 //! What several test files need. Each file uses a part of it.
 #![allow(dead_code, reason = "every test file is a crate of its own and uses a part")]
 
+pub mod paper;
+
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
@@ -110,17 +112,11 @@ pub fn model_on(vehicle: &str, isa: Isa) -> Model {
     bundle::load(&vehicles().join(vehicle), isa).expect("the shipped bundles are sound")
 }
 
-/// Where the paper's network on the same CFD lies: the shipped version before the one in place.
-pub fn paper_bundle(vehicle: &str) -> PathBuf {
-    let kept = bundle::kept(&vehicles().join(vehicle)).expect("the shipped versions are sound");
-    let paper = kept.iter().find(|kept| kept.weights.as_ref().is_some_and(|(form, _)| *form == "paper"));
-    let version = paper.expect("the paper's weights are shipped").version.to_string();
-    vehicles().join(format!("{vehicle}.versions")).join(version).join(vehicle)
-}
-
-/// The model of [`paper_bundle`].
+/// The shipped vehicle with the paper's network.
 pub fn paper_on(vehicle: &str, isa: Isa) -> Model {
-    bundle::load(&paper_bundle(vehicle), isa).expect("the shipped versions are sound")
+    let copy = copy_of_vehicles();
+    paper::put_into(&copy.path().join(vehicle));
+    bundle::load(&copy.path().join(vehicle), isa).expect("the fixture is sound")
 }
 
 /// Copies the shipped bundles to where a test may change them.
