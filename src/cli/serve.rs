@@ -3,17 +3,19 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
-use tracing_subscriber::EnvFilter;
-use wade::config::{Config, Log};
+use wade::config::Config;
 use wade::cores;
 use wade::server::{self, Running};
 use wade::service::admin::Reload;
 use wade::service::shm::Wait;
+
+use super::log;
 
 /// Serve vehicles over gRPC, a Unix socket and shared memory
 ///
@@ -72,20 +74,16 @@ impl Serve {
         if self.with_parent {
             nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM)?;
         }
+        let (begun, file) = (Instant::now(), self.config.clone());
         let config = self.config()?;
         config.validate()?;
-        start_log(&config.log)?;
+        log::start(&config.log)?;
+        log::starting(&config, file.as_deref());
         cores::pin_to(&config.cpus).context("cpus")?;
         // before anything is served, so that no signal meets a server that does not expect it
         let mut signals = Signals::new()?;
         let running = server::start(&config)?;
-        tracing::info!(
-            grpc = running.grpc_address().map(tracing::field::display),
-            unix_socket = running.unix_path().map(|path| tracing::field::display(path.display())),
-            http = running.http_address().map(tracing::field::display),
-            shm = config.shm.enabled,
-            "serving"
-        );
+        log::ready(&config, &running, begun.elapsed());
         notify(&[sd_notify::NotifyState::Ready]);
         signals.wait(&running);
         let failed = running.has_failed();
@@ -122,18 +120,6 @@ fn set<T>(place: &mut T, value: Option<T>) {
     if let Some(value) = value {
         *place = value;
     }
-}
-
-fn start_log(log: &Log) -> Result<()> {
-    let filter =
-        EnvFilter::try_new(&log.filter).with_context(|| format!("log.filter = \"{}\"", log.filter))?;
-    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    if log.json {
-        lines.json().init()
-    } else {
-        lines.init()
-    }
-    Ok(())
 }
 
 /// Tells systemd, where it is systemd that started us.

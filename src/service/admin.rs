@@ -145,6 +145,7 @@ fn announce(served: &ServedVehicle, metrics: &Metrics) {
     let effects = served.effects().map_or(0, |file| file.effects.len());
     let vehicle = &model.vehicle().name;
     metrics.set_bundle_version(vehicle, model.version());
-    let (version, provenance) = (model.version(), model.provenance());
-    tracing::info!(vehicle, version, provenance, kernel = model.isa().name(), effects, "bundle loaded");
+    let (version, kernel) = (model.version(), model.isa().name());
+    tracing::info!(vehicle, version, effects, kernel, "bundle loaded");
+    tracing::debug!(vehicle, version, provenance = model.provenance(), "weights");
 }

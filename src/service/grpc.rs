@@ -29,11 +29,11 @@ use tower::layer::util::{Identity, Stack};
 use tower::util::MapResponseLayer;
 
 use super::admin::Reloader;
-use super::proto;
 use super::proto::admin_server::AdminServer;
 use super::proto::hydrodynamics_server::HydrodynamicsServer;
 use super::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
 use super::wire::Refusal;
+use super::{occupant, proto};
 use crate::engine::{Admission, Engine};
 use crate::metrics::Metrics;
 
@@ -87,18 +87,23 @@ pub enum GrpcError {
         listen: String,
     },
     /// The port or the socket could not be had.
-    #[error("cannot listen on {at}: {source}")]
+    #[error("cannot listen on {at}: {reason}")]
     Bind {
         /// Address or path.
         at: String,
-        /// The system's reason.
-        source: std::io::Error,
+        /// Who is in the way and the way out, or the system's reason.
+        reason: String,
     },
     /// Somebody answers on the Unix socket.
-    #[error("another server is listening on {}; stop it or set grpc.unix_socket", .path.display())]
+    #[error(
+        "cannot listen on {}: {occupant} listens there; stop it, or choose another path with --unix-socket \
+         (grpc.unix_socket)", .path.display()
+    )]
     InUse {
         /// The path.
         path: PathBuf,
+        /// Who listens.
+        occupant: String,
     },
     /// The transport broke down.
     #[error("gRPC transport: {0}")]
@@ -151,13 +156,18 @@ fn bind_tcp(listen: &str) -> Result<TcpListener, GrpcError> {
         listener.set_nonblocking(true)?;
         Ok(listener)
     };
-    bind().map_err(|source| GrpcError::Bind { at: address.to_string(), source })
+    bind().map_err(|source| {
+        let way_out = "--listen (grpc.listen)";
+        let reason = occupant::in_the_way(&source, occupant::of_tcp(address), way_out);
+        GrpcError::Bind { at: address.to_string(), reason }
+    })
 }
 
 /// Takes over the file that a killed server left behind, but not the socket of one that lives.
 fn bind_unix(path: &Path) -> Result<UnixListener, GrpcError> {
     if std::os::unix::net::UnixStream::connect(path).is_ok() {
-        return Err(GrpcError::InUse { path: path.to_owned() });
+        let occupant = occupant::of_unix(path).map_or_else(|| "another program".into(), |o| o.to_string());
+        return Err(GrpcError::InUse { path: path.to_owned(), occupant });
     }
     let bind = || {
         // a socket that nobody listens on is a killed server's; anything else is not ours to remove
@@ -169,7 +179,8 @@ fn bind_unix(path: &Path) -> Result<UnixListener, GrpcError> {
         listener.set_nonblocking(true)?;
         Ok(listener)
     };
-    bind().map_err(|source| GrpcError::Bind { at: path.display().to_string(), source })
+    let refused = |source: std::io::Error| source.to_string();
+    bind().map_err(refused).map_err(|reason| GrpcError::Bind { at: path.display().to_string(), reason })
 }
 
 /// What a health check may ask about: the server as a whole, and its services.
@@ -279,7 +290,8 @@ impl Server {
 
     /// Serves the listeners on the current runtime until `stop` turns true and what is in flight is answered.
     pub async fn run(&self, listeners: &Listeners, stop: watch::Receiver<bool>) -> Result<(), GrpcError> {
-        let at = |at: String| move |source| GrpcError::Bind { at, source };
+        let at =
+            |at: String| move |source: std::io::Error| GrpcError::Bind { at, reason: source.to_string() };
         let tcp = async {
             let Some(listener) = &listeners.tcp else {
                 stopped(stop.clone()).await;

@@ -20,8 +20,8 @@ use axum::routing::get;
 use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 
-use super::grpc;
 use super::health::Health;
+use super::{grpc, occupant};
 use crate::engine::Admission;
 use rejection::Rejection;
 
@@ -51,12 +51,12 @@ pub enum HttpError {
         listen: String,
     },
     /// The port could not be had.
-    #[error("cannot listen on {listen} for HTTP: {source}")]
+    #[error("cannot listen on {listen} for HTTP: {reason}")]
     Bind {
         /// The address.
         listen: String,
-        /// The system's reason.
-        source: std::io::Error,
+        /// Who is in the way and the way out, or the system's reason.
+        reason: String,
     },
 }
 
@@ -73,7 +73,11 @@ pub fn bind(config: &Config) -> Result<Option<TcpListener>, HttpError> {
         listener.set_nonblocking(true)?;
         Ok(listener)
     };
-    bind().map(Some).map_err(|source| HttpError::Bind { listen, source })
+    bind().map(Some).map_err(|source| {
+        let way_out = "--http (http.listen)";
+        let reason = occupant::in_the_way(&source, occupant::of_tcp(address), way_out);
+        HttpError::Bind { listen, reason }
+    })
 }
 
 /// What the handlers share.

@@ -1,0 +1,64 @@
+//! The logs of `wade serve`.
+
+use std::io::IsTerminal;
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use tracing_subscriber::EnvFilter;
+use wade::config::{Config, Log};
+use wade::server::Running;
+use wade::service::shm::Wait;
+
+/// Logs to standard error, with colors only on a terminal and only where NO_COLOR is unset or empty (no-color.org).
+pub fn start(log: &Log) -> Result<()> {
+    let filter =
+        EnvFilter::try_new(&log.filter).with_context(|| format!("log.filter = \"{}\"", log.filter))?;
+    let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    let colors = std::io::stderr().is_terminal() && !no_color;
+    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    if log.json {
+        lines.json().init()
+    } else {
+        // the module would make lines long, and only who writes a filter needs it: JSON has it
+        lines.with_ansi(colors).with_target(false).init()
+    }
+    Ok(())
+}
+
+/// Says which program starts, and with which settings.
+pub fn starting(config: &Config, file: Option<&Path>) {
+    tracing::info!(version = env!("CARGO_PKG_VERSION"), commit = env!("WADE_COMMIT"), "wade starts");
+    match file {
+        Some(file) => tracing::info!(file = %absolute(file), "settings"),
+        None => tracing::info!("settings: the defaults, no --config"),
+    }
+    tracing::info!(folder = %absolute(&config.vehicles_directory()), "vehicles");
+}
+
+/// Says where the server can be reached, and after how long.
+pub fn ready(config: &Config, running: &Running, elapsed: Duration) {
+    if let Some(address) = running.grpc_address() {
+        tracing::info!(%address, "gRPC");
+    }
+    if let Some(path) = running.unix_path() {
+        tracing::info!(address = %format!("unix:{}", path.display()), "gRPC");
+    }
+    match (config.shm.enabled, config.shm.wait) {
+        (true, wait) => tracing::info!(
+            address = %format!("shm:{}", config.shm.namespace),
+            wait = if wait == Wait::Spin { "spin" } else { "block" },
+            "shared memory"
+        ),
+        (false, _) => tracing::info!("shared memory: off"),
+    }
+    if let Some(address) = running.http_address() {
+        tracing::info!("page at http://{address}/");
+    }
+    tracing::info!("ready in {} ms", elapsed.as_millis());
+}
+
+/// A path as whoever reads the log elsewhere needs it.
+fn absolute(path: &Path) -> impl std::fmt::Display {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string()
+}
