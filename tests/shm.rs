@@ -54,7 +54,7 @@ fn a_server_goes_on_when_clients_are_killed() {
             .args(["soak", "--vehicle", "husky", "--transport", "shm-block", "--rate", "max"])
             .args(["--duration", "60s", "--warm-up", "1ms", "--pin", "off"])
             .arg("--addr")
-            .arg(&served.config.shm.namespace)
+            .arg(format!("shm:{}", served.config.shm.namespace))
             .arg("--vehicles")
             .arg(vehicles())
             .arg("--out")

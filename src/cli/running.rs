@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Args;
-use wade::client::{ClientError, reload};
+use wade::client::{Address, AddressError, ClientError, reload};
 
 /// Longest wait for a server that may not be there.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -11,9 +11,20 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 /// Who is told that a bundle has changed.
 #[derive(Debug, Args)]
 pub struct Running {
-    /// Server that is asked to serve the bundle at once, where one runs: http://HOST:PORT or unix:PATH
-    #[arg(long, value_name = "URL", default_value = "unix:/tmp/wade.sock")]
-    server: String,
+    /// Server that is asked to serve the bundle at once, where one runs: host:port, http://host:port or unix:PATH
+    #[arg(long, value_name = "ADDR", default_value = "unix:/tmp/wade.sock", value_parser = of_grpc)]
+    server: Address,
+}
+
+/// An address at which a server can be asked to read bundles.
+fn of_grpc(text: &str) -> Result<Address, String> {
+    let address: Address = text.parse().map_err(|error: AddressError| error.to_string())?;
+    match address.url() {
+        Some(_) => Ok(address),
+        None => {
+            Err("shared memory carries queries alone; write host:port, http://host:port or unix:PATH".into())
+        }
+    }
 }
 
 impl Running {
@@ -26,7 +37,7 @@ impl Running {
 
     /// The same of a server that must be there, and of every vehicle where none is named; false where it refused a bundle.
     pub fn ask(&self, vehicle: &str) -> Result<bool, ClientError> {
-        let reloaded = reload(&self.server, vehicle, TIMEOUT)?;
+        let reloaded = reload(&self.server.url().unwrap_or_default(), vehicle, TIMEOUT)?;
         for one in &reloaded {
             let (server, name, version) = (&self.server, &one.vehicle, one.bundle_version);
             match one.refusal.as_str() {

@@ -1,5 +1,6 @@
 //! Clients of the library's own: in process, gRPC, shared memory; one call and one reply for all.
 
+mod address;
 mod grpc;
 mod grpc_link;
 mod shm;
@@ -8,6 +9,7 @@ mod shm_link;
 use std::sync::Arc;
 use std::time::Duration;
 
+pub use address::{Address, AddressError};
 pub use grpc::{GrpcClient, Method, reload, replies};
 pub use grpc_link::GrpcLink;
 pub use shm::ShmClient;
