@@ -168,11 +168,37 @@ fn a_query_as_json_has_the_bits_of_grpc_with_every_effect() {
             for (effect, expected) in effects.iter().zip(&expected.effects) {
                 assert_eq!(vector_bits(&effect["force_n"]), expected.force.map(f32::to_bits));
             }
+            let rows = answer["added_mass"].as_array().expect("an array");
             assert_eq!(
-                bits(answer["added_mass"].as_array().expect("an array")),
+                bits(rows.iter().flat_map(|row| row.as_array().expect("a row"))),
                 expected.added_mass.expect("there is such an effect").map(f32::to_bits)
             );
         }
+    }
+}
+
+#[test]
+fn the_command_and_the_server_write_one_document() {
+    let bundles = common::copy_with_every_effect();
+    let served = Served::with(|config| config.vehicles = bundles.path().to_owned());
+    let url = format!("http://{}", served.running.grpc_address().expect("TCP is on"));
+    let state = json!({"velocity_mps": {"x": 2.0}, "depth_m": 0.5, "gravity_direction": {"z": -1.0}});
+    let body = json!({"vehicle": "husky", "state": state}).to_string();
+    let mut expected = post(address(&served), "/v1/query", &body).json();
+    assert_eq!(expected["surfaces"][9]["name"], "wheel_fl");
+    assert_eq!(expected["outside"][0]["quantity"], "speed_mps");
+    assert_eq!(expected["effects"][0]["name"], "added_mass");
+    expected["compute_ns"] = Value::Null;
+    let folder = bundles.path().to_str().expect("UTF-8");
+    for more in [["--addr", &url], ["--vehicles", folder]] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_wade"))
+            .args(["query", "--vehicle", "husky", "--speed", "2", "--depth", "0.5", "--json"])
+            .args(more)
+            .output()
+            .expect("the program runs");
+        let mut document: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        document["compute_ns"] = Value::Null;
+        assert_eq!(document, expected, "{more:?}");
     }
 }
 

@@ -191,6 +191,51 @@ impl From<proto::EvaluateResponse> for Reply {
     }
 }
 
+impl From<&Reply> for proto::EvaluateResponse {
+    fn from(reply: &Reply) -> Self {
+        let vector = |[x, y, z]: [f32; 3]| Some(proto::Vector3 { x, y, z });
+        let effect = |load: &EffectReply| proto::EffectLoad {
+            effect: load.effect.code() as i32,
+            force_n: vector(load.force),
+            moment_nm: vector(load.moment),
+            left_out: load.left_out.map_or(0, |reason| reason as i32),
+        };
+        let outside = reply.outside.iter().map(|(quantity, excess)| proto::Outside {
+            quantity: quantity as i32,
+            excess: excess as f32,
+            index: 0,
+        });
+        let effects_outside = BoxQuantity::ALL.into_iter().zip(reply.effects_outside);
+        Self {
+            surface_force_n: reply.surfaces.iter().flat_map(|surface| surface.force).collect(),
+            surface_point_m: reply.surfaces.iter().flat_map(|surface| surface.point).collect(),
+            wetted_fraction: reply.surfaces.iter().map(|surface| surface.wetted_fraction).collect(),
+            wrench: Some(proto::Wrench {
+                force_n: vector(reply.force),
+                moment_nm: vector(reply.moment),
+                about_m: vector(reply.about),
+            }),
+            uncertainty_n: vector(reply.uncertainty),
+            in_domain: reply.outside.is_inside(),
+            outside: outside.collect(),
+            bundle_version: reply.version,
+            provenance: reply.provenance.clone(),
+            compute_ns: reply.compute_ns,
+            effects: reply.effects.iter().map(effect).collect(),
+            effect_surface_force_n: reply.effect_surface_forces.iter().flatten().copied().collect(),
+            effects_outside: effects_outside
+                .filter(|(_, excess)| *excess != 0.0)
+                .map(|(quantity, excess)| proto::EffectOutside {
+                    quantity: quantity as i32,
+                    excess: excess as f32,
+                    index: 0,
+                })
+                .collect(),
+            added_mass: reply.added_mass.map_or_else(Vec::new, Vec::from),
+        }
+    }
+}
+
 /// The replies to the states of a batch, in order.
 pub fn replies(response: proto::EvaluateBatchResponse) -> Vec<Reply> {
     let states = response.force_n.len() / 3;

@@ -1,9 +1,11 @@
 //! The doors through which queries come: checks, gRPC, shared memory, administration.
 
 pub mod admin;
+pub mod answer;
 pub mod grpc;
 pub mod health;
 pub mod http;
+pub mod occupant;
 mod sessions;
 pub mod shm;
 pub mod shm_layout;

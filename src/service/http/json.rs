@@ -73,6 +73,13 @@ pub fn write(name: &str, message: &impl prost::Message) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], text).into_response()
 }
 
+/// Writes a document that is no message.
+pub fn document(document: &impl serde::Serialize) -> Response {
+    let mut text = serde_json::to_vec_pretty(document).expect("numbers, text and lists alone");
+    text.push(b'\n');
+    ([(header::CONTENT_TYPE, "application/json")], text).into_response()
+}
+
 /// The JSON of a message of this name whose fields stand in the parameters of a URL, by path: `state.depth_m=0.2`. A
 /// field that repeats is given as often as it has values.
 pub fn from_parameters(name: &str, parameters: &str) -> Result<Vec<u8>, Rejection> {

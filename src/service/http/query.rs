@@ -1,4 +1,5 @@
-//! Queries, vehicles and latencies as JSON: the messages of `wade.v1.Hydrodynamics`.
+//! Queries, vehicles and latencies as JSON: the messages of `wade.v1.Hydrodynamics`, but the answer to a query, which is
+//! the document of `wade query --json` too.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,6 +14,7 @@ use super::Shared;
 use super::json;
 use super::rejection::Rejection;
 use crate::metrics::Transport;
+use crate::service::answer::Answer;
 use crate::service::grpc::{self, Call, answer_state};
 use crate::service::proto;
 use crate::service::wire::Refusal;
@@ -57,12 +59,14 @@ fn evaluate(shared: &Shared, text: &[u8]) -> Result<Response, Rejection> {
             return Err(rejection);
         }
     };
+    let mut names = Vec::new();
     let answer = call.admit(&shared.requests).and_then(|_permit| {
         let vehicle = shared.grpc.engine.vehicle(&request.vehicle)?;
+        names = vehicle.model().vehicle().surfaces.iter().map(|surface| surface.name.clone()).collect();
         answer_state(&vehicle, request.state.as_ref(), None)
     });
     let response = call.record(answer)?;
-    Ok(json::write("wade.v1.EvaluateResponse", &response))
+    Ok(json::document(&Answer::new(&request.vehicle, &names, response)))
 }
 
 async fn vehicles(State(shared): State<Arc<Shared>>) -> Response {

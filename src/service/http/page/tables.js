@@ -2,9 +2,11 @@
 
 import { css, short } from "./scale.js";
 
-const UNITS = {
-  SPEED: "m/s", ANGLE: "rad", DENSITY: "kg/m³", DEPTH: "m", TILT: "rad", VERTICAL_SPEED: "m/s", ANGULAR_SPEED: "rad/s",
-  DISTANCE: "", ACCELERATION: "m/s²",
+/** Quantities of the training domain and of the effects' box: in words, and their unit. */
+const QUANTITIES = {
+  speed_mps: ["speed", "m/s"], angle_rad: ["flow angle", "rad"], density_kgpm3: ["density", "kg/m³"], depth_m: ["depth", "m"],
+  tilt_rad: ["tilt", "rad"], vertical_speed_mps: ["vertical speed", "m/s"], angular_speed_radps: ["angular speed", "rad/s"],
+  distance: ["distance to the training states", "times their usual spacing"], acceleration_mps2: ["acceleration", "m/s²"],
 };
 const TRANSPORTS = {
   grpc_unary: "gRPC, TCP", grpc_batch: "gRPC batch, TCP", grpc_stream: "gRPC stream, TCP", uds_unary: "gRPC, Unix socket",
@@ -15,7 +17,7 @@ const TRANSPORTS = {
 
 const element = (id) => document.getElementById(id);
 const fixed = (value) => value.toFixed(2).replace(/^-(0\.00)$/, "$1");
-const words = (name, prefix) => name.slice(prefix.length).toLowerCase().replaceAll("_", " ");
+const words = (name) => name.replaceAll("_", " ");
 
 function cell(tag, content, className = "") {
   const made = Object.assign(document.createElement(tag), { className });
@@ -50,24 +52,24 @@ export function showWrench(answer, vehicle) {
 
 export function showFlags(answer) {
   element("bundle").textContent = `bundle version ${answer.bundle_version}, weights: ${answer.provenance}`;
-  const excess = ({ quantity, excess }, prefix) => {
-    const name = quantity.slice(prefix.length);
-    return `${words(quantity, prefix)} by ${excess > 0 ? "+" : ""}${short(excess)} ${UNITS[name] ?? ""}`.trim();
+  const excess = ({ quantity, excess }) => {
+    const [name, unit] = QUANTITIES[quantity] ?? [quantity, ""];
+    return `${name} by ${excess > 0 ? "+" : ""}${short(excess)} ${unit}`.trim();
   };
   const flag = (text, className) => cell("span", text, `flag ${className}`);
-  const outside = answer.outside.map((entry) => excess(entry, "QUANTITY_")).join(", ");
+  const outside = answer.outside.map(excess).join(", ");
   const flags = [answer.in_domain ? flag("inside the training domain", "pass") : flag(`outside the training domain: ${outside}`, "notice")];
   if (answer.effects.length > 0) flags.push(flag(`${answer.effects.length} effects added`, ""));
-  const far = answer.effects_outside.map((entry) => excess(entry, "BOX_QUANTITY_")).join(", ");
+  const far = answer.effects_outside.map(excess).join(", ");
   if (far) flags.push(flag(`outside what the effects were seen in: ${far}`, "notice"));
   element("flags").replaceChildren(...flags);
 }
 
 export function showRemarks(answer) {
-  const remarks = answer.effects.filter((effect) => effect.left_out !== "LEFT_OUT_UNSPECIFIED")
-    .map((effect) => `${words(effect.effect, "EFFECT_")} left out: ${words(effect.left_out, "LEFT_OUT_")}`);
+  const remarks = answer.effects.filter((effect) => effect.left_out)
+    .map((effect) => `${words(effect.name)} left out: ${words(effect.left_out)}`);
   if (!answer.in_domain) remarks.push("Outside the training domain the standard deviation is a lower bound.");
-  if (answer.provenance === "analytic") remarks.push("The weights were learnt from loads by formula, not from CFD.");
+  if (answer.provenance === "analytic") remarks.push("The weights were trained on loads by formula, not on CFD.");
   element("remarks").replaceChildren(...remarks.map((text) => cell("li", text)));
 }
 
@@ -85,7 +87,7 @@ export function showSurfaces(surfaces, answer, pointed) {
   });
   const effects = answer.effects.map((effect) => {
     const { x, y, z } = effect.force_n;
-    return row("td", [`+ ${words(effect.effect, "EFFECT_")}`, "", ...numbers([x, y, z]), fixed(Math.hypot(x, y, z))]);
+    return row("td", [`+ ${words(effect.name)}`, "", ...numbers([x, y, z]), fixed(Math.hypot(x, y, z))]);
   });
   const { x, y, z } = answer.wrench.force_n;
   const sum = row("td", ["net force", "", ...numbers([x, y, z]), fixed(Math.hypot(x, y, z))], "sum");
