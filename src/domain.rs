@@ -57,6 +57,34 @@ impl Quantity {
     }
 }
 
+impl Quantity {
+    /// The name in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Angle => "flow angle",
+            Self::Density => "density",
+            Self::Depth => "depth",
+            Self::Tilt => "tilt",
+            Self::VerticalSpeed => "vertical speed",
+            Self::AngularSpeed => "angular speed",
+            Self::Distance => "distance to the training states",
+        }
+    }
+
+    /// The unit of its values.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Speed | Self::VerticalSpeed => "m/s",
+            Self::Angle | Self::Tilt => "rad",
+            Self::Density => "kg/m3",
+            Self::Depth => "m",
+            Self::AngularSpeed => "rad/s",
+            Self::Distance => "times their usual spacing",
+        }
+    }
+}
+
 /// An inclusive range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

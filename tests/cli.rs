@@ -125,6 +125,28 @@ fn exit_codes_tell_usage_from_failure() {
 }
 
 #[test]
+fn a_state_outside_the_training_domain_is_said_loudly_with_what_was_probably_meant() {
+    let ask = |more: &[&str]| wade(&[&["query", "--vehicle", "husky", "--speed", "0.8"], more].concat());
+    let stderr = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let inside = ask(&["--depth", "0.18", "--strict"]);
+    assert_eq!((inside.status.code(), stderr(&inside).as_str()), (Some(0), ""));
+    for (arguments, says) in [
+        (["--depth", "18"].as_slice(), "were 18 cm meant? Write 0.18"),
+        (&["--depth", "18"], "times the usual spacing of the training states"),
+        (&["--depth", "0.18", "--roll", "10"], "were 10 degrees meant? --roll 0.1745"),
+        (&["--depth", "0.18", "--density", "1"], "were 1 g/cm3 meant? Write 1000"),
+    ] {
+        for more in [[].as_slice(), &["--json"]] {
+            let output = ask(&[arguments, more].concat());
+            let text = stderr(&output);
+            assert_eq!(output.status.code(), Some(0), "{text}");
+            assert!(text.starts_with("warning: the state is outside") && text.contains(says), "{text}");
+        }
+        assert_eq!(ask(&[arguments, &["--strict"]].concat()).status.code(), Some(1));
+    }
+}
+
+#[test]
 fn a_bundle_is_checked() {
     let good = common::vehicles().join("husky");
     assert_eq!(wade(&["vehicle", "check", &good.to_string_lossy()]).status.code(), Some(0));
@@ -200,6 +222,26 @@ fn a_table_of_states_gets_its_forces() {
         let expected = expected.as_f64().expect("a number");
         assert!((value - expected).abs() <= 1e-6 * expected.abs(), "{name}: {value} and {expected}");
     }
+    // straight ahead nothing acts to the side, and what rounding leaves is no force
+    assert_eq!(&rows[1][column("fy")], "0");
+    assert!(rows.iter().flatten().all(|cell| cell != "-0" && !cell.starts_with("-0.00000")), "{rows:?}");
+    let deviation: f64 = rows[1][column("sfx")].parse().expect("a number");
+    let expected = answer["uncertainty"]["force"][0].as_f64().expect("a number");
+    assert!((deviation - expected).abs() <= 1e-6 * expected, "{deviation} and {expected}");
+    for (name, expected) in [("smx", ""), ("smy", ""), ("smz", ""), ("in_domain", "1"), ("outside", "")] {
+        assert_eq!(&rows[1][column(name)], expected, "{name}");
+    }
+    std::fs::write(&states, "vx,vy,vz,depth,rho\n0.5,0,0,0.1,1000\n0.5,0,0,18,1\n").expect("written");
+    let output = wade(&arguments);
+    let warning = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && warning.contains("1 of 2 rows are outside"), "{warning}");
+    let mut reader = csv::Reader::from_path(&out).expect("a table");
+    let headers = reader.headers().expect("headers").clone();
+    let last = reader.records().last().expect("two rows").expect("a row");
+    let at = headers.iter().position(|header| header == "outside").expect("the column");
+    assert_eq!(&last[at], "density_kgpm3;depth_m;distance");
+    assert_eq!(wade(&[&arguments[..], &["--strict"]].concat()).status.code(), Some(1));
+
     std::fs::write(&states, "t,vx,vy,vz,depth\n0,0.5,0,0,0.1\n1,oops,0,0,0.18\n").expect("written");
     let output = wade(&arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use wade::domain::{Domain, Outside};
 use wade::effects::Session;
 use wade::files::StagedFile;
 use wade::frame::Vec3;
@@ -13,14 +14,15 @@ use wade::service::wire::State;
 use wade::service::{Evaluated, Evaluator};
 use wade::states::{Row, unknown_columns};
 
-use super::Vehicles;
+use super::{Vehicles, outside};
 
 /// Forces for every row of a table of states
 ///
 /// Columns: vx vy vz and depth; optionally cx cy cz (current), wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho,
-/// wheel_fl wheel_fr wheel_rl wheel_rr, in SI units and radians. Adds fx fy fz mx my mz about the center of mass and
-/// in_domain (1 or 0); other columns are kept. Where there is a column t, the rows are one run in time, along which effects
-/// remember waves and flooding.
+/// wheel_fl wheel_fr wheel_rl wheel_rr, in SI units and radians. Other columns are kept. Adds fx fy fz mx my mz about the
+/// center of mass; their predicted standard deviations sfx sfy sfz smx smy smz, empty where the model states none, as for
+/// moments; in_domain (1 or 0); and outside, the quantities outside the training domain with `;` between them. Where there
+/// is a column t, the rows are one run in time, along which effects remember waves and flooding.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   wade predict --vehicle warthog --states in.csv --out out.csv --per-surface")]
@@ -37,11 +39,16 @@ pub struct Predict {
     /// Adds the forces of each surface, with what effects put on it; what they put on the hull as a whole is in the net alone
     #[arg(long)]
     per_surface: bool,
+    /// Exit status 1 where a row is outside the training domain
+    #[arg(long)]
+    strict: bool,
     #[command(flatten)]
     vehicles: Vehicles,
 }
 
-const NET: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
+/// Columns that are added for every row.
+const ADDED: [&str; 14] =
+    ["fx", "fy", "fz", "mx", "my", "mz", "sfx", "sfy", "sfz", "smx", "smy", "smz", "in_domain", "outside"];
 
 impl Predict {
     /// Writes the table beside its place and renames it, so that a failure leaves no half of it.
@@ -61,6 +68,7 @@ impl Predict {
         let mut evaluator = Evaluator::default();
         let mut session = headers.iter().any(|header| header == "t").then(Session::default);
         let mut before: Option<f64> = None;
+        let mut far = Far::default();
         for (row, record) in reader.records().enumerate() {
             let at = || format!("{states}, row {}", row + 2);
             let record = record.with_context(at)?;
@@ -69,17 +77,21 @@ impl Predict {
             before = row.t;
             let state = State { time_step, ..row.state() };
             let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut()).with_context(at)?;
+            far.count(&evaluated.forces.outside);
             let added = self.values(&evaluated);
             writer.write_record(record.iter().map(str::to_owned).chain(added))?;
         }
         writer.flush()?;
         drop(writer);
         staged.finish().with_context(out)?;
-        Ok(ExitCode::SUCCESS)
+        if let Some(warning) = far.warning(vehicle.model().domain()) {
+            eprint!("{warning}");
+        }
+        Ok(ExitCode::from(u8::from(self.strict && far.outside > 0)))
     }
 
     fn names(&self, model: &Model) -> Vec<String> {
-        let net = NET.into_iter().chain(["in_domain"]).map(str::to_owned);
+        let net = ADDED.into_iter().map(str::to_owned);
         let surfaces = model.vehicle().surfaces.iter().filter(|_| self.per_surface);
         net.chain(surfaces.flat_map(|s| ["fx", "fy", "fz"].map(|axis| format!("{}_{axis}", s.name))))
             .collect()
@@ -88,12 +100,57 @@ impl Predict {
     fn values(&self, Evaluated { forces, effects, .. }: &Evaluated<'_>) -> Vec<String> {
         let no_effects = vec![Vec3::zeros(); forces.surfaces.len()];
         let added = if effects.loads.is_empty() { &no_effects } else { &effects.surface_forces };
-        let wrench = forces.wrench.force.iter().chain(forces.wrench.moment.iter()).map(f64::to_string);
+        let wrench = forces.wrench.force.iter().chain(forces.wrench.moment.iter()).map(number);
+        // the model states a deviation of the force alone
+        let deviation = forces.uncertainty.iter().map(number).chain(std::iter::repeat_n(String::new(), 3));
         let in_domain = u8::from(forces.outside.is_inside()).to_string();
+        let outside: Vec<&str> = forces.outside.iter().map(|(quantity, _)| quantity.name()).collect();
         let surfaces = forces.surfaces.iter().zip(added).filter(|_| self.per_surface);
-        let forces =
-            surfaces.flat_map(|(load, added)| <[f64; 3]>::from(load.force + added).map(|f| f.to_string()));
-        wrench.chain([in_domain]).chain(forces).collect()
+        let loads =
+            surfaces.flat_map(|(load, added)| <[f64; 3]>::from(load.force + added).map(|f| number(&f)));
+        wrench.chain(deviation).chain([in_domain, outside.join(";")]).chain(loads).collect()
+    }
+}
+
+/// Finest force or moment that is written [N, N m]: what is below is left of rounding, and would be written as -0.
+const FINEST: i32 = 9;
+
+/// A load with nine significant digits, more than the weights have, and never finer than [`FINEST`] decimals.
+fn number(value: &f64) -> String {
+    let before = value.abs().max(1.0).log10().floor() as i32 + 1;
+    let decimals = usize::try_from(FINEST - before).unwrap_or(0);
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// How many rows are outside the training domain, and the farthest of each quantity.
+#[derive(Default)]
+struct Far {
+    rows: usize,
+    outside: usize,
+    farthest: Outside,
+}
+
+impl Far {
+    fn count(&mut self, outside: &Outside) {
+        self.rows += 1;
+        self.outside += usize::from(!outside.is_inside());
+        for (farthest, excess) in self.farthest.excess.iter_mut().zip(outside.excess) {
+            if excess.abs() > farthest.abs() {
+                *farthest = excess;
+            }
+        }
+    }
+
+    fn warning(&self, domain: &Domain) -> Option<String> {
+        let lines = outside::lines(&self.farthest, Some(domain));
+        (self.outside > 0).then(|| {
+            format!(
+                "warning: {} of {} rows are outside the training domain; their forces are not reliable. Farthest:\n{lines}",
+                self.outside, self.rows
+            )
+        })
     }
 }
 
@@ -117,8 +174,8 @@ fn check_columns(headers: &csv::StringRecord) -> Result<()> {
     if let Some(missing) = ["vx", "vy", "vz", "depth"].into_iter().find(|name| !has(name)) {
         bail!("column {missing} is missing; there are: {}", headers.iter().collect::<Vec<_>>().join(", "));
     }
-    if let Some(taken) = NET.into_iter().find(|name| has(name)) {
-        bail!("column {taken} is there already: forces are what this adds");
+    if let Some(taken) = ADDED.into_iter().find(|name| has(name)) {
+        bail!("column {taken} is there already: wade predict adds it; rename or remove yours");
     }
     unknown_columns(headers).iter().for_each(|column| eprintln!("column {column} is kept and not used"));
     Ok(())

@@ -1,47 +1,51 @@
 //! `wade query`.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
-use wade::client::{Client, GrpcClient, InProcess, Method, Reply, ShmClient};
-use wade::effects::{BoxQuantity, LeftOut};
+use wade::client::{Address, Client, GrpcClient, InProcess, Method, Reply, ShmClient};
+use wade::domain::Domain;
+use wade::model::Model;
+use wade::service::answer::Answer;
+use wade::service::proto::EvaluateResponse;
 use wade::service::shm::Wait;
 use wade::service::{grpc, shm};
 
 use super::state::StateArgs;
-use super::{Vehicles, emit};
+use super::{Vehicles, emit, outside, usage_error};
 
 /// Ask for the forces in one state
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   wade query --vehicle husky --speed 0.8 --depth 0.18
-  wade query --vehicle warthog --velocity 2,0.5,0 --depth 0.3 --transport shm --json
-  wade query --vehicle husky --speed 0 --current -1,0,0 --depth 0.1 --addr http://10.0.0.7:50051")]
+  wade query --vehicle warthog --velocity 2,0.5,0 --depth 0.3 --transport shm
+  wade query --vehicle husky --current -1,0,0 --depth 0.1 --addr 10.0.0.7:50051")]
 pub struct Query {
     /// Name of the vehicle
     #[arg(long)]
     vehicle: String,
     #[command(flatten)]
     state: StateArgs,
-    /// Ask the server at this URL, http://HOST:PORT or unix:PATH
-    #[arg(long, value_name = "URL", conflicts_with = "transport")]
-    addr: Option<String>,
-    /// Compute here, or ask the server on this machine
-    #[arg(long, value_enum, default_value_t = Transport::Inproc)]
-    transport: Transport,
-    /// Namespace of the server's shared memory
-    #[arg(long, default_value = shm::NAMESPACE)]
-    namespace: String,
+    /// Ask this server: host:port, http://host:port, unix:PATH or shm:NAMESPACE
+    #[arg(long)]
+    addr: Option<Address>,
+    /// Compute here, or ask the server on this machine at its usual address [default: inproc, or that of --addr]
+    #[arg(long, value_enum)]
+    transport: Option<Transport>,
+    /// Namespace of the server's shared memory, with --transport shm
+    #[arg(long, conflicts_with = "addr")]
+    namespace: Option<String>,
     #[command(flatten)]
     vehicles: Vehicles,
     /// Longest wait for an answer [s]
     #[arg(long, default_value_t = 1.0)]
     timeout: f64,
+    /// Exit status 1 where the state is outside the training domain
+    #[arg(long)]
+    strict: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -59,102 +63,110 @@ enum Transport {
     Shm,
 }
 
+impl Transport {
+    fn suits(self, address: &Address) -> bool {
+        matches!(
+            (self, address),
+            (Self::Grpc, Address::Tcp(_)) | (Self::Uds, Address::Unix(_)) | (Self::Shm, Address::Shm(_))
+        )
+    }
+}
+
+/// What is known of a vehicle beside its answers.
+#[derive(Default)]
+struct About {
+    /// Names of its surfaces.
+    surfaces: Vec<String>,
+    /// The training domain of its weights.
+    domain: Option<Domain>,
+}
+
+impl About {
+    fn of_model(model: &Model) -> Self {
+        let surfaces = model.vehicle().surfaces.iter().map(|surface| surface.name.clone()).collect();
+        Self { surfaces, domain: Some(*model.domain()) }
+    }
+
+    fn name(&self, index: usize) -> String {
+        self.surfaces.get(index).cloned().unwrap_or_else(|| format!("surface_{index}"))
+    }
+}
+
 impl Query {
     /// Prints the forces.
     pub fn run(self) -> Result<ExitCode> {
-        let (mut client, names) = self.client()?;
+        let (mut client, about) = self.client()?;
         let reply = client.evaluate(&self.state.state())?;
+        let warnings = [
+            outside::warning(&self.state, &reply.outside, about.domain.as_ref()),
+            outside::effects_warning(&reply.effects_outside),
+        ];
+        let is_outside = warnings.iter().any(Option::is_some);
         if self.json {
-            emit(&format!("{:#}\n", to_json(&self.vehicle, &names, &reply)))?;
+            let answer = Answer::new(&self.vehicle, &about.surfaces, EvaluateResponse::from(&reply));
+            emit(&format!("{}\n", serde_json::to_string_pretty(&answer)?))?;
         } else {
-            emit(&to_table(&self.vehicle, &names, &reply))?;
+            emit(&to_table(&self.vehicle, &about, &reply))?;
         }
-        Ok(ExitCode::SUCCESS)
+        warnings.into_iter().flatten().for_each(|warning| eprint!("{warning}"));
+        Ok(ExitCode::from(u8::from(self.strict && is_outside)))
     }
 
-    /// A client, and the names of the surfaces.
-    fn client(&self) -> Result<(Client, Vec<String>)> {
+    /// The server that is asked; none for a query in this process. What contradicts the address is refused.
+    fn address(&self) -> Option<Address> {
+        let usual = grpc::Config::default();
+        if self.namespace.is_some() && self.transport != Some(Transport::Shm) {
+            usage_error("--namespace goes with --transport shm");
+        }
+        match (&self.addr, self.transport) {
+            (Some(address), None) => Some(address.clone()),
+            (Some(address), Some(transport)) if transport.suits(address) => Some(address.clone()),
+            (Some(address), Some(transport)) => {
+                let transport = transport.to_possible_value().map(|value| value.get_name().to_owned());
+                usage_error(&format!(
+                    "--addr is {address}, which --transport {} does not ask; leave --transport out",
+                    transport.unwrap_or_default()
+                ))
+            }
+            (None, None | Some(Transport::Inproc)) => None,
+            (None, Some(Transport::Grpc)) => Some(Address::Tcp(usual.listen)),
+            (None, Some(Transport::Uds)) => Some(Address::Unix(usual.unix_socket)),
+            (None, Some(Transport::Shm)) => {
+                Some(Address::Shm(self.namespace.clone().unwrap_or_else(|| shm::NAMESPACE.to_owned())))
+            }
+        }
+    }
+
+    /// A client, and what is known of the vehicle.
+    fn client(&self) -> Result<(Client, About)> {
         let (vehicle, timeout) = (self.vehicle.as_str(), Duration::try_from_secs_f64(self.timeout)?);
         let unary = Method::Unary;
-        let defaults = grpc::Config::default();
-        let mut grpc = match (&self.addr, self.transport) {
-            (Some(url), _) => match url.strip_prefix("unix:") {
-                Some(path) => GrpcClient::unix(PathBuf::from(path), vehicle, unary, timeout)?,
-                None => GrpcClient::tcp(url, vehicle, unary, timeout)?,
-            },
-            (None, Transport::Grpc) => {
-                GrpcClient::tcp(&format!("http://{}", defaults.listen), vehicle, unary, timeout)?
-            }
-            (None, Transport::Uds) => GrpcClient::unix(defaults.unix_socket, vehicle, unary, timeout)?,
-            (None, Transport::Shm) => {
-                let client = ShmClient::new(vehicle, Wait::Block, timeout).in_namespace(&self.namespace);
-                // shared memory carries no names: those of our own bundle, where there is one
-                let names = self.vehicles.model(vehicle).map(|model| surface_names(&model));
-                return Ok((Client::Shm(Box::new(client)), names.unwrap_or_default()));
-            }
-            (None, Transport::Inproc) => {
+        let address = match self.address() {
+            Some(address) => address,
+            None => {
                 let served = self.vehicles.served(vehicle)?;
-                let names = surface_names(served.model());
-                return Ok((Client::InProcess(Box::new(InProcess::new(Arc::new(served)))), names));
+                let about = About::of_model(served.model());
+                return Ok((Client::InProcess(Box::new(InProcess::new(Arc::new(served)))), about));
             }
         };
-        let names = grpc.vehicle()?.surfaces.into_iter().map(|surface| surface.name).collect();
-        Ok((Client::Grpc(Box::new(grpc)), names))
+        let mut grpc = match &address {
+            Address::Shm(namespace) => {
+                let client = ShmClient::new(vehicle, Wait::Block, timeout).in_namespace(namespace);
+                // shared memory carries neither names nor ranges: those of our own bundle, where there is one
+                let about = self.vehicles.model(vehicle).map(|model| About::of_model(&model));
+                return Ok((Client::Shm(Box::new(client)), about.unwrap_or_default()));
+            }
+            Address::Tcp(_) | Address::Unix(_) => {
+                GrpcClient::tcp(&address.url().unwrap_or_default(), vehicle, unary, timeout)?
+            }
+        };
+        let surfaces = grpc.vehicle()?.surfaces.into_iter().map(|surface| surface.name).collect();
+        let about = About { surfaces, domain: Some(grpc.domain()?) };
+        Ok((Client::Grpc(Box::new(grpc)), about))
     }
 }
 
-fn surface_names(model: &wade::model::Model) -> Vec<String> {
-    model.vehicle().surfaces.iter().map(|surface| surface.name.clone()).collect()
-}
-
-fn name_of(names: &[String], index: usize) -> String {
-    names.get(index).cloned().unwrap_or_else(|| format!("surface_{index}"))
-}
-
-fn to_json(vehicle: &str, names: &[String], reply: &Reply) -> Value {
-    let surfaces = reply.surfaces.iter().enumerate().map(|(i, surface)| {
-        json!({
-            "name": name_of(names, i),
-            "force": surface.force,
-            "point": surface.point,
-            "wetted_fraction": surface.wetted_fraction,
-            "effects_force": reply.effect_surface_forces.get(i).copied().unwrap_or_default(),
-        })
-    });
-    let effects = reply.effects.iter().map(|load| {
-        json!({
-            "name": load.effect.name(),
-            "force": load.force,
-            "moment": load.moment,
-            "left_out": load.left_out.map(LeftOut::name),
-        })
-    });
-    let outside =
-        reply.outside.iter().map(|(quantity, excess)| json!({"quantity": quantity.name(), "excess": excess}));
-    json!({
-        "vehicle": vehicle,
-        "version": reply.version,
-        "provenance": reply.provenance,
-        "surfaces": surfaces.collect::<Vec<_>>(),
-        "wrench": {"force": reply.force, "moment": reply.moment, "about": reply.about},
-        "uncertainty": {"force": reply.uncertainty},
-        "in_domain": reply.outside.is_inside(),
-        "outside": outside.collect::<Vec<_>>(),
-        "effects": effects.collect::<Vec<_>>(),
-        "effects_outside": effects_outside(reply)
-            .map(|(quantity, excess)| json!({"quantity": quantity.name(), "excess": excess}))
-            .collect::<Vec<_>>(),
-        "added_mass": reply.added_mass.map(|matrix| matrix.chunks(6).map(<[f32]>::to_vec).collect::<Vec<_>>()),
-        "compute_ns": reply.compute_ns,
-    })
-}
-
-/// Where the state lies outside the box in which the effects were seen.
-fn effects_outside(reply: &Reply) -> impl Iterator<Item = (BoxQuantity, f64)> + '_ {
-    BoxQuantity::ALL.into_iter().zip(reply.effects_outside).filter(|(_, excess)| *excess != 0.0)
-}
-
-fn to_table(vehicle: &str, names: &[String], reply: &Reply) -> String {
+fn to_table(vehicle: &str, about: &About, reply: &Reply) -> String {
     use std::fmt::Write;
     let mut text = String::new();
     let row = |[x, y, z]: [f32; 3]| format!("{x:>10.2} {y:>10.2} {z:>10.2}");
@@ -166,7 +178,7 @@ fn to_table(vehicle: &str, names: &[String], reply: &Reply) -> String {
     line(format!("{:<18} {:>5} {:>10} {:>10} {:>10}", "surface", "wet", "Fx [N]", "Fy [N]", "Fz [N]"));
     for (i, surface) in reply.surfaces.iter().enumerate() {
         let wet = surface.wetted_fraction * 100.0;
-        line(format!("{:<18} {wet:>4.0}% {}", name_of(names, i), row(surface.force)));
+        line(format!("{:<18} {wet:>4.0}% {}", about.name(i), row(surface.force)));
     }
     for load in &reply.effects {
         let why = load.left_out.map_or_else(String::new, |reason| format!("   left out: {}", reason.name()));
@@ -174,13 +186,11 @@ fn to_table(vehicle: &str, names: &[String], reply: &Reply) -> String {
     }
     line(format!("{:<24} {}", "net force [N]", row(reply.force)));
     line(format!("{:<24} {}", "  +- one std. dev.", row(reply.uncertainty)));
-    let about = reply.about.map(|x| format!("{x:.3}")).join(", ");
-    line(format!("{:<24} {}   about ({about}) m", "net moment [N m]", row(reply.moment)));
-    for (quantity, excess) in reply.outside.iter() {
-        line(format!("outside the training domain: {} by {excess:+.4}", quantity.name()));
-    }
-    for (quantity, excess) in effects_outside(reply) {
-        line(format!("outside the box in which the effects were seen: {} by {excess:+.4}", quantity.name()));
+    let center = reply.about.map(|x| format!("{x:.3}")).join(", ");
+    line(format!("{:<24} {}   about ({center}) m", "net moment [N m]", row(reply.moment)));
+    let outside: Vec<&str> = reply.outside.iter().map(|(quantity, _)| quantity.words()).collect();
+    if !outside.is_empty() {
+        line(format!("OUTSIDE the training domain: {}", outside.join(", ")));
     }
     line(format!("computed in {:.1} us", reply.compute_ns as f64 * 1e-3));
     text

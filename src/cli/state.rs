@@ -65,6 +65,16 @@ enum Contact {
 }
 
 impl StateArgs {
+    /// Roll as it was given [rad].
+    pub fn roll(&self) -> f64 {
+        self.roll
+    }
+
+    /// Pitch as it was given [rad].
+    pub fn pitch(&self) -> f64 {
+        self.pitch
+    }
+
     /// The state, not yet checked.
     pub fn state(&self) -> State {
         State {
