@@ -1,9 +1,15 @@
 //! What `wade soak` promises to scripts and to people: the JSON names, the three files, the verdict.
 
-use std::{cell::Cell, fs, time::Duration};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::{cell::Cell, fs, num::NonZeroUsize, time::Duration};
 
 use serde_json::Value;
-use wade::soak::{Config, Domain, Input, Rate, Report, SendError, report, run};
+use wade::soak::steps::Steps;
+use wade::soak::{
+    Ask, Clients, Config, Domain, Input, Rate, Report, SendError, compare::Comparison, report, run,
+    run_clients,
+};
 
 const DOMAIN: Domain =
     Domain { speed: [0.2, 1.5], angle: [0.0, 1.6], depth: [0.1, 0.4], density: [1000.0; 2] };
@@ -84,4 +90,139 @@ fn a_file_that_cannot_be_written_is_named() {
     fs::create_dir(folder.path().join("soak.hlog")).expect("a folder in the way");
     let error = report::write(folder.path(), &soak(&[], None)).expect_err("a folder is no file");
     assert!(error.to_string().contains("soak.hlog"), "{error}");
+}
+
+/// So many clients of 500 Hz together for 200 ms, each of which asks `ask` with its number.
+fn soak_of_clients(
+    count: usize,
+    stop: &AtomicBool,
+    ask: &(dyn Fn(usize) -> Result<u64, SendError> + Sync),
+) -> Result<Report, String> {
+    let config = Config {
+        rate: Rate::Hz(500.0),
+        clients: NonZeroUsize::new(count).expect("some"),
+        duration: Duration::from_millis(200),
+        warm_up: Duration::ZERO,
+        ..Config::default()
+    };
+    let inputs = [Input::varying(&DOMAIN)];
+    let connect = |index: usize| -> Result<Ask<'_>, String> {
+        let first = ask(index).map_err(|error| error.to_string())?;
+        Ok(Box::new(move |_: &[_]| ask(index).map(|_| first)))
+    };
+    run_clients(&config, &Clients { inputs: &inputs, connect: &connect }, &|_| {}, stop)
+}
+
+#[test]
+fn clients_share_the_rate_and_the_report_is_of_all() {
+    let asked = Mutex::new([0; 4]);
+    let report = soak_of_clients(4, &AtomicBool::new(false), &|index| {
+        asked.lock().expect("not poisoned")[index] += 1;
+        Ok(1000)
+    });
+    let report = report.expect("all connect");
+    // one request of each is that of its connection
+    assert_eq!((asked.into_inner().expect("not poisoned"), report.sent + report.unsent), ([26; 4], 100));
+    assert_eq!((report.clients, report.target_rate_hz), (4, Some(500.0)));
+}
+
+#[test]
+fn a_client_that_cannot_connect_ends_the_run_for_all() {
+    for broken in [0, 2] {
+        let outcome = soak_of_clients(3, &AtomicBool::new(false), &|index| match index == broken {
+            true => Err(SendError::Refused("no place".into())),
+            false => Ok(0),
+        });
+        assert_eq!(outcome.expect_err("it cannot connect"), "refused: no place");
+    }
+}
+
+#[test]
+fn a_run_that_is_stopped_reports_the_part_until_then() {
+    let stop = AtomicBool::new(false);
+    let count = AtomicBool::new(false);
+    let report = soak_of_clients(1, &stop, &|_| {
+        // the first request is that of the connection
+        stop.store(count.swap(true, Ordering::Relaxed), Ordering::Relaxed);
+        Ok(0)
+    });
+    let report = report.expect("connected");
+    assert!(report.interrupted && !report.passed && report.sent == 1, "{:?}", report.failures);
+    assert!(
+        report.duration_s < 0.2 && report.failures[0].contains("Interrupted after"),
+        "{:?}",
+        report.failures
+    );
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    report::write(folder.path(), &report).expect("written");
+    let page = fs::read_to_string(folder.path().join("soak.html")).expect("readable");
+    assert!(page.contains("Interrupted after"));
+}
+
+#[test]
+fn a_report_is_replaced_on_demand_alone() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    report::prepare(folder.path(), false).expect("an empty folder");
+    report::write(folder.path(), &soak(&[], None)).expect("written");
+    let error = report::prepare(folder.path(), false).expect_err("there is a report").to_string();
+    assert!(error.contains("--force") && error.contains("--out"), "{error}");
+    report::prepare(folder.path(), true).expect("on demand");
+}
+
+#[test]
+fn failed_requests_within_the_objective_are_no_failure() {
+    let tenth = |slo: &[&str]| soak(slo, Some(SendError::Lost));
+    // a busy machine makes the generator late, which is another failure
+    let of_requests = |report: &Report| {
+        let said = |failure: &&String| failure.contains("no answer in time") || failure.contains("Failed");
+        report.failures.iter().find(said).cloned()
+    };
+    for slo in ["errors=10%", "errors=10"] {
+        let report = tenth(&[slo]);
+        assert!(of_requests(&report).is_none() && report.slo["errors"].holds, "{:?}", report.failures);
+    }
+    let over = of_requests(&tenth(&["errors=9%"])).expect("a failure");
+    assert!(over.contains("over 9"), "{over}");
+    assert!(!soak(&["rate=501"], None).passed);
+}
+
+#[test]
+fn two_reports_are_compared_with_what_differs_in_their_settings() {
+    let folders = [tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder")];
+    let mut second = soak(&[], None);
+    second.transport = "uds".into();
+    second.response_time_us.p99 = 2.0 * second.response_time_us.p99;
+    let first = soak(&[], None);
+    for (folder, report) in folders.iter().zip([&first, &second]) {
+        report::write(folder.path(), report).expect("written");
+    }
+    let [before, after] = [folders[0].path(), folders[1].path()];
+    let comparison = Comparison::read(before, after).expect("two reports");
+    assert_eq!(comparison.differences[0].setting, "transport");
+    let p99 = comparison.figures.iter().find(|figure| figure.name == "response time p99 [us]").expect("p99");
+    assert_eq!((p99.before, p99.after), (first.response_time_us.p99, second.response_time_us.p99));
+    assert!(comparison.text().contains("the runs differ in transport: \"inproc\" and \"uds\""));
+    fs::write(after.join("soak.json"), "{}").expect("written");
+    let error = Comparison::read(before, after).expect_err("no report").to_string();
+    assert!(error.contains("soak.json") && error.contains("response_time_us.p50"), "{error}");
+}
+
+#[test]
+fn the_knee_is_the_last_rate_before_the_first_that_is_not_held() {
+    let step = |hz: f64, p95: f64, failed: bool| {
+        let mut report = soak(&[], None);
+        (report.target_rate_hz, report.rate_hz) = (Some(hz), hz);
+        report.response_time_us.p95 = p95;
+        report.failures = failed.then(|| "failed".to_owned()).into_iter().collect();
+        report
+    };
+    let knee = |reports: &[Report]| Steps::new(reports).knee_hz;
+    assert_eq!(knee(&[step(1000.0, 10.0, false), step(2000.0, 29.0, false)]), Some(2000.0));
+    assert_eq!(knee(&[step(2000.0, 31.0, false), step(1000.0, 10.0, false)]), Some(1000.0));
+    let failed = [step(1000.0, 10.0, false), step(2000.0, 10.0, true), step(4000.0, 10.0, false)];
+    assert_eq!(knee(&failed), Some(1000.0));
+    assert_eq!(knee(&failed[1..]), None);
+    let mut slow = step(2000.0, 10.0, false);
+    slow.rate_hz = 1900.0;
+    assert_eq!(knee(&[step(1000.0, 10.0, false), slow]), Some(1000.0));
 }

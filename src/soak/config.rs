@@ -7,12 +7,14 @@ use super::{schedule::Rate, slo::Slo};
 /// One soak.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
-    /// Name of the vehicle, for the report.
+    /// Name of the vehicle, for the report; several with commas between.
     pub vehicle: String,
     /// Name of the transport, for the report.
     pub transport: String,
-    /// How often a request is due.
+    /// How often a request is due, of all clients together.
     pub rate: Rate,
+    /// Clients that ask at the same time, each from a thread of its own.
+    pub clients: NonZeroUsize,
     /// Length of the measured part.
     pub duration: Duration,
     /// Load before the measured part, recorded apart.
@@ -34,12 +36,23 @@ impl Default for Config {
             vehicle: String::new(),
             transport: String::new(),
             rate: Rate::Hz(1000.0),
+            clients: NonZeroUsize::MIN,
             duration: Duration::from_secs(300),
             warm_up: Duration::from_secs(5),
             batch: NonZeroUsize::MIN,
             slo: Vec::new(),
             control_core: None,
             commit: String::new(),
+        }
+    }
+}
+
+impl Config {
+    /// How often a request of one client is due.
+    pub(super) fn rate_of_client(&self) -> Rate {
+        match self.rate {
+            Rate::Hz(hz) => Rate::Hz(hz / self.clients.get() as f64),
+            Rate::Max => Rate::Max,
         }
     }
 }

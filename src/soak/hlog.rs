@@ -95,7 +95,7 @@ mod tests {
 
     /// One answered request a millisecond, which takes 1 us more than the one before.
     fn recording() -> Recording {
-        let mut recording = Recording::new(Duration::from_secs(1), Duration::from_secs(3));
+        let mut recording = Recording::new(Duration::from_secs(1), Duration::from_secs(3), 1);
         for index in 0..4000 {
             let intended = index * SECOND / 1000;
             let (sent, done) = (intended + 100, intended + 1000 * (index + 1));

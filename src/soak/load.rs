@@ -1,7 +1,10 @@
 //! The measured loop.
 
 use std::{
-    sync::atomic::AtomicBool,
+    sync::{
+        Barrier, OnceLock,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
     time::{Duration, Instant, SystemTime},
 };
@@ -9,11 +12,12 @@ use std::{
 use super::{
     clock::{Clock, Monotonic, wait_until},
     config::Config,
-    hiccup::{self, Deadlines, StopOnDrop},
+    hiccup::{self, Deadlines, Hiccups, StopOnDrop},
     input::Input,
     lateness::Ideal,
     record::{Outcome, Recording, Sample},
     report::Report,
+    schedule::Rate,
 };
 use crate::service::wire::State;
 
@@ -65,71 +69,198 @@ pub struct Progress {
     pub warming_up: bool,
 }
 
-/// Sends requests on schedule and returns what they met.
+/// What one client calls for each request: it gets the states, waits for the answer, and returns the server's own
+/// compute time [ns].
+pub type Ask<'a> = Box<dyn FnMut(&[State]) -> Result<u64, SendError> + 'a>;
+
+/// Who asks, and about what.
+pub struct Clients<'a, E> {
+    /// The states; client `i` asks about input `i` modulo their number.
+    pub inputs: &'a [Input],
+    /// Connects client `i`, on the thread that drives it: the calling one for the first.
+    pub connect: &'a (dyn Fn(usize) -> Result<Ask<'a>, E> + Sync),
+}
+
+/// Sends requests of one client on schedule and returns what they met.
 ///
-/// `send` gets the states of one request, waits for the answer, and returns the server's own compute time [ns].
-/// It is called on this thread, one request at a time; `progress` too, between requests. Pin this thread before
-/// the call where that is wanted.
+/// `send` is called on this thread, one request at a time; `progress` too, between requests. Pin this thread before the
+/// call where that is wanted.
 pub fn run(
     config: &Config,
     input: &Input,
     send: &mut dyn FnMut(&[State]) -> Result<u64, SendError>,
     progress: &dyn Fn(&Progress),
 ) -> Report {
-    let end = (config.warm_up + config.duration).as_nanos() as u64;
-    let deadlines = Deadlines::beside(config.rate);
-    let (recording, memory) =
-        (Recording::new(config.warm_up, config.duration), hiccup::prepare(deadlines, end));
-    let (started_at, clock) = (SystemTime::now() + LEAD, Monotonic { start: Instant::now() + LEAD });
-    let stop = AtomicBool::new(false);
-    let (recording, hiccups) = thread::scope(|scope| {
-        let control =
-            scope.spawn(|| hiccup::watch(&clock, deadlines, end, config.control_core, memory, &stop));
-        let stop_on_drop = StopOnDrop(&stop);
-        let recording = drive(config, input, &clock, recording, send, progress);
-        drop(stop_on_drop);
-        (recording, control.join().unwrap_or_default())
+    let prepared = Prepared::new(config);
+    let start = Start::soon();
+    let (recording, hiccups) = prepared.beside_control(config, start.clock, |recording| {
+        let generator = Generator::new(config, input, &start.clock, 0);
+        generator.drive(recording, send, progress)
     });
-    Report::new(config, input, started_at, recording, hiccups)
+    Report::new(config, input.name(), start.at, recording, hiccups)
 }
 
-/// The loop of `run` on any clock.
-pub(super) fn drive(
+/// Sends requests of `config.clients` clients until the end, or until `stop` is true; the report then says so. The
+/// progress is that of the first client.
+pub fn run_clients<E: Send>(
     config: &Config,
-    input: &Input,
-    clock: &impl Clock,
-    mut recording: Recording,
-    send: &mut dyn FnMut(&[State]) -> Result<u64, SendError>,
+    clients: &Clients<'_, E>,
     progress: &dyn Fn(&Progress),
-) -> Recording {
-    let end = (config.warm_up + config.duration).as_nanos() as u64;
-    let mut states = vec![State::default(); config.batch.get()];
-    let (mut ideal, mut teller) = (Ideal::default(), Teller { told: 0, end });
-    for index in 0.. {
-        let due = config.rate.intended_ns(index);
-        let next = due.unwrap_or_else(|| clock.now());
-        if next >= end {
-            break;
+    stop: &AtomicBool,
+) -> Result<Report, E> {
+    let count = config.clients.get();
+    let (gate, start, failed) = (Barrier::new(count), OnceLock::new(), AtomicBool::new(false));
+    // what one client does; all begin at one moment, once each has its memory and its connection
+    let client = |index: usize, progress: &dyn Fn(&Progress)| -> Result<(Recording, Hiccups), E> {
+        let prepared = Prepared::new(config);
+        let asked = (clients.connect)(index);
+        failed.fetch_or(asked.is_err(), Ordering::Relaxed);
+        gate.wait();
+        let mut ask = asked?;
+        if failed.load(Ordering::Relaxed) {
+            return Ok((prepared.recording, Hiccups::default()));
         }
-        teller.tell(&recording, clock.now(), due, progress);
-        input.fill(next as f64 * 1e-9, &mut states);
-        let wait = wait_until(clock, next);
-        if wait.ended >= end + DRAIN_NS {
-            let due_in_all = config.rate.due_before(end).unwrap_or(index);
-            let unsent = (index..due_in_all).filter_map(|index| config.rate.intended_ns(index));
-            unsent.for_each(|intended| recording.record_unsent(intended, wait.ended));
-            break;
-        }
-        let sent = wait.ended;
-        let result = send(&states);
-        let done = clock.now();
-        let intended = due.unwrap_or(sent);
-        let own_lag = ideal.own_lag(intended, sent, done);
-        let outcome = outcome(result, &mut recording.first_error);
-        recording.record(&Sample { intended, sent, done, own_lag, stall: wait.stall, outcome });
+        let Start { clock, .. } = *start.get_or_init(Start::soon);
+        let input = &clients.inputs[index % clients.inputs.len()];
+        let generator = Generator { stop: Some(stop), ..Generator::new(config, input, &clock, index) };
+        Ok(match index {
+            0 => prepared
+                .beside_control(config, clock, |recording| generator.drive(recording, &mut ask, progress)),
+            _ => (generator.drive(prepared.recording, &mut ask, &|_| {}), Hiccups::default()),
+        })
+    };
+    let (first, others) = thread::scope(|scope| {
+        let client = &client;
+        let others: Vec<_> = (1..count).map(|index| scope.spawn(move || client(index, &|_| {}))).collect();
+        let first = client(0, progress);
+        let others: Vec<_> = others.into_iter().map(|thread| thread.join()).collect();
+        (first, others)
+    });
+    let (mut recording, hiccups) = first?;
+    for other in others {
+        let other = other.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        recording.merge(&other?.0);
     }
-    teller.finish(&recording, progress);
-    recording
+    let at = start.get().map_or_else(SystemTime::now, |start| start.at);
+    Ok(Report::new(config, clients.inputs[0].name(), at, recording, hiccups))
+}
+
+/// When the schedule of all clients starts.
+#[derive(Clone, Copy)]
+struct Start {
+    at: SystemTime,
+    clock: Monotonic,
+}
+
+impl Start {
+    fn soon() -> Self {
+        Self { at: SystemTime::now() + LEAD, clock: Monotonic { start: Instant::now() + LEAD } }
+    }
+}
+
+/// Memory of a client, there before the schedule starts.
+struct Prepared {
+    recording: Recording,
+    deadlines: Deadlines,
+}
+
+impl Prepared {
+    fn new(config: &Config) -> Self {
+        Self {
+            recording: Recording::new(config.warm_up, config.duration, config.clients.get()),
+            deadlines: Deadlines::beside(config.rate_of_client()),
+        }
+    }
+
+    /// Runs the load with the machine's control beside it.
+    fn beside_control(
+        self,
+        config: &Config,
+        clock: Monotonic,
+        load: impl FnOnce(Recording) -> Recording,
+    ) -> (Recording, Hiccups) {
+        let Self { recording, deadlines } = self;
+        let end = (config.warm_up + config.duration).as_nanos() as u64;
+        let (memory, stop) = (hiccup::prepare(deadlines, end), AtomicBool::new(false));
+        thread::scope(|scope| {
+            let control =
+                scope.spawn(|| hiccup::watch(&clock, deadlines, end, config.control_core, memory, &stop));
+            let stop_on_drop = StopOnDrop(&stop);
+            let recording = load(recording);
+            drop(stop_on_drop);
+            (recording, control.join().unwrap_or_default())
+        })
+    }
+}
+
+/// One client's loop, on any clock.
+struct Generator<'a, C> {
+    input: &'a Input,
+    clock: &'a C,
+    rate: Rate,
+    /// From the start of the schedule to this client's first request [ns]: clients take turns.
+    offset: u64,
+    end: u64,
+    batch: usize,
+    stop: Option<&'a AtomicBool>,
+}
+
+impl<'a, C: Clock> Generator<'a, C> {
+    fn new(config: &Config, input: &'a Input, clock: &'a C, index: usize) -> Self {
+        Self {
+            input,
+            clock,
+            rate: config.rate_of_client(),
+            offset: config.rate.intended_ns(index as u64).unwrap_or(0),
+            end: (config.warm_up + config.duration).as_nanos() as u64,
+            batch: config.batch.get(),
+            stop: None,
+        }
+    }
+
+    fn due(&self, index: u64) -> Option<u64> {
+        self.rate.intended_ns(index).map(|due| due + self.offset)
+    }
+
+    fn drive(
+        &self,
+        mut recording: Recording,
+        send: &mut dyn FnMut(&[State]) -> Result<u64, SendError>,
+        progress: &dyn Fn(&Progress),
+    ) -> Recording {
+        let Self { clock, end, .. } = *self;
+        let mut states = vec![State::default(); self.batch];
+        let (mut ideal, mut teller) = (Ideal::default(), Teller { told: 0, end });
+        for index in 0.. {
+            if self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                recording.stopped = Some(clock.now());
+                break;
+            }
+            let due = self.due(index);
+            let next = due.unwrap_or_else(|| clock.now());
+            if next >= end {
+                break;
+            }
+            teller.tell(&recording, clock.now(), due, progress);
+            self.input.fill(next as f64 * 1e-9, &mut states);
+            let wait = wait_until(clock, next);
+            if wait.ended >= end + DRAIN_NS {
+                let due_in_all = self.rate.due_before(end.saturating_sub(self.offset)).unwrap_or(index);
+                let unsent = (index..due_in_all).filter_map(|index| self.due(index));
+                unsent.for_each(|intended| recording.record_unsent(intended, wait.ended));
+                break;
+            }
+            let sent = wait.ended;
+            let result = send(&states);
+            let done = clock.now();
+            let intended = due.unwrap_or(sent);
+            let own_lag = ideal.own_lag(intended, sent, done);
+            let outcome = outcome(result, &mut recording.first_error);
+            recording.record(&Sample { intended, sent, done, own_lag, stall: wait.stall, outcome });
+        }
+        teller.finish(&recording, progress);
+        recording
+    }
 }
 
 fn outcome(result: Result<u64, SendError>, first_error: &mut Option<String>) -> Outcome {
@@ -190,7 +321,6 @@ mod tests {
             input::Domain,
             lateness,
             record::{Counts, Percentiles},
-            schedule::Rate,
         },
         *,
     };
@@ -213,8 +343,8 @@ mod tests {
         progress: &dyn Fn(&Progress),
     ) -> Recording {
         let domain = Domain { speed: [0.0, 2.0], angle: [0.0, 1.6], depth: [0.1, 0.5], density: [1000.0; 2] };
-        let recording = Recording::new(config.warm_up, config.duration);
-        drive(config, &Input::varying(&domain), clock, recording, send, progress)
+        let recording = Recording::new(config.warm_up, config.duration, 1);
+        Generator::new(config, &Input::varying(&domain), clock, 0).drive(recording, send, progress)
     }
 
     fn longer_than(times: &Counts, ns: u64) -> u64 {

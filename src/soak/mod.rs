@@ -6,9 +6,10 @@
 //!
 //! Layout in reading order: `schedule` (when), `input` and `trace` (what), `load` (the measured loop), `record`
 //! (its memory), `lateness` (whose fault a late send was), `hiccup` (the machine's own control), `slo` (the
-//! verdict), `report` with `hlog`, `page` and `plot` (the files).
+//! verdict), `report` with `hlog`, `page` and `plot` (the files), `steps` (several rates), `compare` (two reports).
 
 mod clock;
+pub mod compare;
 mod config;
 mod duration;
 mod hiccup;
@@ -23,13 +24,14 @@ mod record;
 pub mod report;
 mod schedule;
 mod slo;
+pub mod steps;
 mod trace;
 
 pub use config::Config;
 pub use duration::{DurationError, parse_duration};
 pub use input::{Domain, Input};
-pub use load::{Progress, SendError, run};
+pub use load::{Ask, Clients, Progress, SendError, run, run_clients};
 pub use report::Report;
 pub use schedule::{Rate, RateError};
-pub use slo::{Quantile, Slo, SloError};
+pub use slo::{Slo, SloError};
 pub use trace::TraceError;

@@ -6,9 +6,9 @@ use super::{
     hlog::control_by_interval,
     plot::{Frame, Line, distribution, nines, percentile, plot, time},
     record::{Interval, Percentiles},
-    report::Report,
+    report::{Figures, Outcome, Report, sentence},
 };
-use crate::page::plot::{BLUE, GRAY, GREEN, ORANGE, PURPLE, RED};
+use crate::page::plot::{BLUE, GRAY, GREEN, ORANGE, PURPLE, RED, tick};
 use crate::page::{PlotError, document, escape};
 
 /// The page.
@@ -45,10 +45,11 @@ fn summary(report: &Report) -> String {
         ),
     };
     format!(
-        "<p class=\"small\">{} · {} s after {} s of warm-up · {rate} · {} input, {} a request</p>",
+        "<p class=\"small\">{} · {:.1} s after {} s of warm-up · {rate} · {} · {} input, {} a request</p>",
         report.started_at,
         report.duration_s,
         report.warm_up.duration_s,
+        if report.clients == 1 { "1 client".to_owned() } else { format!("{} clients", report.clients) },
         report.input,
         if report.batch == 1 { "1 state".to_owned() } else { format!("{} states", report.batch) },
     )
@@ -72,8 +73,7 @@ fn verdict(report: &Report) -> String {
     }
     text.push_str(if report.passed { "<ul>" } else { "" });
     for (name, outcome) in report.slo.iter().filter(|(_, outcome)| outcome.holds) {
-        let (measured, limit) = (time(outcome.measured_us), time(outcome.limit_us));
-        let _ = write!(text, "<li>{name} of the response time is {measured}, within {limit}.</li>");
+        let _ = write!(text, "<li>{}</li>", sentence(name, outcome));
     }
     text + "</ul></div>"
 }
@@ -89,7 +89,7 @@ fn table(report: &Report) -> String {
         ("Generator stalls", &report.generator_stall_us, "longest pause between two looks at the clock"),
     ];
     let mut text =
-        "<table><tr><th></th><th>p50</th><th>p95</th><th>p99</th><th>p99.9</th><th>max</th><th></th></tr>"
+        "<div class=\"wide\"><table><tr><th></th><th>p50</th><th>p95</th><th>p99</th><th>p99.9</th><th>max</th><th></th></tr>"
             .to_owned();
     for (name, Percentiles { p50, p95, p99, p99_9, max }, note) in rows {
         let _ = write!(text, "<tr><td>{name}</td>");
@@ -98,13 +98,15 @@ fn table(report: &Report) -> String {
         }
         let _ = write!(text, "<td class=\"text\">{note}</td></tr>");
     }
-    text + "</table>"
+    text + "</table></div>"
 }
 
 fn limits(report: &Report) -> Vec<(String, f64)> {
-    let limit =
-        |(name, outcome): (&&str, &super::slo::Outcome)| (format!("limit on {name}"), outcome.limit_us);
-    report.slo.iter().map(limit).collect()
+    let limit = |(name, outcome): (&String, &Outcome)| match outcome.figures {
+        Figures::Time { limit_us, .. } => Some((format!("limit on {name}"), limit_us)),
+        Figures::Rate { .. } | Figures::Errors { .. } => None,
+    };
+    report.slo.iter().filter_map(limit).collect()
 }
 
 fn tail(report: &Report) -> Result<String, PlotError> {
@@ -157,7 +159,7 @@ fn control_timeline(report: &Report) -> Result<String, PlotError> {
 }
 
 fn time_frame<'a>(report: &Report, height: u32, limits: &'a [(String, f64)]) -> Frame<'a> {
-    let x_label = &|s: &f64| format!("{s}");
+    let x_label = &tick;
     Frame {
         height,
         x_title: "seconds of the measured part",

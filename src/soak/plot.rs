@@ -33,12 +33,11 @@ pub(super) fn plot(frame: &Frame<'_>, lines: &[Line]) -> Result<String, PlotErro
 }
 
 fn legend(frame: &Frame<'_>, lines: &[Line]) -> String {
-    let key = |style: &str, name: &str| format!("<span><i style=\"border-top:{style}\"></i>{name}</span>");
     let solid = |line: &Line| {
-        let RGBColor(r, g, b) = line.color;
-        key(&format!("3px solid rgb({r},{g},{b})"), line.name)
+        let (RGBColor(r, g, b), name) = (line.color, line.name);
+        format!("<span><i style=\"background:rgb({r},{g},{b})\"></i>{name}</span>")
     };
-    let limits = frame.limits.iter().map(|(name, _)| key("2px dashed #000", name));
+    let limits = frame.limits.iter().map(|(name, _)| format!("<span><i class=\"dash\"></i>{name}</span>"));
     let keys: String = lines.iter().map(solid).chain(limits).collect();
     format!("<p class=\"legend\">{keys}</p>")
 }

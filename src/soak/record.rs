@@ -16,7 +16,7 @@ pub(super) type IntervalCounts = Histogram<u32>;
 
 /// A histogram is exact to three digits.
 const DIGITS: u8 = 3;
-/// More intervals than this are not kept; they become longer instead (memory: about 0.25 MB each).
+/// More intervals than this are not kept by all clients together; they become longer instead (memory: about 0.25 MB each).
 const MOST_INTERVALS: u64 = 600;
 
 /// Points of a distribution of times [us].
@@ -94,6 +94,24 @@ pub(super) struct Totals {
 }
 
 impl Totals {
+    /// Adds what another client counted over the same phase.
+    fn merge(&mut self, other: &Self) {
+        self.sent += other.sent;
+        self.answered += other.answered;
+        self.errors += other.errors;
+        self.lost += other.lost;
+        for (ours, theirs) in [
+            (&mut self.response, &other.response),
+            (&mut self.service, &other.service),
+            (&mut self.lag, &other.lag),
+            (&mut self.own_lag, &other.own_lag),
+            (&mut self.stall, &other.stall),
+            (&mut self.server, &other.server),
+        ] {
+            ours.add(theirs).expect("histograms of one run have the same bounds");
+        }
+    }
+
     fn new(longest_ns: u64) -> Self {
         let times = || histogram(longest_ns);
         Self {
@@ -161,15 +179,18 @@ pub(super) struct Recording {
     pub first_error: Option<String>,
     /// When the last request was done [ns].
     pub last_done: u64,
+    /// When the run was stopped, where it was stopped before its end [ns].
+    pub stopped: Option<u64>,
 }
 
 impl Recording {
-    /// Allocates for a run of these lengths.
-    pub(super) fn new(warm_up: Duration, duration: Duration) -> Self {
+    /// Allocates for one of so many clients in a run of these lengths.
+    pub(super) fn new(warm_up: Duration, duration: Duration, clients: usize) -> Self {
         // a request can wait as long as the run lasts, and a client's timeout on top
         let longest = (warm_up + duration + Duration::from_secs(60)).as_nanos() as u64;
         let seconds = duration.as_secs_f64().ceil() as u64;
-        let interval_s = seconds.div_ceil(MOST_INTERVALS).max(1);
+        let most = (MOST_INTERVALS / clients as u64).max(1);
+        let interval_s = seconds.div_ceil(most).max(1);
         let interval = || Interval { response: histogram(longest), service: histogram(longest), stall: 0 };
         Self {
             warm_up_ns: warm_up.as_nanos() as u64,
@@ -180,7 +201,30 @@ impl Recording {
             unsent: 0,
             first_error: None,
             last_done: 0,
+            stopped: None,
         }
+    }
+
+    /// Adds what another client of the same run recorded.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.warm_up.merge(&other.warm_up);
+        self.measured.merge(&other.measured);
+        for (ours, theirs) in self.intervals.iter_mut().zip(&other.intervals) {
+            let same = "histograms of one run have the same bounds";
+            ours.response.add(&theirs.response).expect(same);
+            ours.service.add(&theirs.service).expect(same);
+            ours.stall = ours.stall.max(theirs.stall);
+        }
+        self.unsent += other.unsent;
+        self.first_error = self.first_error.take().or_else(|| other.first_error.clone());
+        self.last_done = self.last_done.max(other.last_done);
+        self.stopped = self.stopped.max(other.stopped);
+    }
+
+    /// The measured part that was reached [ns].
+    pub(super) fn reached(&self, duration: Duration) -> Duration {
+        let whole = Duration::from_nanos(self.last_done.saturating_sub(self.warm_up_ns)).max(duration);
+        self.stopped.map_or(whole, |at| Duration::from_nanos(at.saturating_sub(self.warm_up_ns)))
     }
 
     /// Counts one request in the phase and the interval in which it was due.
@@ -231,7 +275,7 @@ mod tests {
 
     #[test]
     fn lost_and_refused_are_counted_apart_and_only_the_lost_has_a_time() {
-        let mut recording = Recording::new(Duration::ZERO, Duration::from_secs(1));
+        let mut recording = Recording::new(Duration::ZERO, Duration::from_secs(1), 1);
         for outcome in [Outcome::Answered(7), Outcome::Refused, Outcome::Lost, Outcome::Lost] {
             recording.record(&sample(0, outcome));
         }
@@ -243,7 +287,7 @@ mod tests {
 
     #[test]
     fn the_warm_up_is_not_in_the_figures() {
-        let mut recording = Recording::new(Duration::from_secs(1), Duration::from_secs(2));
+        let mut recording = Recording::new(Duration::from_secs(1), Duration::from_secs(2), 1);
         for intended in [0, 999_999_999, 1_000_000_000, 2_999_999_999] {
             recording.record(&sample(intended, Outcome::Answered(7)));
         }
@@ -254,7 +298,21 @@ mod tests {
 
     #[test]
     fn long_runs_get_longer_intervals_not_more() {
-        let recording = Recording::new(Duration::ZERO, Duration::from_secs(86_400));
+        let recording = Recording::new(Duration::ZERO, Duration::from_secs(86_400), 1);
         assert_eq!((recording.intervals.len(), recording.interval_ns), (600, 144_000_000_000));
+    }
+
+    #[test]
+    fn two_clients_together_are_the_sum_of_both() {
+        let mut both = Recording::new(Duration::ZERO, Duration::from_secs(1), 2);
+        let mut other = Recording::new(Duration::ZERO, Duration::from_secs(1), 2);
+        both.record(&sample(0, Outcome::Answered(7)));
+        other.record(&sample(5, Outcome::Lost));
+        other.stopped = Some(9);
+        both.merge(&other);
+        let totals = &both.measured;
+        assert_eq!((totals.sent, totals.answered, totals.lost, totals.response.len()), (2, 1, 1, 2));
+        assert_eq!((both.intervals[0].response.len(), both.last_done), (2, 1015));
+        assert_eq!(both.reached(Duration::from_secs(1)), Duration::from_nanos(9));
     }
 }

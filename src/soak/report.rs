@@ -4,7 +4,7 @@ use std::{
     collections::BTreeMap,
     fs, io,
     path::{Path, PathBuf},
-    time::{Duration, SystemTime},
+    time::SystemTime,
 };
 
 use serde::Serialize;
@@ -12,16 +12,18 @@ use serde::Serialize;
 use super::{
     config::Config,
     hiccup::Hiccups,
-    hlog,
-    input::Input,
-    lateness,
+    hlog, lateness,
     machine::{Machine, rfc3339},
     page,
     plot::time,
     record::{Counts, Recording, Totals, histogram},
-    slo::judge,
+    slo::{Measured, Slo, judge},
 };
-pub use super::{hlog::HlogError, record::Percentiles, slo::Outcome};
+pub use super::{
+    hlog::HlogError,
+    record::Percentiles,
+    slo::{Figures, Outcome},
+};
 use crate::files::write_whole;
 use crate::page::PlotError;
 
@@ -30,6 +32,8 @@ use crate::page::PlotError;
 pub struct Report {
     /// True when `failures` is empty.
     pub passed: bool,
+    /// True when the run was stopped before its end; the figures are those of the part until then.
+    pub interrupted: bool,
     /// Everything that did not hold, in plain sentences.
     pub failures: Vec<String>,
     /// Name of the vehicle.
@@ -40,6 +44,8 @@ pub struct Report {
     pub input: &'static str,
     /// States in a request.
     pub batch: usize,
+    /// Clients that asked at the same time.
+    pub clients: usize,
     /// True when each request waited for the answer before (`--rate max`); response is then service time.
     pub closed_loop: bool,
     /// The rate that was asked for [Hz]; none in a closed loop.
@@ -81,7 +87,7 @@ pub struct Report {
     /// The server's own compute time.
     pub server_compute_us: Percentiles,
     /// How each objective came out, by name.
-    pub slo: BTreeMap<&'static str, Outcome>,
+    pub slo: BTreeMap<String, Outcome>,
     /// The load before the measured part, in none of the figures above.
     pub warm_up: WarmUp,
     /// The machine.
@@ -123,55 +129,68 @@ pub(super) struct Details {
 impl Report {
     pub(super) fn new(
         config: &Config,
-        input: &Input,
+        input: &'static str,
         started: SystemTime,
         recording: Recording,
         hiccups: Hiccups,
     ) -> Self {
         let totals = &recording.measured;
-        let response_time_us = Percentiles::of(&totals.response);
+        let reached = recording.reached(config.duration);
+        let rate_hz = totals.answered as f64 / reached.as_secs_f64().max(f64::MIN_POSITIVE);
+        let failed = totals.errors + totals.lost + recording.unsent;
+        let measured = Measured { response: &totals.response, answered: totals.answered, rate_hz, failed };
         let control = control(&recording, &hiccups);
         let mut report = Self {
             passed: false,
+            interrupted: recording.stopped.is_some(),
             failures: Vec::new(),
             vehicle: config.vehicle.clone(),
             transport: config.transport.clone(),
-            input: input.name(),
+            input,
             batch: config.batch.get(),
+            clients: config.clients.get(),
             closed_loop: config.rate.interval_ns().is_none(),
             target_rate_hz: config.rate.interval_ns().map(|interval| 1e9 / interval),
-            rate_hz: totals.answered as f64 / elapsed(config, &recording).as_secs_f64(),
-            duration_s: config.duration.as_secs_f64(),
+            rate_hz,
+            duration_s: recording.stopped.map_or(config.duration, |_| reached).as_secs_f64(),
             sent: totals.sent,
             answered: totals.answered,
             errors: totals.errors,
             lost: totals.lost,
             unsent: recording.unsent,
             first_error: recording.first_error.clone(),
-            generator_late: lateness::is_late(config.rate, &totals.own_lag),
+            generator_late: lateness::is_late(config.rate_of_client(), &totals.own_lag),
             generator_lag_us: Percentiles::of(&totals.own_lag),
-            generator_lag_limit_us: lateness::limit_us(config.rate),
-            response_time_us,
+            generator_lag_limit_us: lateness::limit_us(config.rate_of_client()),
+            response_time_us: Percentiles::of(&totals.response),
             service_time_us: Percentiles::of(&totals.service),
             send_lag_us: Percentiles::of(&totals.lag),
             control_us: Percentiles::of(&control),
             control_core: hiccups.core,
             generator_stall_us: Percentiles::of(&totals.stall),
             server_compute_us: Percentiles::of(&totals.server),
-            slo: judge(&config.slo, &response_time_us, totals.answered),
+            slo: judge(&config.slo, &measured),
             warm_up: WarmUp::new(config, &recording.warm_up),
             machine: Machine::this(),
             commit: config.commit.clone(),
             started_at: rfc3339(started),
             details: Details { recording, hiccups, control, started },
         };
-        report.failures = report.failures();
+        report.failures = report.failures(config);
         report.passed = report.failures.is_empty();
         report
     }
 
-    fn failures(&self) -> Vec<String> {
+    fn failures(&self, config: &Config) -> Vec<String> {
         let mut failures = Vec::new();
+        if self.interrupted {
+            failures.push(format!(
+                "Interrupted after {:.1} of {} s: the figures are of the part until then.",
+                self.duration_s,
+                config.duration.as_secs_f64()
+            ));
+        }
+        let allowed = config.slo.iter().any(Slo::allows_errors);
         if self.answered == 0 {
             failures.push("No request was answered.".to_owned());
         }
@@ -183,7 +202,7 @@ impl Report {
                 "were due but could not be sent before the end: the server is too slow for this rate",
             ),
         ] {
-            if count > 0 {
+            if count > 0 && !allowed {
                 failures.push(format!("{count} requests {what}."));
             }
         }
@@ -196,9 +215,7 @@ impl Report {
             ));
         }
         for (name, outcome) in self.slo.iter().filter(|(_, outcome)| !outcome.holds) {
-            let Outcome { limit_us, measured_us, .. } = outcome;
-            failures
-                .push(format!("{name} of the response time is {measured_us:.1} us, over {limit_us:.1} us."));
+            failures.push(sentence(name, outcome));
         }
         failures
     }
@@ -225,10 +242,26 @@ fn control(recording: &Recording, hiccups: &Hiccups) -> Counts {
     control
 }
 
-/// The measured part up to its last answer.
-fn elapsed(config: &Config, recording: &Recording) -> Duration {
-    let to_last = recording.last_done.saturating_sub(recording.warm_up_ns);
-    config.duration.max(Duration::from_nanos(to_last))
+/// How an objective came out, in words.
+pub(super) fn sentence(name: &str, Outcome { figures, holds }: &Outcome) -> String {
+    match *figures {
+        Figures::Time { limit_us, measured_us } => {
+            let side = if *holds { "within" } else { "over" };
+            format!("{name} of the response time is {}, {side} {}.", time(measured_us), time(limit_us))
+        }
+        Figures::Rate { limit_hz, measured_hz } => {
+            let side = if *holds { "at least" } else { "under" };
+            format!("{measured_hz:.1} requests a second were answered, {side} {limit_hz}.")
+        }
+        Figures::Errors { limit, measured } => {
+            let side = if *holds { "within" } else { "over" };
+            let as_text = |value: f64| match limit {
+                limit if limit > 0.0 && limit < 1.0 => format!("{:.3} %", 100.0 * value),
+                _ => format!("{value}"),
+            };
+            format!("Failed requests: {}, {side} {}.", as_text(measured), as_text(limit))
+        }
+    }
 }
 
 /// A file of the report could not be made.
@@ -242,6 +275,12 @@ pub enum WriteError {
         /// Why.
         source: io::Error,
     },
+    /// There is a report already.
+    #[error("{} holds the report of another run: name another folder with --out, or add --force to replace it", path.display())]
+    Exists {
+        /// The folder.
+        path: PathBuf,
+    },
     /// The report is no JSON.
     #[error("cannot write soak.json: {0}")]
     Json(#[from] serde_json::Error),
@@ -253,8 +292,11 @@ pub enum WriteError {
     Plot(#[from] PlotError),
 }
 
-/// Makes the folder and tries whether it can be written.
-pub fn prepare(dir: &Path) -> Result<(), WriteError> {
+/// Makes the folder and tries whether it can be written. A report that is there is kept, unless it may be replaced.
+pub fn prepare(dir: &Path, replace: bool) -> Result<(), WriteError> {
+    if !replace && dir.join("soak.json").exists() {
+        return Err(WriteError::Exists { path: dir.to_owned() });
+    }
     let probe = dir.join(".soak.probe");
     let try_it = || {
         fs::create_dir_all(dir)?;

@@ -53,6 +53,14 @@ impl fmt::Display for Rate {
 }
 
 impl Rate {
+    /// Name of the folder for the report of this rate.
+    pub fn folder(self) -> String {
+        match self {
+            Self::Hz(hz) => format!("{hz}hz"),
+            Self::Max => "max".into(),
+        }
+    }
+
     /// Time between two requests [ns]; none in a closed loop.
     pub fn interval_ns(self) -> Option<f64> {
         match self {
