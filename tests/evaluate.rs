@@ -298,6 +298,8 @@ fn the_program_judges_bundles_by_what_their_training_held_out() {
         text(&training),
         "--config",
         text(&settings),
+        "--variant",
+        "paper",
     ];
     let output = wade(&train);
     assert!(output.status.success(), "{}", stderr(&output));
@@ -364,7 +366,7 @@ fn the_program_trains_anew_for_every_part_that_is_held_out() {
     let eval =
         ["eval", "--vehicles", text(&vehicles), "--data", text(&data), "--config", text(&settings), "--json"];
     for (rule, parts, models) in [("depth", 2, 5), ("vehicle", 2, 2)] {
-        let output = wade(&[&eval[..], &["--split", rule]].concat());
+        let output = wade(&[&eval[..], &["--split", rule, "--variants", "paper"]].concat());
         assert!(output.status.success(), "{}", stderr(&output));
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(report["splits"].as_array().unwrap().len(), parts);

@@ -392,9 +392,9 @@ fn a_parquet_file_ends_in_bundles_that_say_where_they_come_from() {
     let (vehicles, folder) = (common::copy_of_vehicles(), TempDir::new().unwrap());
     let (data, out) = (parquet(folder.path()), folder.path().join("report"));
     let before = bundle::read(&vehicles.path().join("husky")).unwrap();
-    let arguments =
-        ["train", "--data", &data, "--vehicles", text(vehicles.path()), "--epochs", "2", "--out", text(&out)];
-    success(&output(&arguments));
+    let vehicles_folder = text(vehicles.path());
+    let arguments = ["train", "--data", &data, "--vehicles", vehicles_folder, "--variant", "paper"];
+    success(&output(&[&arguments[..], &["--epochs", "2", "--out", text(&out)]].concat()));
     let record = Record::read(&out).unwrap();
     assert_eq!(record.history.len(), 2);
     assert!(record.split.training_cases.is_disjoint(&record.split.held_out_cases));
@@ -423,9 +423,9 @@ fn a_run_that_was_killed_ends_as_one_that_was_not() {
     let state = folder.path().join("state");
     let out = folder.path().join("report");
     let arguments = |vehicles: &Path, more: &[&str]| {
-        let fixed =
-            ["train", "--data", &data, "--epochs", "60", "--out", text(&out), "--vehicles", text(vehicles)];
-        fixed.iter().chain(more).map(|s| (*s).to_owned()).collect::<Vec<String>>()
+        let fixed = ["train", "--data", &data, "--variant", "paper", "--epochs", "60"];
+        let places = ["--out", text(&out), "--vehicles", text(vehicles)];
+        fixed.iter().chain(&places).chain(more).map(|s| (*s).to_owned()).collect::<Vec<String>>()
     };
     let (killed, whole) = (common::copy_of_vehicles(), common::copy_of_vehicles());
     let checkpoint = ["--checkpoint", text(&state)];

@@ -27,11 +27,11 @@ use super::Vehicles;
 /// Plan, run and collect a CFD campaign with OpenFOAM
 #[derive(Debug, Args)]
 #[command(after_help = "Example, from nothing to a data set:
-  wade campaign plan --vehicle husky --set paper --cases 175 --out campaigns/husky
+  wade campaign plan --vehicle husky --set paper --out campaigns/husky
   nice wade campaign run campaigns/husky --jobs 2
   wade campaign collect campaigns/husky
 
-What a model lacks that was learnt from parked, steady cases, by cases that move:
+What a model that was trained on parked, steady cases lacks, by cases that move:
   wade campaign trials campaigns/husky --set unsteady --out trials/
   wade gap --vehicle husky --trials trials/ --out gap/")]
 pub struct CampaignCommand {
@@ -40,28 +40,28 @@ pub struct CampaignCommand {
 }
 
 /// The form of `--table`.
-const TABLE: &str = "  speed_mps = { min = 0.5, max = 4.0 }               # through the water
-  angle_deg = { min = 30.0, max = 90.0 }             # of the flow: 90 is straight ahead
-  depth_m = { min = 0.10, max = 0.40 }               # at the body origin
+const TABLE: &str = "  speed_mps = { min = 0.5, max = 4.0 }      # through the water
+  angle_deg = { min = 30.0, max = 90.0 }    # of the flow: 90 is straight ahead
+  depth_m = { min = 0.10, max = 0.40 }      # at the body origin
   density_kgpm3 = { min = 1000.0, max = 1900.0 }
 ";
 
 /// The form of `--settings`, with what holds without one.
 const SETTINGS: &str = "  courant = 8.0                # largest Courant number
   interface_courant = 6.0      # and at the water's surface
-  settle_lengths = 3.5         # time before the first window, in vehicle lengths over the speed,
+  settle_lengths = 3.5         # time before the first window, lengths / speed
   settle_s = [2.0, 30.0]       # and its bounds [s]
   window_s = 2.0               # what is averaged [s]
   windows = 3                  # computed at most, until the mean has settled
-  drift = 0.05                 # of the mean that counts as settled, over the dynamic force
+  drift = 0.05                 # of a settled mean, over the dynamic force
   sample_s = 0.05              # between two samples of the forces [s]
-  limit_s = 3600.0             # after which a program is given up [s], longer on finer meshes
+  limit_s = 3600.0             # longest run of a program [s]; finer: longer
   [mesh]
   cells_per_length = 6.1       # background cells along the vehicle
-  wet_layer = 0.42             # height of wet background cells over their length
+  wet_layer = 0.42             # height of wet background cells over length
   hull_level = 2               # halvings at the hull
   wheel_level = 3              # and at the wheels
-  # channel_m = [6.0, 5.0, 1.5]  length, width, height; the source paper's otherwise
+  # channel_m = [6.0, 5.0, 1.5]  # length, width, height; default: the paper's
 ";
 
 // What stood above a variant would replace all that its command says of itself.
@@ -118,9 +118,9 @@ impl From<SetName> for Set {
 #[derive(Debug, Args)]
 #[command(after_help = format!("\
 Examples:
-  wade campaign plan --vehicle husky --set paper --cases 175 --out campaigns/husky
-  wade campaign plan --vehicle husky --set driving --cases 24 --out campaigns/husky
-  wade campaign plan --vehicle rover --set paper --table ranges.toml --out campaigns/rover
+  wade campaign plan --vehicle husky --set paper --out campaigns/husky
+  wade campaign plan --vehicle husky --set driving --cases 24 --out husky
+  wade campaign plan --vehicle rover --set paper --table ranges.toml --out rover
 
 A file of ranges (--table), here the source paper's of the Warthog:
 {TABLE}

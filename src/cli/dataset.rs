@@ -32,7 +32,8 @@ const MOST_CASES: u64 = 1_000_000;
 /// A data set is one Parquet file, a row for each surface of each sample, which pandas and DuckDB open too.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  wade dataset import --format openfoam --vehicle warthog --cases runs --out data.parquet
+  wade dataset import --format openfoam --vehicle warthog --cases runs \\
+    --out data.parquet
   wade dataset augment data.parquet --out augmented.parquet
   wade dataset split augmented.parquet --by case --out split
   wade dataset describe data.parquet --html data.html")]
@@ -48,23 +49,28 @@ enum Command {
     /// Each sub-folder is a case and holds case.toml, its description, beside the solver's files: for OpenFOAM
     /// postProcessing/SURFACE/TIME/force.dat and moment.dat, for Fluent report files *.out. A case that cannot be read
     /// is an error, and then nothing is written.
+    #[command(override_usage = "wade dataset import [OPTIONS] --format <FORMAT> --vehicle <VEHICLE>
+       --cases <DIR> --out <FILE>")]
     #[command(after_help = "Example:
-  wade dataset import --format fluent --vehicle husky --cases runs --out data.parquet
+  wade dataset import --format fluent --vehicle husky --cases runs \\
+    --out data.parquet
 
 case.toml, with z of the CFD forward, y up and so x to the left:
   vehicle = \"husky\"
   speed_mps = 0.8
-  flow_angle_deg = 60.0        # 90 head-on; or heading_deg, or water_velocity_mps in the axes of the CFD
+  flow_angle_deg = 60.0        # 90 is head-on
+  # heading_deg = 30.0         # or this, or water_velocity_mps in CFD axes
   density_kgpm3 = 1000.0
   depth_m = 0.15
   domain_m = [6.0, 5.0, 1.5]
   bed = \"parked\"               # or \"driving\"
   ground_contact = \"dry\"       # or \"wetted\"
   [frame]
-  x = \"z\"                      # the axis of the CFD that points forward, left, up
-  y = \"x\"
-  z = \"y\"
-  origin_m = [0.0, 0.0, 0.0]   # the body origin in the CFD; also yaw_deg, pitch_deg, roll_deg
+  x = \"z\"                      # the axis of the CFD that points forward
+  y = \"x\"                      # that points left
+  z = \"y\"                      # that points up
+  origin_m = [0.0, 0.0, 0.0]   # the body origin in the CFD
+  # yaw_deg = 0.0              # and its attitude: yaw_deg, pitch_deg, roll_deg
   [surfaces]
   wheel_fl = \"wheel-front-left\" # where the solver's name is not ours
   [report]                     # Fluent alone
@@ -74,7 +80,7 @@ case.toml, with z of the CFD forward, y up and so x to the left:
     Import(ImportCases),
     /// Loads by formula over the paper's parameter table, in the same form
     #[command(after_help = "Example:
-  wade dataset analytic --vehicle husky --vehicle warthog --seed 1 --cases 175 --out analytic.parquet")]
+  wade dataset analytic --vehicle husky --vehicle warthog --out analytic.parquet")]
     Analytic(Analytic),
     /// Add mirror images: left to right and, where the hull is symmetric, front to rear
     #[command(after_help = "Example: wade dataset augment data.parquet --out augmented.parquet")]
@@ -95,12 +101,13 @@ case.toml, with z of the CFD forward, y up and so x to the left:
     /// Every split but the one by sample keeps the sections and images of a case together.
     #[command(after_help = "Examples:
   wade dataset split data.parquet --by case --share 0.2 --seed 1 --out split
-  wade dataset split data.parquet --by depth --parts 5 --out split    split/1 to split/5, one depth held out in each")]
+  split/1 to split/5, with one depth held out in each:
+  wade dataset split data.parquet --by depth --parts 5 --out split")]
     Split(SplitFile),
     /// Join data sets, such as those of two vehicles, and take some sets of a campaign alone
     #[command(after_help = "Examples:
   wade dataset merge husky.parquet warthog.parquet --out both.parquet
-  wade dataset merge campaigns/mine/sections.parquet --set paper,wide --out steady.parquet")]
+  wade dataset merge mine/sections.parquet --set paper,wide --out steady.parquet")]
     Merge {
         /// The data sets
         #[arg(required = true)]

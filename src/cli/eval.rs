@@ -29,18 +29,19 @@ use super::{PROGRAM, begin_page, emit, usage_error};
 #[command(after_help = "Examples:
   wade eval --data cfd.parquet --trained training --html eval.html
   wade eval --data cfd.parquet --trained training --ablations --html eval.html
-  wade eval --data cfd.parquet --split depth --json         trains anew for each depth held out, leaves bundles alone")]
+  Train one model for each depth held out; this leaves the bundles alone:
+  wade eval --data cfd.parquet --split depth --json")]
 pub struct Eval {
     #[command(flatten)]
     data: Data,
     /// Folder of the report that wade train wrote
     #[arg(long, value_name = "DIR", default_value = "training")]
     trained: PathBuf,
-    /// Trains anew for each part that is held out in turn, with the settings of --config, instead of judging the bundles
+    /// Train for each held-out part in turn, with the settings of --config, instead of judging the bundles
     #[arg(long, value_enum, conflicts_with = "trained")]
     split: Option<Rule>,
-    /// What is trained anew; the first is the one under evaluation
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "paper", requires = "split")]
+    /// Kinds of model to train; the first is the one under evaluation
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "anchored", requires = "split")]
     variants: Vec<Served>,
     /// Trains the paper's three ablations on the same split, with the settings of the paper's network
     #[arg(long)]
@@ -114,7 +115,7 @@ impl Eval {
 
     /// One training a part; the held-out states of all parts are pooled.
     fn anew(&self, rule: Rule) -> Result<Report> {
-        let first = self.variants.first().copied().unwrap_or(Served::Paper);
+        let first = self.variants.first().copied().unwrap_or(Served::Anchored);
         let config = self.data.settings(first)?;
         let of_paper = self.data.settings(Served::Paper)?;
         let mut settings = self.ablation_settings(&of_paper);

@@ -20,23 +20,22 @@ use super::running::Running;
 use super::{Vehicles, check_report_folder, emit, usage_error};
 
 /// The form of `--config`, with what holds without one; besides `library`, which names all effects.
-const SETTINGS: &str =
-    "  # library = [\"added_mass\", \"current\"]   names of docs/src/concepts/effects.md; all of them otherwise
-  ground_contact = \"wetted\"    # or \"dry\": whether predictions have water under the tires
+const SETTINGS: &str = "  # library = [\"added_mass\", \"current\"]   # default: all effects
+  ground_contact = \"wetted\"    # or \"dry\": water under the tires, or none
   seed = 1
   bin_s = 0.1                  # over which samples are averaged [s]
   block_s = 1.5                # unit of cross-validation [s]
   folds = 8
-  held_out = 0.2               # share of the trials that take no part in naming and fitting
+  held_out = 0.2               # share of the trials that is held out
   least_trials = 4
   significance = 1e-6          # probability of a false alarm of one effect
-  share_of_remaining = 0.1     # of the gap above the floor that an effect must explain
-  share_of_gap = 0.01          # of all that is explained that one of several must
+  share_of_remaining = 0.1     # least share of the gap above the noise floor
+  share_of_gap = 0.01          # least share of the explained gap
   relevance = 0.08             # least size over the noise of a sample
   most_effects = 4             # named together
-  placebos = 20                # phase-shifted copies that an effect must beat
+  placebos = 20                # surrogates that an effect must beat
   bootstrap = 400              # draws
-  coverage = 0.6               # of the structure that what is named must explain
+  coverage = 0.6               # least share of the structure that is explained
 ";
 
 /// Find where a model and measured trials disagree, name the missing effect, and show the gap shrink
@@ -53,33 +52,53 @@ const SETTINGS: &str =
   wade gap locate --vehicle warthog --trials trials/ --json
   wade gap bench --cases 69 --out bench/
 
-  wade vehicle rollback warthog                     takes it back
+  Restore the version before:
+  wade vehicle rollback warthog
 
-OUT holds report.json and index.html, with --apply effects.toml too: the physical effects with their standard errors and the
-ranges in which they were seen. Faults of sensors and drive are never in it. --apply writes it into the bundle as the next
-version, in the place of effects from before, and keeps the version before it; only a verdict of `named` is applied. The gap of
-another simulator (sim_ columns) is not the bundle's, so effects.toml is all that is written of it; that of a control, the same
-trial without what is looked for, is added to the bundle; what trials of another kind gave cannot stand beside it.
+Output:
+  OUT holds report.json and index.html, with --apply also effects.toml: the
+  physical effects, their standard errors, and the ranges in which they were
+  seen. Faults of sensors and of the drive are never in it. --apply writes it
+  into the bundle as the next version and keeps the version before. It replaces
+  the effects of earlier runs, and only a verdict of `named` is applied.
+  With sim_ columns the gap is another simulator's: effects.toml is written to
+  OUT alone. With sim_is = \"control\" the effects go into the bundle, and those
+  of trials of another kind cannot stand beside them.
 
-Trials: a folder of CSV files, one a trial, in SI units and body axes (forward, left, up), and trials.toml.
-  t vx vy vz wx wy wz depth                needed: time, velocity over ground, angular velocity, water over the ground
-  roll pitch yaw  ax ay az  alx aly alz    attitude, accelerations without gravity (else differentiated)
-  cx cy cz  rho  wheel_fl fr rl rr         known current, density, wheel speeds
-  fx fy fz mx my mz                        measured wrench about the center of mass, any of it
-  sim_fx .. sim_mz                         another simulator's, in the place of the bundle's
+Trials: a folder with one CSV file a trial, in SI units and body axes (forward,
+left, up), and trials.toml. Columns:
+  t                        time, needed
+  vx vy vz wx wy wz        velocity over ground, angular velocity, needed
+  depth                    water above the ground, needed
+  roll pitch yaw           attitude
+  ax ay az alx aly alz     accelerations without gravity; else differentiated
+  cx cy cz rho             known current, density
+  wheel_fl fr rl rr        wheel speeds
+  fx fy fz mx my mz        measured wrench about the center of mass, any of it
+  sim_fx .. sim_mz         another simulator's, instead of the bundle's
 
-  vehicle = \"warthog\"                    the only key that is needed
-  fluid_density = 1000.0                   mass = 280.0, where the wrench is inferred
-  channel_width = 6.0                      [channel_widths] run07 = inf   by trial; inf is open water
+Keys of trials.toml; only the vehicle is needed:
+  vehicle = \"warthog\"
+  fluid_density = 1000.0
+  mass = 280.0             # where the wrench is inferred
+  channel_width = 6.0
+  [channel_widths]         # by trial
+  run07 = inf              # open water
   [measured]
-  method = \"load_cell\"                   inverse_dynamics, cfd
-  columns = [\"fx\"]                       repeats = [[\"run01\", \"run07\"]]   dry_twins = {{ run03 = \"dry03\" }}
-  other_forces = [\"drive_fx\"]            columns of known forces, for inverse_dynamics
-  sim_is = \"control\"                     the sim_ columns are the same trial without what is looked for [default: simulator]
-  known_loads = [\"hung_fz\"]              columns of loads that the cell bears besides the water's, such as known weights
-  [sensor_noise]  [trial_offset]           standard deviation of a sample and of the zero from run to run: fx = 4.0
-  [trial_offsets.run07]                    the same of a run whose zero wanders more or less than that of the others
-  [body]                                   with sim_ columns: length, width, draft, mass, displaced_volume, center_of_mass
+  method = \"load_cell\"     # or inverse_dynamics, cfd
+  columns = [\"fx\"]
+  repeats = [[\"run01\", \"run07\"]]
+  dry_twins = {{ run03 = \"dry03\" }}
+  other_forces = [\"drive_fx\"]   # known forces, for inverse_dynamics
+  known_loads = [\"hung_fz\"]     # what the load cell bears besides the water
+  sim_is = \"control\"     # the same trial without the effect in question
+                           # [default: simulator]
+  [sensor_noise]           # standard deviation of one sample
+  fx = 4.0
+  [trial_offset]           # standard deviation of the offset between runs
+  [trial_offsets.run07]    # the same of one run that differs
+  [body]                   # with sim_ columns: length, width, draft, mass,
+                           # displaced_volume, center_of_mass
 
 Settings that a file (--config) leaves out are these:
 {SETTINGS}"))]

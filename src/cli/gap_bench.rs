@@ -28,12 +28,13 @@ use super::emit;
 #[command(args_conflicts_with_subcommands = true)]
 #[command(after_help = "Examples:
   wade gap bench --cases 69 --seed 1 --out bench/
-  wade gap bench --cases 6 --families null,single --size slice --out bench/ --json
+  wade gap bench --cases 6 --families null,single --size slice --out bench/
   wade gap bench --cases 69 --only squat --no-baselines --keep --out bench/
-  wade gap bench --cases 69 --tool 'mytool --trials {trials} --out {out}' --out bench/
+  wade gap bench --tool 'mytool --trials {trials} --out {out}' --out bench/
   wade gap bench import kvlcc2 --from kvlcc2_roll_decay/ --out trials/
 
-All trials are generated and labelled so. OUT/results.json holds the table and every case.")]
+All trials are generated and labelled so. OUT/results.json holds the table and
+every case.")]
 pub struct GapBench {
     #[command(subcommand)]
     command: Option<Command>,

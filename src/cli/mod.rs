@@ -5,12 +5,15 @@ mod dataset;
 mod eval;
 mod gap;
 mod gap_bench;
+mod log;
+mod outside;
 mod predict;
 mod progress;
 mod query;
 mod running;
 mod serve;
 mod soak;
+mod soak_server;
 mod state;
 mod train;
 mod validate;
@@ -36,9 +39,12 @@ const PROGRAM: &str = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WA
 #[derive(Debug, Parser)]
 #[command(version = concat!(env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")"), propagate_version = true)]
 #[command(after_help = "Examples:
-  wade serve                                             serve the shipped vehicles on loopback
-  wade query --vehicle husky --speed 0.8 --depth 0.18    one query, no server needed
-  wade soak --vehicle husky --transport shm-spin --rate 1000 --duration 300s --out soak/")]
+  Serve the shipped vehicles on this machine:
+  wade serve
+  One query; it needs no server:
+  wade query --vehicle husky --speed 0.8 --depth 0.18
+  Latency at 1000 requests a second for 300 s:
+  wade soak --vehicle husky --transport shm-spin --out soak/")]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -183,4 +189,33 @@ impl Page {
 /// Names of the bundles in a folder, sorted.
 fn bundle_names(directory: &Path) -> Result<Vec<String>> {
     wade::bundle::names_in(directory).with_context(|| format!("cannot read {}", directory.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of a plain terminal.
+    const WIDTH: usize = 80;
+
+    /// Lines of the help of a command and of all below it that do not fit, with the name of the command.
+    fn too_wide(command: &mut clap::Command, faults: &mut Vec<String>) {
+        let name = command.get_bin_name().unwrap_or_default().to_owned();
+        let (long, short) = (command.render_long_help().to_string(), command.render_help().to_string());
+        // of a longer line clap would put the rest on a line of its own, which breaks a table in two
+        let written = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let lines = [long, short, written];
+        let wide = lines.iter().flat_map(|text| text.lines()).filter(|line| line.chars().count() > WIDTH);
+        faults.extend(wide.map(|line| format!("{name}: {line}")));
+        command.get_subcommands_mut().for_each(|command| too_wide(command, faults));
+    }
+
+    #[test]
+    fn every_help_can_be_read_at_80_columns() {
+        use clap::CommandFactory;
+        let (mut command, mut faults) = (Cli::command().term_width(WIDTH), Vec::new());
+        command.build();
+        too_wide(&mut command, &mut faults);
+        assert!(faults.is_empty(), "{}", faults.join("\n"));
+    }
 }

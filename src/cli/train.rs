@@ -26,53 +26,56 @@ use super::{PROGRAM, Vehicles, bundle_names, check_report_folder, usage_error};
 
 /// Train one network for the vehicles of a data set and write it into their bundles
 ///
-/// The data set is split, mirrored and standardised by its training side; the bundles get the weights under their next
-/// version, labelled with where the loads come from, and the version before is kept (wade vehicle rollback). "analytic" stands for
-/// hydrostatics, form drag and skin friction by formula over the paper's parameter table, generated on the spot.
+/// Splits the data set, adds mirror images, and standardizes by the training side. Writes the weights into the bundles as
+/// their next version, with the origin of the loads, and keeps the version before (wade vehicle rollback). "analytic"
+/// stands for hydrostatics, form drag and skin friction by formula over the paper's parameter table, generated here.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  wade train --data analytic --vehicles vehicles
-  wade train --data cfd.parquet --vehicles vehicles --out training --checkpoint training.ckpt
-  wade train --data cfd.parquet --vehicles vehicles --checkpoint training.ckpt --resume
-  wade train --data cfd.parquet --vehicles copy --split depth --part 5 --out deepest
+  wade train --data cfd.parquet
+  wade train --data cfd.parquet --checkpoint training.ckpt
+  wade train --data cfd.parquet --checkpoint training.ckpt --resume
+  wade train --data cfd.parquet --vehicles copy --split depth --part 5
+  wade train --data analytic --variant paper --vehicles copy
 
-Settings that a file (--config) leaves out are the paper's, and those below of --variant anchored:
+Settings that a file (--config) leaves out:
   seed = 1
-  epochs = 1000
+  epochs = 150
   batch = 16
   held_out_batch = 64
   learning_rate = 1e-3
-  patience = 20                # epochs without improvement of the validation loss after which the rate is halved
-  least_learning_rate = 0.0    # ends training before the last epoch
-  keep = \"last\"                # or \"best\" by the validation loss; the paper does not say
-  front_rear = false           # mirror front to rear also a hull that is not symmetric, as the paper did
+  patience = 5                 # epochs without a better validation loss after
+                               # which the learning rate is halved
+  least_learning_rate = 1e-6   # ends training before the last epoch
+  keep = \"last\"                # or \"best\" by the validation loss
+  front_rear = false           # also mirror a hull that is not symmetric
   held_out_share = 0.2         # by case and by sample
-  validation_share = 0.1       # of what is not held out; it sets the pace of the paper's network
+  validation_share = 0.1       # of what is not held out; --variant paper alone
   parts = 5                    # folds, depths, headings
   threads = 2
-  weight_decay = 0.0
+  weight_decay = 0.01
   [loss]
   alpha = 0.5
   epsilon = 0.01
   net_weight = 0.1
   dry_weight = 0.5
   [anchored]
-  between = 40                 # states between the cases in which the network is taught, for each case
-  outside = 8                  # and on lines through any two cases and as far again beyond
+  between = 40                 # interpolated states a case for distillation
+  outside = 8                  # the same on lines through two cases and beyond
   [anchored.loss]
   net_weight = 10.0
   moment_weight = 1.0          # of each surface's moment
   net_moment_weight = 10.0
   delta = 0.1                  # error up to which the loss is a square
-  exponent = 0.5               # 0 judges errors in newtons, 1 in shares of the load
+  exponent = 0.5               # 0: errors in newtons, 1: in shares of the load
   floor = 0.01
---variant anchored takes epochs = 150, patience = 5, least_learning_rate = 1e-6, weight_decay = 0.01, and --data analytic
-for the paper's network epochs = 2000, patience = 60, least_learning_rate = 1e-6.")]
+--variant paper takes epochs = 1000, patience = 20, least_learning_rate = 0 and
+weight_decay = 0; with --data analytic epochs = 2000, patience = 60 and
+least_learning_rate = 1e-6.")]
 pub struct Train {
     #[command(flatten)]
     data: Data,
-    /// What is learnt
-    #[arg(long, value_enum, default_value = "paper")]
+    /// Kind of model; `anchored` is what the shipped vehicles have
+    #[arg(long, value_enum, default_value = "anchored")]
     variant: Served,
     /// Epochs at most
     #[arg(long)]
@@ -115,10 +118,10 @@ pub struct Data {
 /// What can be learnt and served.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Served {
+    /// Exact hydrostatics, a simple drag, and a learned dimensionless remainder
+    Anchored,
     /// The paper's network as published
     Paper,
-    /// Hydrostatics of the hull, a simple drag, and a learned remainder without a dimension
-    Anchored,
 }
 
 /// What a training comes to: weights for each vehicle, and its record without that of the data.

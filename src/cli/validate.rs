@@ -12,8 +12,7 @@ use wade::validate::{self, Config, OutFolder, Recordings, Report, Source, Subjec
 use super::{Vehicles, emit};
 
 /// The form of `--config`, with what holds without one.
-const SETTINGS: &str =
-    "  ground_contact = \"wetted\"    # or \"dry\": whether predictions have water under the tires
+const SETTINGS: &str = "  ground_contact = \"wetted\"    # or \"dry\": water under the tires, or none
   [mocap]
   rate_hz = 111.0              # after resampling
   window = 9                   # of the Savitzky-Golay filter [samples]
@@ -32,7 +31,7 @@ const SETTINGS: &str =
   speed_mps = 0.5              # width of a bin of speed
   [thresholds]
   drag_r2 = 0.9                # least R2 of |Fx| against v^2 at every depth
-  ratio_difference = 0.3       # largest between the mean ratio of pairs and that of the fits
+  ratio_difference = 0.3       # largest between mean ratio of pairs and of fits
   f0_r2 = 0.95                 # least R2 of F0 against depth
   sections = 3                 # fewest from which a depth is judged
 ";
@@ -42,15 +41,18 @@ const SETTINGS: &str =
 /// Test 1: drag grows with the square of the speed. Test 2: the vertical force is buoyancy, which grows with depth, plus
 /// lift. Only motion is needed, no measured force. Exit status 1: a check does not hold.
 #[derive(Debug, Args)]
+#[command(override_usage = "wade validate [OPTIONS] --vehicle <VEHICLE> --out <DIR>
+       <--trials <DIR>|--mocap <DIR>|--generated <SEED>>")]
 #[command(group = ArgGroup::new("source").required(true))]
 #[command(after_help = format!("Examples:
   wade validate --vehicle warthog --generated 1 --out validation/
   wade validate --vehicle warthog --mocap recordings/ --out validation/ --json
-  wade validate --vehicle warthog --trials trials/ --config validate.toml --out validation/
+  wade validate --vehicle warthog --trials trials/ --out validation/
 
-A folder of recordings holds recordings.toml and one CSV a recording (t, x y z, qw qx qy qz of the marker frame, z up);
-with --generated one is written to OUT/recordings. A folder of trials holds trials.toml and one CSV a trial (t, vx vy vz,
-wx wy wz, roll pitch yaw, depth, ...); those made from recordings are written to OUT/trials.
+A folder of recordings holds recordings.toml and one CSV a recording: t, x y z,
+qw qx qy qz of the marker frame, z up. --generated writes one to OUT/recordings.
+A folder of trials holds trials.toml and one CSV a trial: t, vx vy vz, wx wy wz,
+roll pitch yaw, depth and more. Trials made from recordings go to OUT/trials.
 
 Settings that a file (--config) leaves out are these:
 {SETTINGS}"))]

@@ -41,9 +41,8 @@ pub struct Vehicle {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Make a bundle from an STL and a vehicle file
-    #[command(
-        after_help = "Example: wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover"
-    )]
+    #[command(after_help = "Example:
+  wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover")]
     Build {
         /// The hull, any axes and unit
         #[arg(long, value_name = "FILE")]
