@@ -12,6 +12,7 @@
 pub mod case;
 pub mod claim;
 pub mod collect;
+mod foreword;
 pub mod mesh;
 pub mod openfoam;
 pub mod placement;

@@ -8,6 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::collect::{CaseSummary, CollectError, Collected, SECTIONS_FILE};
+use super::foreword::foreword;
 use super::plan::{Case, Plan, Set};
 use crate::analytic;
 use crate::condition::{Condition, GroundContact};
@@ -16,7 +17,7 @@ use crate::dataset::page;
 use crate::dataset::summary::Summary;
 use crate::domain::Range;
 use crate::frame::Vec3;
-use crate::page::{PlotError, preformatted};
+use crate::page::PlotError;
 use crate::signal;
 use crate::validate::paper::{self, PaperDepth};
 use crate::vehicle::Vehicle;
@@ -212,10 +213,10 @@ impl Report {
         }
         for case in &self.head_on {
             let paper = case.paper_c.map_or_else(String::new, |c| {
-                format!(", the paper's {c:.1}: other data ({:+.0} %)", 100.0 * (case.c / c - 1.0))
+                format!(", published, different data: {c:.1} ({:+.0} %)", 100.0 * (case.c / c - 1.0))
             });
             line(format_args!(
-                "  head-on, {:.3} m, {:.2} m/s: C {:.1}{paper}",
+                "  head-on, {:.3} m, {:.2} m/s: C = -Fx / v2 = {:.1} N s2/m2{paper}",
                 case.depth_m, case.speed_mps, case.c
             ));
         }
@@ -247,7 +248,7 @@ impl Report {
             .collect();
         let summary = Summary::of(&dataset, &|_, surface| kinds.get(surface).cloned());
         let title = format!("CFD campaign: {}", self.vehicle);
-        Ok(page::page_with(&title, &preformatted(&self.text()), &summary)?)
+        Ok(page::page_with(&title, &foreword(self), &summary)?)
     }
 }
 

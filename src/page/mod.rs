@@ -5,18 +5,18 @@ pub mod plot;
 pub use plot::PlotError;
 
 /// The look of every page.
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;margin:24px auto;padding:0 10px;color:#1f2328;overflow-wrap:break-word}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1340px;margin:24px auto;padding:0 10px;color:#1f2328;overflow-wrap:anywhere}\
 h1{font-size:22px;margin:0 0 4px}h2{font-size:18px;margin:30px 0 4px}h3{font-size:15px;margin:18px 0 2px}p{margin:4px 0 8px}\
 .verdict{padding:10px 14px;border-left:6px solid #1d5fb0;background:#eef4fb;margin:12px 0}.verdict ul{margin:4px 0;padding-left:20px}\
 .pass{border-color:#2a8c4a;background:#eef8f0}.fail{border-color:#b91c1c;background:#fdf0f0}\
 .notice{border-color:#d97a06;background:#fdf6ec}\
-.wide{overflow-x:auto}table{border-collapse:collapse;margin:8px 0}\
-th,td{padding:3px 11px;border-bottom:1px solid #e3e6ea;text-align:right;white-space:nowrap}\
-th:first-child,td:first-child{text-align:left;padding-left:0}.text{text-align:left;white-space:normal}\
+.wide{overflow-x:auto;max-width:100%}table{display:block;overflow-x:auto;max-width:100%;border-collapse:collapse;margin:8px 0}\
+th,td{padding:3px 9px;border-bottom:1px solid #e3e6ea;text-align:right;white-space:nowrap;overflow-wrap:normal}th{white-space:normal;vertical-align:bottom}\
+th:first-child,td:first-child{text-align:left;padding-left:0}.text{text-align:left;white-space:normal;min-width:14em}\
 td.paper,th.paper{color:#8a5a00;background:#fdf9f1}td.none{background:#fdf0f0}\
-figure{display:inline-block;margin:0 6px 6px 0}.legend span{margin-right:18px;white-space:nowrap}\
+figure{display:inline-block;max-width:100%;margin:0 6px 6px 0}.legend span{display:inline-block;margin-right:18px}\
 .bar{display:flex;height:22px;border-radius:4px;overflow:hidden;margin:8px 0 4px}\
-.legend i{display:inline-block;width:9px;height:9px;border-radius:5px;margin-right:6px}\
+.legend i{display:inline-block;width:9px;height:9px;border-radius:5px;margin-right:6px}.legend i.dash{width:18px;height:0;border-top:2px dashed #000;border-radius:0;vertical-align:middle}\
 .small{color:#57606a;font-size:13px}svg{max-width:100%;height:auto;display:block}pre{font-size:13px;overflow-x:auto}";
 
 /// A page of a title, which is plain text, and a body, which is HTML.

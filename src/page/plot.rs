@@ -137,15 +137,32 @@ fn chart<'a, 'b>(area: &'a Canvas<'b>, width: u32) -> ChartBuilder<'a, 'a, SVGBa
     chart
 }
 
+/// A number at an axis: without what rounding leaves, without zeros at the end, and never -0.
+pub fn tick(value: &f64) -> String {
+    if *value != 0.0 && !(1e-4..1e6).contains(&value.abs()) && value.abs() > 1e-12 {
+        return format!("{value:.3e}");
+    }
+    let text = format!("{value:.6}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
 /// The grid and letters of every figure.
-fn styled<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
+fn styled<'m, 'a, 'b, X, Y, DB>(
     mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
     [x_title, y_title]: [&str; 2],
-) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {
+) -> &'m mut MeshStyle<'a, 'b, X, Y, DB>
+where
+    X: Ranged<ValueType = f64>,
+    Y: Ranged<ValueType = f64>,
+    DB: DrawingBackend,
+{
     mesh.light_line_style(WHITE)
         .bold_line_style(GRID)
         .x_desc(x_title)
         .y_desc(y_title)
+        .x_label_formatter(&tick)
+        .y_label_formatter(&tick)
         .label_style(LETTERS)
         .axis_desc_style(LETTERS)
 }
@@ -170,4 +187,15 @@ fn padded(extent: Option<(f64, f64)>) -> Range<f64> {
     let Some((low, high)) = extent else { return 0.0..1.0 };
     let room = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
     low - room..high + room
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_as_people_write_them() {
+        let texts = [0.0, -0.0, -1e-17, 0.1 + 0.2, -2.5, 1500.0, 2e7, 3e-5].map(|value| tick(&value));
+        assert_eq!(texts, ["0", "0", "0", "0.3", "-2.5", "1500", "2.000e7", "3.000e-5"]);
+    }
 }
