@@ -15,7 +15,12 @@ use process::{Process, state, until_answered};
 use tempfile::TempDir;
 use wade::client::{ClientError, ShmClient};
 use wade::service::shm::Wait;
-use wade::service::shm_layout::{Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, Status};
+use wade::service::shm_layout::{
+    Answer, BatchAnswer, BatchHeader, BatchQuery, HAS_BED, HAS_BED_CLEARANCE, HAS_HEADING, HAS_WATER_LEVEL,
+    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, MAX_BATCH, MAX_WHEELS, Names, Query, SERVER_POLLS, Status,
+    SurfaceAnswer,
+};
+use wade::service::wire::{Field, InvalidState, Problem};
 
 #[test]
 fn a_living_client_finds_a_killed_and_restarted_server_again() {
@@ -138,7 +143,7 @@ fn a_hostile_request_gets_an_error_code_and_the_next_is_served() {
         Query { depth_m: f32::NAN, ..good },
         Query { velocity_mps: [f32::INFINITY; 3], ..good },
         Query { gravity_direction: [0.0; 3], ..good },
-        Query { density_kgpm3: -1.0, flags: u32::MAX, session: u64::MAX, ..good },
+        Query { density_kgpm3: -1.0, flags: u64::MAX, session: u64::MAX, ..good },
     ];
     for (sequence, query) in (1..).zip(bad) {
         // a wake key that no listener has must not hold anybody up
@@ -146,10 +151,83 @@ fn a_hostile_request_gets_an_error_code_and_the_next_is_served() {
         let pending = raw.single.send_copy(query).expect("sent");
         let answer = patiently(|| pending.receive().expect("received").map(|answer| *answer));
         assert_eq!((answer.status, answer.sequence), (Status::InvalidState as u32, sequence));
-        assert!(answer.refusal().is_some() && answer.force_n == [0.0; 3]);
+        assert!(answer.refusal().is_some() && answer.force_n.iter().all(|force| force.is_nan()));
         let pending = raw.single.send_copy(Query { sequence: 99, ..good }).expect("sent");
         let answer = patiently(|| pending.receive().expect("received").map(|answer| *answer));
         assert_eq!((answer.status, answer.sequence), (Status::Ok as u32, 99));
+    }
+}
+
+/// What a polling server answers to a query that was written by the layout alone.
+fn asked(raw: &Raw, query: Query) -> Answer {
+    let pending = raw.single.send_copy(query).expect("sent");
+    patiently(|| pending.receive().expect("received").map(|answer| *answer))
+}
+
+#[test]
+fn what_is_set_and_cannot_be_used_is_refused_by_name() {
+    let served = Served::with(|config| config.shm.wait = Wait::Spin);
+    let raw = Raw::new(&served);
+    let good = Query::from(&state());
+    let mut wheels = [f32::NAN; MAX_WHEELS];
+    wheels[5] = 3.0;
+    let six = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, f32::NAN, f32::NAN];
+    let (level, clearance) = (0.1, 0.5);
+    use Problem::{Count, NotFinite, Unsupported, WithoutFlag};
+    let cases = [
+        (Query { flags: HAS_WATER_LEVEL, water_level_m: level, ..good }, Field::WaterLevel, Unsupported),
+        (Query { water_level_m: level, ..good }, Field::WaterLevel, WithoutFlag),
+        (
+            Query { flags: HAS_BED_CLEARANCE, bed_clearance_m: clearance, ..good },
+            Field::BedClearance,
+            Unsupported,
+        ),
+        (Query { bed_clearance_m: 0.0, ..good }, Field::BedClearance, WithoutFlag),
+        (Query { flags: HAS_BED, bed: 1.0, ..good }, Field::Bed, Unsupported),
+        (
+            Query { flags: HAS_WHEEL_LEVELS, wheel_water_level_m: six, ..good },
+            Field::WheelWaterLevel,
+            Unsupported,
+        ),
+        (Query { wheel_water_level_m: wheels, ..good }, Field::WheelWaterLevel, WithoutFlag),
+        (Query { flags: HAS_WHEEL_SPEEDS, wheel_speed_radps: six, ..good }, Field::WheelSpeed, Count),
+        (Query { wheel_speed_radps: wheels, ..good }, Field::WheelSpeed, WithoutFlag),
+        (Query { flags: HAS_WHEEL_SPEEDS, ..good }, Field::WheelSpeed, NotFinite),
+        (Query { flags: HAS_HEADING, ..good }, Field::Heading, NotFinite),
+        (Query { heading_rad: 0.0, ..good }, Field::Heading, WithoutFlag),
+        (Query { flags: 1 << 63, ..good }, Field::Flags, Unsupported),
+        (Query { depth_m: f32::NAN, ..good }, Field::Depth, NotFinite),
+    ];
+    for (query, field, problem) in cases {
+        let answer = asked(&raw, query);
+        assert_eq!(answer.refusal(), Some(InvalidState { field, problem }));
+        assert!(answer.force_n.iter().all(|force| force.is_nan()) && answer.surface_count == 0);
+    }
+    assert_eq!(asked(&raw, good).status, Status::Ok as u32);
+}
+
+#[test]
+fn what_no_model_answers_yet_is_unset_and_never_zero() {
+    let served = Served::with(|config| config.shm.wait = Wait::Spin);
+    let answer = asked(&Raw::new(&served), Query::from(&state()));
+    assert_eq!((answer.status, answer.flags), (Status::Ok as u32, SERVER_POLLS));
+    let surfaces = answer.surfaces();
+    assert!(!surfaces.is_empty() && answer.effects().is_empty());
+    let answered = |load: &SurfaceAnswer| [load.force_n, load.point_m].concat().iter().all(|x| x.is_finite());
+    assert!(surfaces.iter().all(answered));
+    let unset = [
+        &surfaces.iter().flat_map(|load| [load.couple_nm, load.effect_force_n].concat()).collect::<Vec<_>>()
+            [..],
+        &answer.surfaces[surfaces.len()..].iter().flat_map(|load| load.force_n).collect::<Vec<_>>(),
+        &answer.moment_deviation_nm,
+        &answer.effects_outside,
+        &answer.outside[8..],
+        &[answer.water_level_m, answer.bed_clearance_m, answer.bed],
+        &answer.added_mass,
+        &answer.damping,
+    ];
+    for (place, values) in unset.iter().enumerate() {
+        assert!(values.iter().all(|value| value.is_nan()), "group {place}: {values:?}");
     }
 }
 
@@ -163,7 +241,7 @@ fn a_batch_that_lies_about_its_length_gets_an_error_code() {
             .batch
             .loan_uninit()
             .expect("a slot")
-            .write_payload(BatchQuery { header: Default::default(), queries: [good; MAX_BATCH] });
+            .write_payload(BatchQuery { header: BatchHeader::UNSET, queries: [good; MAX_BATCH] });
         request.payload_mut().header.count = count;
         let pending = request.send().expect("sent");
         let (status, answered) =

@@ -9,10 +9,9 @@ use super::{ClientError, EffectReply, Reply, SurfaceReply};
 use crate::effects::{Effect, LeftOut};
 use crate::service::shm::{self, Wait};
 use crate::service::shm_layout::{
-    Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query, Status,
+    Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query, Status, SurfaceAnswer,
 };
 use crate::service::wire::State;
-use crate::vehicle::MAX_SURFACES;
 
 /// A client of one vehicle, owned by one thread.
 #[derive(Debug)]
@@ -47,7 +46,7 @@ impl ShmClient {
         let query = Query { session: self.session, ..Query::from(state) };
         let answer = self.exchange(|link, deadline| {
             let asked = link.ask(query)?;
-            link.answer(&asked, deadline, |answer| *answer)
+            link.answer(&asked, deadline, Answer::copied)
         })?;
         match answer.refusal() {
             Some(invalid) => Err(invalid.into()),
@@ -58,7 +57,9 @@ impl ShmClient {
 
     /// The forces in each state of a batch.
     pub fn evaluate_batch(&mut self, states: &[State]) -> Result<Vec<Answer>, ClientError> {
-        self.exchange_batch(states, |answer| answer.answers[..states.len()].to_vec())
+        self.exchange_batch(states, |answer| {
+            answer.answers[..states.len()].iter().map(Answer::copied).collect()
+        })
     }
 
     /// The server's own time for a batch [ns].
@@ -86,7 +87,7 @@ impl ShmClient {
             Some((invalid, _)) => Err(invalid.into()),
             None if status == Status::InvalidBatch as u32 => Err(ClientError::Refused {
                 code: Code::InvalidArgument,
-                message: "the batch is empty or too long".into(),
+                message: "the batch is empty or too long, or has a flag that the server does not know".into(),
             }),
             None => Err(unknown_status(status)),
         }
@@ -122,35 +123,34 @@ fn unknown_status(status: u32) -> ClientError {
 
 impl From<&Answer> for Reply {
     fn from(answer: &Answer) -> Self {
-        let surface = |i: usize| SurfaceReply {
-            force: answer.surface_force_n[i],
-            point: answer.surface_point_m[i],
-            wetted_fraction: answer.wetted_fraction[i],
+        let surface = |load: &SurfaceAnswer| SurfaceReply {
+            force: load.force_n,
+            point: load.point_m,
+            wetted_fraction: load.wetted_fraction,
         };
-        let effect = |slot: &EffectAnswer| {
+        let effect = |load: &EffectAnswer| {
             Some(EffectReply {
-                effect: Effect::from_code(slot.effect)?,
-                force: slot.force_n,
-                moment: slot.moment_nm,
-                left_out: LeftOut::from_code(slot.left_out),
+                effect: Effect::from_code(load.effect)?,
+                force: load.force_n,
+                moment: load.moment_nm,
+                left_out: LeftOut::from_code(load.left_out),
             })
         };
-        let surface_count = (answer.surface_count as usize).min(MAX_SURFACES);
         Self {
             version: answer.bundle_version,
             provenance: answer.provenance().to_owned(),
-            surfaces: (0..surface_count).map(surface).collect(),
+            surfaces: answer.surfaces().iter().map(surface).collect(),
             force: answer.force_n,
             moment: answer.moment_nm,
             about: answer.about_m,
-            uncertainty: answer.uncertainty_n,
+            uncertainty: answer.force_deviation_n,
             outside: answer.outside(),
-            effects: answer.effects.iter().take(answer.effect_count as usize).filter_map(effect).collect(),
+            effects: answer.effects().iter().filter_map(effect).collect(),
             effect_surface_forces: match answer.effect_count {
                 0 => Vec::new(),
-                _ => answer.effect_surface_force_n[..surface_count].to_vec(),
+                _ => answer.surfaces().iter().map(|load| load.effect_force_n).collect(),
             },
-            effects_outside: answer.effects_outside.map(f64::from),
+            effects_outside: answer.effects_outside(),
             added_mass: (answer.flags & HAS_ADDED_MASS != 0).then_some(answer.added_mass),
             compute_ns: answer.compute_ns,
         }

@@ -19,7 +19,7 @@ use tonic::Code;
 use super::ClientError;
 use crate::service::shm::{self, OpenError, ShmError, Wait};
 use crate::service::shm_layout::{
-    Answer, BatchAnswer, BatchHeader, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, VERSION, wake_name,
+    Answer, BatchAnswer, BatchHeader, BatchQuery, Names, Query, SERVER_POLLS, VERSION, wake_name,
 };
 use crate::service::shm_served::{self, Served};
 
@@ -123,19 +123,20 @@ impl ShmLink {
         self.until(deadline, asked, |answer| (answer.flags, take(answer)))
     }
 
-    /// Asks for the forces in the states of a batch: those of `queries` after the first [`MAX_BATCH`] are left out.
+    /// Asks for the forces in the states of a batch: those of `queries` after the first [`MAX_BATCH`](crate::service::shm_layout::MAX_BATCH) are left out.
     pub fn ask_batch(
         &mut self,
         queries: impl Iterator<Item = Query>,
     ) -> Result<Asked<BatchQuery, BatchAnswer>, Lost> {
         let (sequence, wake_key) = (self.next_sequence(), self.wake_key());
-        let header = BatchHeader { sequence, wake_key, count: 0, reserved: 0 };
-        let mut batch = BatchQuery { header, queries: [Query::default(); MAX_BATCH] };
+        let mut slot = self.batch.loan_uninit().map_err(|error| Lost::Send(error.into()))?;
+        let batch = shm::in_place(slot.payload_mut());
+        batch.header = BatchHeader { sequence, wake_key, ..BatchHeader::UNSET };
         for (place, query) in batch.queries.iter_mut().zip(queries) {
             *place = query;
             batch.header.count += 1;
         }
-        let pending = self.batch.send_copy(batch).map_err(Lost::Send)?;
+        let pending = shm::written(slot).send().map_err(Lost::Send)?;
         self.notify();
         connected(pending)
     }
@@ -172,7 +173,7 @@ impl ShmLink {
         &mut self,
         deadline: Instant,
         asked: &Asked<Q, A>,
-        take: impl FnOnce(&A) -> (u32, T),
+        take: impl FnOnce(&A) -> (u64, T),
     ) -> Result<Option<T>, Lost>
     where
         Q: ZeroCopySend + std::fmt::Debug + 'static,

@@ -8,6 +8,7 @@ pub mod http;
 pub mod occupant;
 mod sessions;
 pub mod shm;
+mod shm_convert;
 pub mod shm_layout;
 pub(crate) mod shm_remains;
 pub(crate) mod shm_served;

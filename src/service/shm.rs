@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 use std::collections::HashMap;
+use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -14,6 +15,8 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::{ListenerKey, Notifier};
 use iceoryx2::port::server::Server;
 use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, SignalHandlingMode, ZeroCopySend, ipc};
+use iceoryx2::request_mut::RequestMut;
+use iceoryx2::request_mut_uninit::RequestMutUninit;
 use iceoryx2::service::Service;
 use iceoryx2::service::port_factory::{event, request_response};
 use serde::{Deserialize, Serialize};
@@ -22,7 +25,7 @@ use super::sessions::{CAPACITY, Sessions};
 use super::shm_layout::{
     Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
 };
-use super::wire::{InvalidState, Refusal, State};
+use super::wire::{InvalidState, Refusal};
 use super::{Evaluator, nanoseconds_since, shm_remains, shm_served};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
@@ -229,7 +232,7 @@ struct Desk {
     evaluator: Evaluator,
     sessions: Sessions<Run>,
     /// [`Answer::flags`] of every answer.
-    flags: u32,
+    flags: u64,
     done: Notifier<ipc::Service>,
     /// Listeners of the clients that sleep, by wake key.
     sleepers: HashMap<u64, ListenerKey>,
@@ -387,41 +390,51 @@ struct At<'s> {
 }
 
 impl Desk {
-    /// Answers a query, in its session where it has one.
-    fn evaluate(&mut self, at: At, client: UniqueClientId, query: &Query) -> Result<Answer, InvalidState> {
+    /// Writes the answer to a query, in its session where it has one.
+    fn evaluate(
+        &mut self,
+        at: At,
+        client: UniqueClientId,
+        query: &Query,
+        answer: &mut Answer,
+    ) -> Result<(), InvalidState> {
         let run = Run { client, door: at.door, session: query.session };
-        let state = State::from(query);
-        // a query that is refused begins no session
-        let known = match query.session {
-            0 => None,
-            _ => state.check().and_then(|_| state.circumstances()).map(|_| Some(self.sessions.get(run)))?,
-        };
-        let (session, begins) = known.map_or((None, false), |(session, begins)| (Some(session), begins));
-        let evaluated = self.evaluator.evaluate(at.vehicle, &state, session)?;
-        let mut answer = Answer::new(at.vehicle, &evaluated);
+        let outcome = query.state().and_then(|state| {
+            // a query that is refused begins no session
+            let known = match query.session {
+                0 => None,
+                _ => {
+                    state.check().and_then(|_| state.circumstances()).map(|_| Some(self.sessions.get(run)))?
+                }
+            };
+            let (session, begins) = known.map_or((None, false), |(session, begins)| (Some(session), begins));
+            answer.fill(at.vehicle, &self.evaluator.evaluate(at.vehicle, &state, session)?);
+            answer.flags |= if begins { SESSION_BEGINS } else { 0 };
+            Ok(())
+        });
+        if let Err(invalid) = outcome {
+            answer.refuse(invalid);
+        }
         answer.sequence = query.sequence;
-        answer.flags |= self.flags | if begins { SESSION_BEGINS } else { 0 };
-        Ok(answer)
+        answer.flags |= self.flags;
+        outcome
     }
 
     fn answer(&mut self, at: At, arrived: Instant, request: &Request<Query, Answer>, recorder: &Recorder) {
         let query = copy(request.payload());
-        let (answer, refusal) = match self.evaluate(at, request.origin(), &query) {
-            Ok(answer) => (answer, None),
-            Err(invalid) => {
-                let answer =
-                    Answer { sequence: query.sequence, flags: self.flags, ..Answer::invalid(invalid) };
-                (answer, Some(Refusal::from(invalid)))
-            }
-        };
-        if sent(request.loan_uninit().map(|slot| slot.write_payload(answer).send())) {
+        let Some(mut slot) = loaned(request.loan_uninit()) else { return };
+        let answer = in_place(slot.payload_mut());
+        let outcome = self.evaluate(at, request.origin(), &query, answer);
+        let (is_outside, status) = (answer.is_outside(), answer.status);
+        // SAFETY: it has been written.
+        if sent(unsafe { slot.assume_init() }.send()) {
             wake(&self.done, &mut self.sleepers, query.wake_key);
         }
-        match refusal {
-            None => recorder.record(arrived.elapsed(), answer.is_outside().into()),
-            Some(refusal) => self.metrics.refuse(Transport::shm, refusal.reason()),
+        match outcome {
+            Ok(()) => recorder.record(arrived.elapsed(), is_outside.into()),
+            Err(invalid) => self.metrics.refuse(Transport::shm, Refusal::from(invalid).reason()),
         }
-        tracing::debug!(target: "wade::request", transport = "shm", vehicle = at.vehicle.model().vehicle().name, status = answer.status);
+        tracing::debug!(target: "wade::request", transport = "shm", vehicle = at.vehicle.model().vehicle().name, status);
     }
 
     fn answer_batch(
@@ -432,12 +445,10 @@ impl Desk {
         recorder: &Recorder,
     ) {
         let header = copy(&request.payload().header);
-        let Ok(mut slot) = request.loan_uninit() else { return };
-        let answer: *mut BatchAnswer = slot.payload_mut().as_mut_ptr();
-        // SAFETY: the slot is ours until it is sent and was zero when the segment was made; its fields are all numbers,
-        // for which whatever an answer before this one left is a value too.
-        let answer = unsafe { &mut *answer };
-        let (count, valid) = (header.count as usize, (1..=MAX_BATCH as u32).contains(&header.count));
+        let Some(mut slot) = loaned(request.loan_uninit()) else { return };
+        let answer = in_place(slot.payload_mut());
+        let count = header.count as usize;
+        let valid = (1..=MAX_BATCH).contains(&count) && header.flags == 0;
         answer.sequence = header.sequence;
         answer.flags = self.flags;
         answer.status = if valid { Status::Ok as u32 } else { Status::InvalidBatch as u32 };
@@ -446,21 +457,17 @@ impl Desk {
         for i in 0..if valid { count } else { 0 } {
             let query = copy(&request.payload().queries[i]);
             let slot = &mut answer.answers[i];
-            match self.evaluate(at, request.origin(), &query) {
-                Ok(answer) => *slot = answer,
-                Err(invalid) => {
-                    *slot = Answer::invalid(invalid);
-                    (answer.status, answer.index) = (Status::InvalidState as u32, i as u32);
-                    break;
-                }
+            if self.evaluate(at, request.origin(), &query, slot).is_err() {
+                (answer.status, answer.index) = (Status::InvalidState as u32, i as u32);
+                break;
             }
             outside += u64::from(slot.is_outside());
             answer.count += 1;
         }
         answer.compute_ns = nanoseconds_since(arrived);
         let status = answer.status;
-        // SAFETY: as above.
-        if sent(Ok::<_, ()>(unsafe { slot.assume_init() }.send())) {
+        // SAFETY: it has been written, but for answers that do not count, which are numbers too.
+        if sent(unsafe { slot.assume_init() }.send()) {
             wake(&self.done, &mut self.sleepers, header.wake_key);
         }
         if status == Status::Ok as u32 {
@@ -470,6 +477,13 @@ impl Desk {
         }
         tracing::debug!(target: "wade::request", transport = "shm_batch", vehicle = at.vehicle.model().vehicle().name, count, status);
     }
+}
+
+/// A loaned slot as what it is to hold, so that a large message is written where it lies.
+pub(crate) fn in_place<T: Copy + ZeroCopySend>(slot: &mut MaybeUninit<T>) -> &mut T {
+    // SAFETY: callers pass slots of shared memory alone, which was zero when it was made. The shared types hold numbers,
+    // for which whatever a message before this one left is a value too.
+    unsafe { slot.assume_init_mut() }
 }
 
 /// Copies a value out of memory that another process may be changing, so that what was checked is what is used.
@@ -487,14 +501,26 @@ fn taken<R, E: std::fmt::Debug>(received: Result<Option<R>, E>) -> Option<R> {
     })
 }
 
-fn sent<L: std::fmt::Debug, S: std::fmt::Debug>(outcome: Result<Result<(), S>, L>) -> bool {
-    match outcome {
-        Ok(Ok(())) => true,
-        failure => {
-            tracing::debug!(?failure, "answering over shared memory");
-            false
-        }
-    }
+/// A request that was written [`in_place`].
+pub(crate) fn written<S, Q, A>(
+    slot: RequestMutUninit<S, MaybeUninit<Q>, (), A, ()>,
+) -> RequestMut<S, Q, (), A, ()>
+where
+    S: Service,
+    Q: Copy + ZeroCopySend + std::fmt::Debug + 'static,
+    A: ZeroCopySend + std::fmt::Debug + 'static,
+{
+    // SAFETY: as in `in_place`: shared memory holds numbers from the start.
+    unsafe { slot.assume_init() }
+}
+
+/// A slot for an answer, if there is one.
+fn loaned<T, E: std::fmt::Debug>(loan: Result<T, E>) -> Option<T> {
+    loan.inspect_err(|failure| tracing::debug!(?failure, "answering over shared memory")).ok()
+}
+
+fn sent<E: std::fmt::Debug>(outcome: Result<(), E>) -> bool {
+    outcome.inspect_err(|failure| tracing::debug!(?failure, "answering over shared memory")).is_ok()
 }
 
 /// Wakes the one client that sleeps under this key.

@@ -98,10 +98,20 @@ pub enum Field {
     WheelSpeed = 14,
     /// `time_step_s`
     TimeStep = 15,
+    /// `water_level_m`
+    WaterLevel = 16,
+    /// `bed_clearance_m`
+    BedClearance = 17,
+    /// `bed`
+    Bed = 18,
+    /// `wheel_water_level_m`
+    WheelWaterLevel = 19,
+    /// `flags`
+    Flags = 20,
 }
 
 impl Field {
-    const ALL: [Self; 15] = [
+    const ALL: [Self; 20] = [
         Self::Velocity,
         Self::Current,
         Self::AngularVelocity,
@@ -117,6 +127,11 @@ impl Field {
         Self::DepthRate,
         Self::WheelSpeed,
         Self::TimeStep,
+        Self::WaterLevel,
+        Self::BedClearance,
+        Self::Bed,
+        Self::WheelWaterLevel,
+        Self::Flags,
     ];
 
     /// The name that the wire gives it.
@@ -137,6 +152,11 @@ impl Field {
             Self::DepthRate => "depth_rate_mps",
             Self::WheelSpeed => "wheel_speed_radps",
             Self::TimeStep => "time_step_s",
+            Self::WaterLevel => "water_level_m",
+            Self::BedClearance => "bed_clearance_m",
+            Self::Bed => "bed",
+            Self::WheelWaterLevel => "wheel_water_level_m",
+            Self::Flags => "flags",
         }
     }
 
@@ -164,10 +184,14 @@ pub enum Problem {
     Unknown = 6,
     /// Another number of values.
     Count = 7,
+    /// An input that the server cannot use yet.
+    Unsupported = 8,
+    /// A value, but not the flag that says so.
+    WithoutFlag = 9,
 }
 
 impl Problem {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 9] = [
         Self::NotFinite,
         Self::TooLarge,
         Self::Negative,
@@ -175,6 +199,8 @@ impl Problem {
         Self::NotUnit,
         Self::Unknown,
         Self::Count,
+        Self::Unsupported,
+        Self::WithoutFlag,
     ];
 
     /// The problem of a code of the shared-memory layout.
@@ -204,6 +230,8 @@ impl std::fmt::Display for InvalidState {
             Problem::NotPositive => write!(f, "{name} must be greater than zero"),
             Problem::Unknown => write!(f, "{name} must be one of the values of its enumeration"),
             Problem::Count => write!(f, "{name} must have four values, or none"),
+            Problem::Unsupported => write!(f, "{name} is set, which this server does not support yet"),
+            Problem::WithoutFlag => write!(f, "{name} has a value, but its flag is not set"),
             Problem::NotUnit => write!(f, "{name} must have length 1 (within {UNIT_TOLERANCE})"),
         }
     }
@@ -223,6 +251,8 @@ pub fn limit(field: Field) -> f64 {
         // a turn counter may have wound up
         Field::Heading => 1e6,
         Field::DepthRate | Field::WheelSpeed | Field::TimeStep => 1e3,
+        // these are refused whatever their value
+        Field::WaterLevel | Field::BedClearance | Field::Bed | Field::WheelWaterLevel | Field::Flags => 1e3,
     }
 }
 

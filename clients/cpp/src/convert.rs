@@ -101,33 +101,41 @@ pub fn answered(answer: &Answer) -> Result<WadeForces, WadeStatus> {
 impl From<&Answer> for WadeForces {
     fn from(answer: &Answer) -> Self {
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+        let (surfaces, effects) = (answer.surfaces(), answer.effects());
+        let has_added_mass = answer.flags & shm_layout::HAS_ADDED_MASS != 0;
         let mut forces = Self {
             compute_ns: answer.compute_ns,
             flags: flag(!answer.is_outside(), WADE_IN_DOMAIN)
                 | flag(answer.flags & shm_layout::SESSION_BEGINS != 0, WADE_SESSION_BEGINS)
-                | flag(answer.flags & shm_layout::HAS_ADDED_MASS != 0, WADE_HAS_ADDED_MASS),
+                | flag(has_added_mass, WADE_HAS_ADDED_MASS),
             bundle_version: answer.bundle_version,
-            surface_count: answer.surface_count.min(WADE_MAX_SURFACES as u32),
-            effect_count: answer.effect_count.min(WADE_MAX_EFFECTS as u32),
+            surface_count: surfaces.len().min(WADE_MAX_SURFACES) as u32,
+            effect_count: effects.len().min(WADE_MAX_EFFECTS) as u32,
             force_n: answer.force_n,
             moment_nm: answer.moment_nm,
             about_m: answer.about_m,
-            uncertainty_n: answer.uncertainty_n,
-            outside: answer.outside,
-            effects_outside: answer.effects_outside,
-            added_mass: answer.added_mass,
-            surface_force_n: answer.surface_force_n,
-            surface_point_m: answer.surface_point_m,
-            wetted_fraction: answer.wetted_fraction,
-            effect_surface_force_n: answer.effect_surface_force_n,
-            effects: answer.effects.map(|load| WadeEffectLoad {
+            uncertainty_n: answer.force_deviation_n,
+            outside: answer.outside().excess.map(|excess| excess as f32),
+            effects_outside: answer.effects_outside().map(|excess| excess as f32),
+            added_mass: if has_added_mass { answer.added_mass } else { [0.0; 36] },
+            ..Self::NONE
+        };
+        for (i, load) in surfaces.iter().take(WADE_MAX_SURFACES).enumerate() {
+            forces.surface_force_n[i] = load.force_n;
+            forces.surface_point_m[i] = load.point_m;
+            forces.wetted_fraction[i] = load.wetted_fraction;
+            if !effects.is_empty() {
+                forces.effect_surface_force_n[i] = load.effect_force_n;
+            }
+        }
+        for (slot, load) in forces.effects.iter_mut().zip(effects) {
+            *slot = WadeEffectLoad {
                 effect: load.effect,
                 left_out: load.left_out,
                 force_n: load.force_n,
                 moment_nm: load.moment_nm,
-            }),
-            ..Self::NONE
-        };
+            };
+        }
         write_text(&mut forces.provenance, answer.provenance());
         forces
     }

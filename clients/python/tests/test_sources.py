@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import subprocess
@@ -53,7 +54,7 @@ def test_the_enumerations_are_those_of_the_messages() -> None:
     assert {quantity.name: quantity.value + 1 for quantity in wade.Quantity} == quantities
     effects = members(hydrodynamics_pb2.Effect, "EFFECT_")
     assert {effect.name: effect.value for effect in wade.Effect} == effects
-    assert len(effects) == shm_layout.PHYSICS
+    assert len(effects) <= shm_layout.MAX_EFFECTS
     reasons = members(hydrodynamics_pb2.LeftOut, "LEFT_OUT_")
     assert {reason.name: reason.value for reason in wade.LeftOut} == reasons
     boxed = members(hydrodynamics_pb2.BoxQuantity, "BOX_QUANTITY_")
@@ -69,11 +70,12 @@ def rust_fields(struct: str) -> list[tuple[str, str]]:
 
 def rust_type(dtype: np.dtype[Any]) -> str:
     """How Rust writes a field of this type."""
-    names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|S32": "[u8; PROVENANCE_LEN]"}
-    lengths = {shm_layout.MAX_SURFACES: "MAX_SURFACES", shm_layout.MAX_BATCH: "MAX_BATCH"}
-    lengths[shm_layout.PHYSICS] = "PHYSICS"
+    names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|u1": "u8", "|S64": "[u8; PROVENANCE_LEN]"}
+    rooms = ("MAX_SURFACES", "MAX_BATCH", "MAX_EFFECTS", "MAX_QUANTITIES", "MAX_WHEELS", "RESERVED_LEN")
+    lengths = {getattr(shm_layout, room): room for room in rooms}
     structs = {shm_layout.QUERY: "Query", shm_layout.ANSWER: "Answer", shm_layout.BATCH_HEADER: "BatchHeader"}
     structs[shm_layout.EFFECT_ANSWER] = "EffectAnswer"
+    structs[shm_layout.SURFACE_ANSWER] = "SurfaceAnswer"
     base = structs.get(dtype.base) or names[dtype.base.str]
     for length in reversed(dtype.shape):
         base = f"[{base}; {lengths.get(length, length)}]"
@@ -85,6 +87,7 @@ def rust_type(dtype: np.dtype[Any]) -> str:
     [
         ("Query", shm_layout.QUERY),
         ("EffectAnswer", shm_layout.EFFECT_ANSWER),
+        ("SurfaceAnswer", shm_layout.SURFACE_ANSWER),
         ("Answer", shm_layout.ANSWER),
         ("BatchHeader", shm_layout.BATCH_HEADER),
         ("BatchQuery", shm_layout.BATCH_QUERY),
@@ -96,8 +99,54 @@ def test_the_layout_is_the_servers(struct: str, dtype: np.dtype[Any]) -> None:
     assert fields == rust_fields(struct)
     name = re.search(rf'#\[type_name\("(.*)"\)\]\npub struct {struct} ', LAYOUT)
     assert name
-    if struct not in ("BatchHeader", "EffectAnswer"):  # which lie within others
+    if struct not in ("BatchHeader", "EffectAnswer", "SurfaceAnswer"):  # which lie within others
         assert getattr(shm_layout, struct).type_name() == name.group(1)
+
+
+PAGES = ROOT / "tests" / "data" / "shm" / "v4"
+
+
+def test_every_field_lies_where_the_first_commit_of_the_layout_put_it() -> None:
+    rows = list(csv.DictReader((PAGES / "layout.csv").read_text().splitlines()))
+    assert len(rows) > 60
+    names = {"Query": "QUERY", "Answer": "ANSWER", "EffectAnswer": "EFFECT_ANSWER", "SurfaceAnswer": "SURFACE_ANSWER"}
+    names |= {"BatchHeader": "BATCH_HEADER", "BatchQuery": "BATCH_QUERY", "BatchAnswer": "BATCH_ANSWER"}
+    for row in rows:
+        if row["field"] not in ("reserved", "spare"):
+            field, offset = shm_layout.fields(getattr(shm_layout, names[row["struct"]]))[row["field"]]
+            assert (offset, field.itemsize) == (int(row["offset"]), int(row["size"])), row
+
+
+def words(value: Any) -> list[float]:
+    """The numbers of a field, in order."""
+    array = np.asarray(value)
+    if array.dtype.fields:
+        return [word for entry in array.ravel() for name in array.dtype.fields for word in words(entry[name])]
+    return [float(word) for word in array.ravel()]
+
+
+@pytest.mark.parametrize(("name", "dtype"), [("query", shm_layout.QUERY), ("answer", shm_layout.ANSWER)])
+def test_a_page_of_the_first_commit_of_the_layout_says_what_it_said(name: str, dtype: np.dtype[Any]) -> None:
+    page = np.frombuffer((PAGES / f"set-{name}.bin").read_bytes(), dtype)[0]
+    for row, field in enumerate(shm_layout.fields(dtype)):
+        if field == "provenance":
+            assert page[field] == b"the first page of v4"
+        elif field != "reserved":
+            assert words(page[field]) == [100 * row + word for word in range(len(words(page[field])))], field
+
+
+def test_what_is_unset_in_a_page_is_nan_here_too() -> None:
+    query = np.frombuffer((PAGES / "unset-query.bin").read_bytes(), shm_layout.QUERY)[0]
+    ours = shm_layout.UNSET_QUERY
+    for field in ("heading_rad", "depth_rate_mps", "water_level_m", "bed_clearance_m", "bed"):
+        assert np.isnan(query[field]) and np.isnan(ours[field]), field
+    for field in ("wheel_speed_radps", "wheel_water_level_m"):
+        assert np.isnan(query[field]).all() and np.isnan(ours[field]).all(), field
+    assert query["flags"] == ours["flags"] == 0
+    answer = np.frombuffer((PAGES / "unset-answer.bin").read_bytes(), shm_layout.ANSWER)[0]
+    for field in ("moment_deviation_nm", "added_mass", "damping", "water_level_m", "bed_clearance_m", "bed"):
+        assert np.isnan(answer[field]).all(), field
+    assert np.isnan(answer["surfaces"]["couple_nm"]).all()
 
 
 def rust_numbers(pattern: str, text: str) -> dict[str, int]:
@@ -106,14 +155,13 @@ def rust_numbers(pattern: str, text: str) -> dict[str, int]:
 
 def test_the_codes_and_limits_are_the_servers() -> None:
     constants = rust_numbers(r"pub const (\w+): \w+ = (\d+);", LAYOUT)
-    assert {name: getattr(shm_layout, name) for name in constants if name != "PROVENANCE_LEN"} == {
-        name: number for name, number in constants.items() if name != "PROVENANCE_LEN"
-    }
+    assert {name: getattr(shm_layout, name) for name in constants} == constants
     surfaces = (ROOT / "src" / "vehicle.rs", ROOT / "src" / "vehicle" / "mod.rs")
     text = "".join(path.read_text() for path in surfaces if path.exists())
     assert rust_numbers(r"pub const (MAX_SURFACES): \w+ = (\d+);", text) == {"MAX_SURFACES": shm_layout.MAX_SURFACES}
     status = rust_numbers(r"    (\w+) = (\d+),", LAYOUT)
-    assert (status["Ok"], status["InvalidState"]) == (shm_layout.STATUS_OK, shm_layout.STATUS_INVALID_STATE)
+    ours = (shm_layout.STATUS_OK, shm_layout.STATUS_INVALID_STATE, shm_layout.STATUS_NOT_SERVED)
+    assert (status["Ok"], status["InvalidState"], status["NotServed"]) == ours
     fields = re.search(r"pub enum Field \{(.*?)\n\}", WIRE, re.DOTALL)
     assert fields
     assert shm_layout.FIELDS == {

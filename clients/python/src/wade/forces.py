@@ -125,7 +125,7 @@ class Forces:
     session_begins: NDArray[np.bool_] | np.bool_
     #: Version of the bundle that answered.
     bundle_version: int
-    #: Where the weights come from, such as "analytic"; over shared memory the first 32 bytes of it.
+    #: Where the weights come from, such as "analytic"; over shared memory the first 64 bytes of it.
     provenance: str
     #: The server's own time [ns], for the whole batch.
     compute_ns: int

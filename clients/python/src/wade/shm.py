@@ -19,9 +19,9 @@ import numpy as np
 from . import shm_layout as layout
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
-from .forces import Array, Effect, Forces, named_effect
+from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
 from .shm_link import Link, Lost, memory, vehicles
-from .state import GroundContact, State
+from .state import TOLD, TOLD_AT, GroundContact, State
 
 _T = TypeVar("_T")
 
@@ -200,14 +200,21 @@ def _flags(state: State) -> int:
     return flags
 
 
+_NAN = (math.nan,)
+_WHEELS = TOLD["wheel_speed_radps"]
+
+
 def _query(sequence: int, wake_key: int, session: int, flags: int, floats: list[float]) -> bytes:
+    # in the order of the layout; water level, bed clearance, bed, further wheels and the wheels' levels are not set
+    stated, (heading, depth_rate, *wheels, time_step) = floats[:TOLD_AT], floats[TOLD_AT:]
+    values = (*stated, time_step, heading, depth_rate, *_NAN * 3, *wheels, *_NAN * (2 * layout.MAX_WHEELS - _WHEELS))
     try:
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *floats)
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *values)
     except OverflowError:
         # beyond single precision: infinite, which the server refuses and names
         limit = float(np.finfo(np.float32).max)
-        floats = [x if abs(x) <= limit else math.copysign(math.inf, x) for x in floats]
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *floats)
+        values = tuple(math.copysign(math.inf, x) if abs(x) > limit else x for x in values)
+        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *values)
 
 
 def _read(address: int) -> np.void:
@@ -220,32 +227,36 @@ def _write_batch(
 ) -> None:
     batch = np.frombuffer(memory(address, layout.BATCH_QUERY.itemsize), layout.BATCH_QUERY)[0]
     count = chunk.stop - chunk.start
-    batch["header"] = (*who, count, 0)
-    queries = batch["queries"][:count]
+    header, queries = batch["header"], batch["queries"][:count]
+    header["sequence"], header["wake_key"] = who
+    header["flags"], header["count"] = 0, count
+    # the place holds what an earlier batch left
+    queries[...] = layout.UNSET_QUERY
     queries["session"] = sessions[chunk]
     queries["flags"] = flags
     for name, array in rows.items():
-        queries[name] = array[chunk]
+        place = queries[name][:, :_WHEELS] if name == "wheel_speed_radps" else queries[name]
+        place[...] = array[chunk]
 
 
 def _forces(answer: np.void) -> Forces:
-    surfaces, flags = _surface_count(answer), int(answer["flags"])
-    effects, effect_force, effect_moment, left_out, effect_surface_force = _effects(answer, surfaces)
+    surfaces, flags = answer["surfaces"][: _surface_count(answer)], int(answer["flags"])
+    effects, effect_force, effect_moment, left_out, effect_surface_force, effects_outside = _effects(answer, surfaces)
     return Forces(
         force_n=answer["force_n"],
         moment_nm=answer["moment_nm"],
         about_m=answer["about_m"],
-        uncertainty_n=answer["uncertainty_n"],
-        surface_force_n=answer["surface_force_n"][:surfaces],
-        surface_point_m=answer["surface_point_m"][:surfaces],
-        wetted_fraction=answer["wetted_fraction"][:surfaces],
-        outside=answer["outside"],
+        uncertainty_n=answer["force_deviation_n"],
+        surface_force_n=surfaces["force_n"],
+        surface_point_m=surfaces["point_m"],
+        wetted_fraction=surfaces["wetted_fraction"],
+        outside=answer["outside"][:_QUANTITIES],
         effects=effects,
         effect_force_n=effect_force,
         effect_moment_nm=effect_moment,
         effect_left_out=left_out,
         effect_surface_force_n=effect_surface_force,
-        effects_outside=answer["effects_outside"],
+        effects_outside=effects_outside,
         added_mass=answer["added_mass"].reshape(6, 6) if flags & layout.HAS_ADDED_MASS else None,
         session_begins=_YES if flags & layout.SESSION_BEGINS else _NO,
         bundle_version=int(answer["bundle_version"]),
@@ -255,18 +266,19 @@ def _forces(answer: np.void) -> Forces:
 
 
 _YES, _NO = np.True_, np.False_
+_QUANTITIES, _BOX_QUANTITIES = len(Quantity), len(BoxQuantity)
 _NO_VECTORS = np.empty((0, 3), np.float32)
-_NO_EFFECTS: tuple[Any, ...] = ((), _NO_VECTORS, _NO_VECTORS, np.empty(0, np.uint8), _NO_VECTORS)
+_NO_BOX = np.zeros(_BOX_QUANTITIES, np.float32)
+_NO_EFFECTS: tuple[Any, ...] = ((), _NO_VECTORS, _NO_VECTORS, np.empty(0, np.uint8), _NO_VECTORS, _NO_BOX)
 
 
-def _effects(answer: np.void, surfaces: int) -> tuple[Any, ...]:
-    """Names, forces, moments, why left out, shares on surfaces."""
+def _effects(answer: np.void, surfaces: Any) -> tuple[Any, ...]:
+    """Names, forces, moments, why left out, shares on surfaces, distance from the box."""
     effects = answer["effects"][: _effect_count(answer)]
     if not len(effects):
         return _NO_EFFECTS
-    left_out = effects["left_out"].astype(np.uint8)
-    on_surfaces = answer["effect_surface_force_n"][:surfaces]
-    return _named(effects), effects["force_n"], effects["moment_nm"], left_out, on_surfaces
+    left_out, box = effects["left_out"].astype(np.uint8), answer["effects_outside"][:_BOX_QUANTITIES]
+    return _named(effects), effects["force_n"], effects["moment_nm"], left_out, surfaces["effect_force_n"], box
 
 
 def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool) -> Forces:
@@ -277,11 +289,14 @@ def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, 
     answers = batch["answers"][: chunk.stop - chunk.start]
     if forces is None or forces.bundle_version != answers[0]["bundle_version"]:
         forces = _empty(answers[0], length, _surface_count(answers[0]) if with_surfaces else 0)
-    for name in ("force_n", "moment_nm", "uncertainty_n", "outside"):
-        getattr(forces, name)[chunk] = answers[name]
-    surfaces = forces.wetted_fraction.shape[1]
-    for name in ("surface_force_n", "surface_point_m", "wetted_fraction") if surfaces else ():
-        getattr(forces, name)[chunk] = answers[name][:, :surfaces]
+    forces.force_n[chunk], forces.moment_nm[chunk] = answers["force_n"], answers["moment_nm"]
+    forces.uncertainty_n[chunk] = answers["force_deviation_n"]
+    forces.outside[chunk] = answers["outside"][:, :_QUANTITIES]
+    count = forces.wetted_fraction.shape[1]
+    if count:
+        surfaces = answers["surfaces"][:, :count]
+        forces.surface_force_n[chunk], forces.surface_point_m[chunk] = surfaces["force_n"], surfaces["point_m"]
+        forces.wetted_fraction[chunk] = surfaces["wetted_fraction"]
     _read_effects(answers, forces, chunk)
     np.asarray(forces.session_begins)[chunk] = answers["flags"] & layout.SESSION_BEGINS != 0
     forces.compute_ns += int(batch["compute_ns"])
@@ -295,9 +310,9 @@ def _read_effects(answers: Any, forces: Forces, chunk: slice) -> None:
     forces.effect_force_n[chunk] = effects["force_n"]
     forces.effect_moment_nm[chunk] = effects["moment_nm"]
     forces.effect_left_out[chunk] = effects["left_out"]
-    forces.effects_outside[chunk] = answers["effects_outside"]
+    forces.effects_outside[chunk] = answers["effects_outside"][:, :_BOX_QUANTITIES]
     surfaces = forces.effect_surface_force_n.shape[1]
-    forces.effect_surface_force_n[chunk] = answers["effect_surface_force_n"][:, :surfaces]
+    forces.effect_surface_force_n[chunk] = answers["surfaces"]["effect_force_n"][:, :surfaces]
     if forces.added_mass is not None:
         forces.added_mass[chunk] = answers["added_mass"].reshape(-1, 6, 6)
 
@@ -315,13 +330,13 @@ def _empty(answer: np.void, length: int, surfaces: int) -> Forces:
         surface_force_n=array(surfaces, 3),
         surface_point_m=array(surfaces, 3),
         wetted_fraction=array(surfaces),
-        outside=array(len(answer["outside"])),
+        outside=array(_QUANTITIES),
         effects=effects,
         effect_force_n=array(len(effects), 3),
         effect_moment_nm=array(len(effects), 3),
         effect_left_out=np.empty((length, len(effects)), np.uint8),
         effect_surface_force_n=array(surfaces if effects else 0, 3),
-        effects_outside=np.zeros((length, len(answer["effects_outside"])), np.float32),
+        effects_outside=np.zeros((length, _BOX_QUANTITIES), np.float32),
         added_mass=array(6, 6) if int(answer["flags"]) & layout.HAS_ADDED_MASS else None,
         session_begins=np.empty(length, bool),
         bundle_version=int(answer["bundle_version"]),
@@ -335,7 +350,7 @@ def _named(effects: Any) -> tuple[Effect | int, ...]:
 
 
 def _effect_count(answer: np.void) -> int:
-    return min(int(answer["effect_count"]), layout.PHYSICS)
+    return min(int(answer["effect_count"]), layout.MAX_EFFECTS)
 
 
 def _surface_count(answer: np.void) -> int:

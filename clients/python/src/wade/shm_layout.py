@@ -10,12 +10,17 @@ import struct
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-VERSION = "v3"
+VERSION = "v4"
 MAX_BATCH = 256
 MAX_SURFACES = 64
-#: Most effects that a vehicle can have.
-PHYSICS = 14
+#: Room for effects, for quantities of a domain, for wheels, for the text of the provenance, and for what is to come.
+MAX_EFFECTS = 32
+MAX_QUANTITIES = 16
+MAX_WHEELS = 8
+PROVENANCE_LEN = 64
+RESERVED_LEN = 128
 
 #: Attributes of the service of `served_name`: the version of the layout, and lists of the vehicles that are served.
 SERVED_LAYOUT = "layout"
@@ -25,26 +30,34 @@ SERVED_VEHICLES = "vehicles"
 DRY_CONTACT = 1
 #: Flag of a query: the caller integrates added mass.
 IMPLICIT_ADDED_MASS = 2
-#: Flags of a query: these fields hold values.
+#: Flags of a query: these fields are set. A field that is not set is NaN.
 HAS_HEADING = 4
 HAS_DEPTH_RATE = 8
 HAS_WHEEL_SPEEDS = 16
+HAS_WATER_LEVEL = 32
+HAS_BED_CLEARANCE = 64
+HAS_BED = 128
+HAS_WHEEL_LEVELS = 256
 #: Flag of an answer: the server polls, so that waking it is of no use.
 SERVER_POLLS = 1
 #: Flag of an answer: the session begins with this query.
 SESSION_BEGINS = 2
-#: Flag of an answer: it holds a matrix.
+#: Flags of an answer: it holds these matrices.
 HAS_ADDED_MASS = 4
+HAS_DAMPING = 8
 
 STATUS_OK = 0
 STATUS_INVALID_STATE = 1
+STATUS_NOT_SERVED = 3
+
+_RESERVED: tuple[str, str, int] = ("reserved", "u1", RESERVED_LEN)
 
 QUERY = np.dtype(
     [
         ("sequence", "<u8"),
         ("wake_key", "<u8"),
         ("session", "<u8"),
-        ("flags", "<u4"),
+        ("flags", "<u8"),
         ("depth_m", "<f4"),
         ("density_kgpm3", "<f4"),
         ("velocity_mps", "<f4", 3),
@@ -53,43 +66,63 @@ QUERY = np.dtype(
         ("acceleration_mps2", "<f4", 3),
         ("angular_acceleration_radps2", "<f4", 3),
         ("gravity_direction", "<f4", 3),
+        ("time_step_s", "<f4"),
         ("heading_rad", "<f4"),
         ("depth_rate_mps", "<f4"),
-        ("wheel_speed_radps", "<f4", 4),
-        ("time_step_s", "<f4"),
+        ("water_level_m", "<f4"),
+        ("bed_clearance_m", "<f4"),
+        ("bed", "<f4"),
+        ("wheel_speed_radps", "<f4", MAX_WHEELS),
+        ("wheel_water_level_m", "<f4", MAX_WHEELS),
+        _RESERVED,
     ]
 )
 
 EFFECT_ANSWER = np.dtype([("effect", "<u4"), ("left_out", "<u4"), ("force_n", "<f4", 3), ("moment_nm", "<f4", 3)])
 
+SURFACE_ANSWER = np.dtype(
+    [
+        ("force_n", "<f4", 3),
+        ("point_m", "<f4", 3),
+        ("couple_nm", "<f4", 3),
+        ("effect_force_n", "<f4", 3),
+        ("wetted_fraction", "<f4"),
+    ]
+)
+
 ANSWER = np.dtype(
     [
         ("sequence", "<u8"),
         ("compute_ns", "<u8"),
+        ("flags", "<u8"),
         ("status", "<u4"),
         ("field", "<u4"),
         ("problem", "<u4"),
-        ("flags", "<u4"),
         ("bundle_version", "<u4"),
         ("surface_count", "<u4"),
+        ("effect_count", "<u4"),
         ("force_n", "<f4", 3),
         ("moment_nm", "<f4", 3),
         ("about_m", "<f4", 3),
-        ("uncertainty_n", "<f4", 3),
-        ("outside", "<f4", 8),
-        ("provenance", "S32"),
-        ("surface_force_n", "<f4", (MAX_SURFACES, 3)),
-        ("surface_point_m", "<f4", (MAX_SURFACES, 3)),
-        ("wetted_fraction", "<f4", MAX_SURFACES),
-        ("effect_count", "<u4"),
-        ("effects", EFFECT_ANSWER, PHYSICS),
-        ("effect_surface_force_n", "<f4", (MAX_SURFACES, 3)),
-        ("effects_outside", "<f4", 5),
+        ("force_deviation_n", "<f4", 3),
+        ("moment_deviation_nm", "<f4", 3),
+        ("outside", "<f4", MAX_QUANTITIES),
+        ("effects_outside", "<f4", MAX_QUANTITIES),
+        ("water_level_m", "<f4"),
+        ("bed_clearance_m", "<f4"),
+        ("bed", "<f4"),
+        ("provenance", f"S{PROVENANCE_LEN}"),
+        ("effects", EFFECT_ANSWER, MAX_EFFECTS),
+        ("surfaces", SURFACE_ANSWER, MAX_SURFACES),
         ("added_mass", "<f4", 36),
+        ("damping", "<f4", 36),
+        _RESERVED,
     ]
 )
 
-BATCH_HEADER = np.dtype([("sequence", "<u8"), ("wake_key", "<u8"), ("count", "<u4"), ("reserved", "<u4")])
+BATCH_HEADER = np.dtype(
+    [("sequence", "<u8"), ("wake_key", "<u8"), ("flags", "<u8"), ("count", "<u4"), ("spare", "<u4"), _RESERVED]
+)
 
 BATCH_QUERY = np.dtype([("header", BATCH_HEADER), ("queries", QUERY, MAX_BATCH)])
 
@@ -97,10 +130,12 @@ BATCH_ANSWER = np.dtype(
     [
         ("sequence", "<u8"),
         ("compute_ns", "<u8"),
+        ("flags", "<u8"),
         ("status", "<u4"),
         ("index", "<u4"),
         ("count", "<u4"),
-        ("flags", "<u4"),
+        ("spare", "<u4"),
+        _RESERVED,
         ("answers", ANSWER, MAX_BATCH),
     ]
 )
@@ -122,6 +157,11 @@ FIELDS = {
     13: "depth_rate_mps",
     14: "wheel_speed_radps",
     15: "time_step_s",
+    16: "water_level_m",
+    17: "bed_clearance_m",
+    18: "bed",
+    19: "wheel_water_level_m",
+    20: "flags",
 }
 
 #: What is wrong with them, by code.
@@ -133,6 +173,8 @@ PROBLEMS = {
     5: "must have length 1",
     6: "must be one of the values of its enumeration",
     7: "must have four values, or none",
+    8: "is set, which this server does not support yet",
+    9: "has a value, but its flag is not set",
 }
 
 
@@ -143,13 +185,26 @@ def fields(dtype: np.dtype[Any]) -> dict[str, tuple[np.dtype[Any], int]]:
 
 
 def _pack_format(dtype: np.dtype[Any]) -> str:
-    codes = {"<u8": "Q", "<u4": "I", "<f4": "f"}
+    # what is reserved becomes zero
+    codes = {"<u8": "Q", "<u4": "I", "<f4": "f", "|u1": "x"}
     types = (field for field, _ in fields(dtype).values())
     return "<" + "".join(codes[field.base.str] * int(np.prod(field.shape)) for field in types)
 
 
 #: A query as bytes: several times faster than through a numpy record.
 QUERY_STRUCT = struct.Struct(_pack_format(QUERY))
+
+
+def _unset() -> NDArray[np.void]:
+    query = np.zeros((), QUERY)
+    optional = ("heading_rad", "depth_rate_mps", "water_level_m", "bed_clearance_m", "bed")
+    for name in ("depth_m", *optional, "wheel_speed_radps", "wheel_water_level_m"):
+        query[name] = np.nan
+    return query
+
+
+#: A query that sets nothing: at rest, with everything else NaN that need not be set.
+UNSET_QUERY = _unset()
 
 
 def _payload(name: str, dtype: np.dtype[Any]) -> type[ctypes.Structure]:

@@ -106,7 +106,7 @@ class Link:
             if not self._server_polls:
                 self._notify()
             response = self._await(pending, end, timeout_s)
-            flags = ctypes.c_uint32.from_address(response.payload_ptr + _FLAGS_AT[batch]).value
+            flags = ctypes.c_uint64.from_address(response.payload_ptr + _FLAGS_AT[batch]).value
             self._server_polls = bool(flags & layout.SERVER_POLLS)
             return response
         except _FAILURES as failure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -42,7 +43,7 @@ TOLD = {"heading_rad": 1, "depth_rate_mps": 1, "wheel_speed_radps": 4}
 TOLD_AT = len(SCALARS) + 3 * len(VECTORS)
 TIME_STEP_AT = TOLD_AT + sum(TOLD.values())
 
-_UNTOLD = (0.0,) * sum(TOLD.values())
+_UNTOLD = (math.nan,) * sum(TOLD.values())
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -94,7 +95,7 @@ class State:
         return getattr(self, name) is _DEFAULTS.get(name)
 
     def floats(self) -> list[float]:
-        """The numbers of a single state: the scalars, three a vector, what is told or 0, the time step.
+        """The numbers of a single state: the scalars, three a vector, what is told or NaN, the time step.
 
         Raises `InvalidState` for a wrong shape.
         """
@@ -160,7 +161,7 @@ _DEFAULTS: dict[str, Any] = {name: field.default for name, field in State.__data
 
 def _told(value: Any, count: int) -> tuple[float, ...]:
     if value is None:
-        return (0.0,) * count
+        return (math.nan,) * count
     if count == 1:
         return (float(value),)
     a, b, c, d = value

@@ -144,6 +144,9 @@ fn array(batch: &mut proto::EvaluateBatchRequest, field: Field) -> Option<&mut V
         Field::DepthRate => &mut batch.depth_rate_mps,
         Field::WheelSpeed => &mut batch.wheel_speed_radps,
         Field::Quaternion | Field::RollPitch | Field::GroundContact | Field::TimeStep => return None,
+        Field::WaterLevel | Field::BedClearance | Field::Bed | Field::WheelWaterLevel | Field::Flags => {
+            return None;
+        }
     })
 }
 
