@@ -139,7 +139,7 @@ fn what_is_named_is_added_and_taken_back() {
     let output = place.gap("trials", &[]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stdout));
-    assert!(said.contains("rollback") && said.contains("no running server"), "{said}");
+    assert!(said.contains("rollback") && said.contains("no server runs at"), "{said}");
 
     let after = place.query();
     let version = |answer: &Value| answer["version"].as_u64().expect("a number");

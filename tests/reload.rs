@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use common::{PATIENCE, Served, copy_of_vehicles};
 use hdrhistogram::Histogram;
+use tempfile::TempDir;
 use wade::bundle;
 use wade::client::{ClientError, Method};
 use wade::service::proto;
@@ -60,7 +61,7 @@ fn a_bad_bundle_is_refused_over_grpc_and_the_old_version_stays() {
         let endpoint = tonic::transport::Endpoint::from_shared(served.url()).expect("a URL");
         let channel = endpoint.connect().await.expect("connected");
         let mut admin = proto::admin_client::AdminClient::new(channel);
-        let unknown = proto::ReloadRequest { vehicle: "../husky".into() };
+        let unknown = proto::ReloadRequest { vehicle: "../husky".into(), ..Default::default() };
         assert_eq!(admin.reload(unknown).await.expect_err("no such vehicle").code(), tonic::Code::NotFound);
         admin.reload(proto::ReloadRequest::default()).await.expect("answered").into_inner()
     });
@@ -84,14 +85,48 @@ fn the_command_line_has_a_server_read_its_bundles_again_and_says_what_it_refused
     };
     let version = write_next_version(&folder.path().join("husky"));
     let (code, said) = reload(&[]);
-    assert!(code == Some(0) && said.contains(&format!("serves husky, version {version}")), "{said}");
-    assert!(said.contains("serves warthog"), "{said}");
+    assert!(code == Some(0) && said.contains(&format!("now serves husky, version {version}")), "{said}");
+    assert!(said.contains("now serves warthog"), "{said}");
     std::fs::write(folder.path().join("husky/hull.stl"), b"not a hull").expect("written");
     let (code, said) = reload(&["husky"]);
-    assert!(code == Some(1) && said.contains(&format!("keeps husky, version {version}")), "{said}");
+    assert!(code == Some(1) && said.contains(&format!("goes on with version {version} of husky")), "{said}");
     assert!(said.contains("hull.stl"), "{said}");
     let (code, said) = reload(&["rover"]);
     assert!(code == Some(1) && said.contains("rover"), "{said}");
+}
+
+#[test]
+fn a_change_of_another_folder_leaves_a_server_alone() {
+    let (ours, theirs) = (copy_of_vehicles(), copy_of_vehicles());
+    let link = theirs.path().join("link");
+    std::os::unix::fs::symlink(ours.path(), &link).expect("a link");
+    let served = Served::with(|config| config.vehicles = ours.path().to_owned());
+    let mut client = served.tcp("husky", Method::Unary);
+    let mut version = || client.evaluate(&state()).expect("answered").bundle_version;
+    let before = version();
+    let rollback = |folder: &std::path::Path| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+        command.args(["vehicle", "rollback", "husky", "--server", &served.url(), "--vehicles"]).arg(folder);
+        let output = command.output().expect("the program runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        said
+    };
+    // versions that the server has not been asked to read, kept as the commands that write bundles keep them
+    let succeed = |folder: &TempDir| {
+        let husky = folder.path().join("husky");
+        let bundle = bundle::read(&husky).expect("a sound bundle");
+        bundle::succeed(&husky, bundle).expect("written")
+    };
+    succeed(&ours);
+    let next = succeed(&ours);
+    succeed(&theirs);
+    let said = rollback(theirs.path());
+    assert!(said.contains("serves husky from another folder"), "{said}");
+    assert_eq!(version(), before, "what others change is not read");
+    let said = rollback(&link);
+    assert!(said.contains(&format!("now serves husky, version {}", next - 1)), "{said}");
+    assert_eq!(version(), next - 1);
 }
 
 #[test]

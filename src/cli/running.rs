@@ -1,17 +1,19 @@
 //! A server that runs on this machine, for commands that change a bundle.
 
+use std::path::Path;
 use std::time::Duration;
 
 use clap::Args;
 use wade::client::{Address, AddressError, ClientError, reload};
+use wade::service::proto::ReloadRequest;
 
 /// Longest wait for a server that may not be there.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Who is told that a bundle has changed.
+/// Which server reads a changed bundle.
 #[derive(Debug, Args)]
 pub struct Running {
-    /// Server that is asked to serve the bundle at once, where one runs: host:port, http://host:port or unix:PATH
+    /// Server that reads the changed bundle, where it serves from the same folder: host:port, http://host:port or unix:PATH
     #[arg(long, value_name = "ADDR", default_value = "unix:/tmp/wade.sock", value_parser = of_grpc)]
     server: Address,
 }
@@ -28,21 +30,50 @@ fn of_grpc(text: &str) -> Result<Address, String> {
 }
 
 impl Running {
-    /// Asks the server to read a vehicle's bundle again, and says what came of it. A server that is not there is no failure.
-    pub fn reload(&self, vehicle: &str) {
-        if let Err(error) = self.ask(vehicle) {
-            eprintln!("no running server was told ({error}); one reads the bundle at its start");
+    /// Has the server read the bundle in this folder again, if it serves from there. Whatever becomes of that is no failure
+    /// of the command: its own work is done.
+    pub fn reload(&self, vehicle: &str, bundle: &Path) {
+        let folder = std::fs::canonicalize(bundle).unwrap_or_else(|_| bundle.to_owned());
+        let request = ReloadRequest { vehicle: vehicle.to_owned(), bundle: folder.display().to_string() };
+        let server = &self.server;
+        match reload(&server.url().unwrap_or_default(), request, TIMEOUT) {
+            Ok(reloaded) => {
+                for one in reloaded {
+                    let (name, version) = (&one.vehicle, one.bundle_version);
+                    match one.refusal.as_str() {
+                        _ if one.elsewhere => {
+                            eprintln!(
+                                "note: the server at {server} serves {name} from another folder and goes on with it"
+                            );
+                        }
+                        "" => eprintln!("the server at {server} now serves {name}, version {version}"),
+                        refusal => eprintln!(
+                            "note: the bundle is written; the server at {server} goes on with version {version} of {name}: \
+                             {refusal}"
+                        ),
+                    }
+                }
+            }
+            Err(ClientError::NoServer { .. }) => {
+                eprintln!("note: no server runs at {server}; the next start reads the bundle");
+            }
+            Err(error) => {
+                eprintln!("note: the bundle is written; the server at {server} did not reload it: {error}")
+            }
         }
     }
 
-    /// The same of a server that must be there, and of every vehicle where none is named; false where it refused a bundle.
+    /// Has a server that must be there read a vehicle again, or all where none is named; false where it refused a bundle.
     pub fn ask(&self, vehicle: &str) -> Result<bool, ClientError> {
-        let reloaded = reload(&self.server.url().unwrap_or_default(), vehicle, TIMEOUT)?;
+        let request = ReloadRequest { vehicle: vehicle.to_owned(), bundle: String::new() };
+        let reloaded = reload(&self.server.url().unwrap_or_default(), request, TIMEOUT)?;
         for one in &reloaded {
             let (server, name, version) = (&self.server, &one.vehicle, one.bundle_version);
             match one.refusal.as_str() {
-                "" => eprintln!("{server} serves {name}, version {version}, now"),
-                refusal => eprintln!("{server} keeps {name}, version {version}: {refusal}"),
+                "" => eprintln!("the server at {server} now serves {name}, version {version}"),
+                refusal => {
+                    eprintln!("the server at {server} goes on with version {version} of {name}: {refusal}")
+                }
             }
         }
         Ok(reloaded.iter().all(|one| one.refusal.is_empty()))

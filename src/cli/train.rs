@@ -358,7 +358,7 @@ impl Train {
         let versions = bundle::succeed_together(next)?;
         for (of_vehicle, version) in record.vehicles.iter().zip(versions) {
             report(of_vehicle, record.judged(), version);
-            self.running.reload(&of_vehicle.name);
+            self.running.reload(&of_vehicle.name, &self.data.vehicles.bundle(&of_vehicle.name));
         }
         // the last of all: who finds it finds the weights that it is about
         record.write(&self.out)?;

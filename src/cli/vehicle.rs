@@ -178,7 +178,7 @@ impl Vehicle {
             Command::Rollback { name, to, vehicles, running } => {
                 let version = bundle::roll_back(&vehicles.existing(&name)?, to)?;
                 println!("{name}: version {version} is in its place again");
-                running.reload(&name);
+                running.reload(&name, &vehicles.bundle(&name));
             }
             Command::Sdf { name, out, vehicles } => {
                 let out = out.unwrap_or_else(|| format!("{name}-sdf.safetensors").into());

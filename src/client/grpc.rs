@@ -89,17 +89,26 @@ impl GrpcClient {
     }
 }
 
-/// Asks the server at a URL, `http://HOST:PORT` or `unix:PATH`, to read a vehicle's bundle again.
-pub fn reload(url: &str, vehicle: &str, timeout: Duration) -> Result<Vec<proto::Reloaded>, ClientError> {
+/// Asks the server at a URL, `http://HOST:PORT` or `unix:PATH`, to read bundles again: what `request` names.
+pub fn reload(
+    url: &str,
+    request: proto::ReloadRequest,
+    timeout: Duration,
+) -> Result<Vec<proto::Reloaded>, ClientError> {
     let runtime = runtime(url)?;
     let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| nobody_at(url, &error))?;
     runtime.block_on(async {
         let endpoint = endpoint.connect_timeout(timeout).timeout(timeout);
         let mut client = AdminClient::new(endpoint.connect().await.map_err(|error| nobody_at(url, &error))?);
-        let request = proto::ReloadRequest { vehicle: vehicle.to_owned() };
         let no_answer = |status: tonic::Status| {
-            let reason = status.message().to_owned();
-            ClientError::NoServer { at: url.to_owned(), reason }
+            let message = status.message().to_owned();
+            match status.code() {
+                tonic::Code::Unavailable | tonic::Code::Unknown => {
+                    ClientError::NoServer { at: url.to_owned(), reason: message }
+                }
+                tonic::Code::Cancelled | tonic::Code::DeadlineExceeded => ClientError::Timeout(timeout),
+                code => ClientError::Refused { code, message },
+            }
         };
         let response = client.reload(request).await.map_err(no_answer)?;
         Ok(response.into_inner().vehicles)

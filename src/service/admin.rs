@@ -1,6 +1,6 @@
 //! Reading bundles from disk: at the start, and again when an administrator asks.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::bundle::{self, BundleError, Fault};
@@ -40,6 +40,8 @@ pub struct Reload {
     pub served_version: u32,
     /// Why the bundle on disk is not the one served.
     pub refusal: Option<BundleError>,
+    /// True where it was left alone, because it is read from another folder.
+    pub elsewhere: bool,
 }
 
 /// Knows where the bundles are.
@@ -102,6 +104,18 @@ impl Reloader {
         Ok(names.into_iter().map(|name| self.reload_one(name)).collect())
     }
 
+    /// Reads one vehicle's bundle again where this is the folder that it is read from, and leaves it alone otherwise.
+    pub fn reload_from(&self, vehicle: &str, bundle: &Path) -> Result<Vec<Reload>, UnknownVehicle> {
+        // both may be reached through links
+        let place = |path: &Path| std::fs::canonicalize(path).ok();
+        let ours = place(&self.directory.join(vehicle));
+        if !vehicle.is_empty() && ours.is_some() && ours == place(bundle) {
+            return self.reload(vehicle);
+        }
+        let served_version = self.engine.vehicle(vehicle).map_or(0, |served| served.model().version());
+        Ok(vec![Reload { vehicle: vehicle.to_owned(), served_version, refusal: None, elsewhere: true }])
+    }
+
     /// Serves a vehicle no more, until it is loaded again.
     pub fn unload(&self, vehicle: &str) -> Result<(), UnknownVehicle> {
         let _guard = self.one_at_a_time.lock().unwrap_or_else(PoisonError::into_inner);
@@ -128,13 +142,13 @@ impl Reloader {
                 announce(&served, &self.metrics);
                 let served_version = served.model().version();
                 self.engine.swap(served);
-                Reload { vehicle, served_version, refusal: None }
+                Reload { vehicle, served_version, refusal: None, elsewhere: false }
             }
             Err(refusal) => {
                 tracing::warn!(vehicle, %refusal, "bundle refused; the version before it stays");
                 let served_version =
                     self.engine.vehicle(&vehicle).map_or(0, |served| served.model().version());
-                Reload { vehicle, served_version, refusal: Some(refusal) }
+                Reload { vehicle, served_version, refusal: Some(refusal), elsewhere: false }
             }
         }
     }

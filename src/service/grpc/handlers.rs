@@ -1,6 +1,7 @@
 //! The calls.
 
 use std::cell::RefCell;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -292,13 +293,18 @@ impl Admin for AdminHandlers {
         &self,
         request: Request<proto::ReloadRequest>,
     ) -> Result<Response<proto::ReloadResponse>, Status> {
-        let vehicle = request.into_inner().vehicle;
+        let proto::ReloadRequest { vehicle, bundle } = request.into_inner();
         let reloader = Arc::clone(&self.reloader);
-        let reloaded = blocking(move || reloader.reload(&vehicle)).await?;
+        let reloaded = blocking(move || match bundle.as_str() {
+            "" => reloader.reload(&vehicle),
+            bundle => reloader.reload_from(&vehicle, Path::new(bundle)),
+        });
+        let reloaded = reloaded.await?;
         let vehicles = reloaded.map_err(Refusal::from)?.into_iter().map(|reload| proto::Reloaded {
             vehicle: reload.vehicle,
             bundle_version: reload.served_version,
             refusal: reload.refusal.map(|refusal| refusal.to_string()).unwrap_or_default(),
+            elsewhere: reload.elsewhere,
         });
         Ok(Response::new(proto::ReloadResponse { vehicles: vehicles.collect() }))
     }

@@ -96,6 +96,6 @@ function bar([from, to], min, max) {
   const element = document.createElement("i");
   element.style.left = place(at(from));
   element.style.right = `calc(100% - (${place(at(to))}))`;
-  element.title = `learnt from ${+from.toPrecision(3)} to ${+to.toPrecision(3)}`;
+  element.title = `trained from ${+from.toPrecision(3)} to ${+to.toPrecision(3)}`;
   return element;
 }

@@ -24,7 +24,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x13wade/v1/admin.proto\x12\x07wade.v1\" \n\rReloadRequest\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\"5\n\x0eReloadResponse\x12#\n\x08vehicles\x18\x01 \x03(\x0b\x32\x11.wade.v1.Reloaded\"D\n\x08Reloaded\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\x12\x16\n\x0e\x62undle_version\x18\x02 \x01(\r\x12\x0f\n\x07refusal\x18\x03 \x01(\t2B\n\x05\x41\x64min\x12\x39\n\x06Reload\x12\x16.wade.v1.ReloadRequest\x1a\x17.wade.v1.ReloadResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x13wade/v1/admin.proto\x12\x07wade.v1\"0\n\rReloadRequest\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\x12\x0e\n\x06\x62undle\x18\x02 \x01(\t\"5\n\x0eReloadResponse\x12#\n\x08vehicles\x18\x01 \x03(\x0b\x32\x11.wade.v1.Reloaded\"W\n\x08Reloaded\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\x12\x16\n\x0e\x62undle_version\x18\x02 \x01(\r\x12\x0f\n\x07refusal\x18\x03 \x01(\t\x12\x11\n\telsewhere\x18\x04 \x01(\x08\x32\x42\n\x05\x41\x64min\x12\x39\n\x06Reload\x12\x16.wade.v1.ReloadRequest\x1a\x17.wade.v1.ReloadResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -32,11 +32,11 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'wade.v1.admin_pb2', _global
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_RELOADREQUEST']._serialized_start=32
-  _globals['_RELOADREQUEST']._serialized_end=64
-  _globals['_RELOADRESPONSE']._serialized_start=66
-  _globals['_RELOADRESPONSE']._serialized_end=119
-  _globals['_RELOADED']._serialized_start=121
-  _globals['_RELOADED']._serialized_end=189
-  _globals['_ADMIN']._serialized_start=191
-  _globals['_ADMIN']._serialized_end=257
+  _globals['_RELOADREQUEST']._serialized_end=80
+  _globals['_RELOADRESPONSE']._serialized_start=82
+  _globals['_RELOADRESPONSE']._serialized_end=135
+  _globals['_RELOADED']._serialized_start=137
+  _globals['_RELOADED']._serialized_end=224
+  _globals['_ADMIN']._serialized_start=226
+  _globals['_ADMIN']._serialized_end=292
 # @@protoc_insertion_point(module_scope)
