@@ -39,6 +39,9 @@ fn every_subcommand_shows_an_example() {
         "campaign plan",
         "validate",
         "gap",
+        "doctor",
+        "completions",
+        "man",
     ];
     for command in commands {
         let arguments: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();
@@ -353,4 +356,73 @@ fn a_plan_without_its_campaign_is_not_begun_anew() {
     std::fs::remove_file(&campaign).expect("removed");
     refused(&plan, "holds plan.csv and no campaign.toml");
     assert_eq!(std::fs::read_to_string(&cases).expect("readable"), before);
+}
+
+#[test]
+fn completions_and_man_pages_know_every_command() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = wade(&["completions", shell]);
+        let script = String::from_utf8(output.stdout).expect("text");
+        for word in ["soak", "rollback", "clients"] {
+            assert!(script.contains(word), "{shell}: {word} is missing");
+        }
+    }
+    let folder = TempDir::new().expect("a folder");
+    let script = folder.path().join("wade.bash");
+    std::fs::write(&script, wade(&["completions", "bash"]).stdout).expect("written");
+    assert!(Command::new("bash").arg("-n").arg(&script).status().expect("bash runs").success());
+    let out = folder.path().join("man1");
+    assert!(wade(&["man", "--out", &out.to_string_lossy()]).status.success());
+    for page in
+        ["wade.1", "wade-serve.1", "wade-soak-compare.1", "wade-gap-bench-import.1", "wade-vehicle-check.1"]
+    {
+        let text = std::fs::read_to_string(out.join(page)).expect(page);
+        assert!(text.starts_with(".ie") || text.contains(".TH wade"), "{page}: {text}");
+    }
+}
+
+#[test]
+fn the_doctor_names_what_is_wrong_and_the_way_out() {
+    let folder = TempDir::new().expect("a folder");
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = taken.local_addr().expect("an address");
+    let settings = |grpc: &str| {
+        let path = folder.path().join("wade.toml");
+        let socket = folder.path().join("wade.sock");
+        let namespace = format!("doctor-{}", std::process::id());
+        let text = format!(
+            "[grpc]\nlisten = \"{grpc}\"\nunix_socket = \"{}\"\n[http]\nlisten = \"\"\n[shm]\nnamespace = \"{namespace}\"",
+            socket.display()
+        );
+        std::fs::write(&path, text).expect("written");
+        path.to_string_lossy().into_owned()
+    };
+    let doctor = |config: &str| {
+        let output = wade(&["doctor", "--json", "--config", config]);
+        let document: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        (output.status.code(), document)
+    };
+    let check = |document: &Value, name: &str| {
+        let checks = document["checks"].as_array().expect("an array").clone();
+        checks.into_iter().find(|check| check["name"] == name).unwrap_or_else(|| panic!("no {name}"))
+    };
+    let (code, document) = doctor(&settings(&port.to_string()));
+    let address = check(&document, "gRPC address");
+    assert_eq!((code, &address["status"]), (Some(1), &"fail".into()), "{document:#}");
+    assert!(address["found"].as_str().expect("text").contains(&std::process::id().to_string()), "{address}");
+    assert!(address["way_out"].as_str().expect("text").contains("--listen"), "{address}");
+    drop(taken);
+    let (_, document) = doctor(&settings(&port.to_string()));
+    for name in ["gRPC address", "Unix socket", "vehicles", "settings", "server, gRPC", "server, shm"] {
+        assert_eq!(check(&document, name)["status"], "ok", "{name}: {document:#}");
+    }
+    for name in
+        ["shared memory", "iceoryx2 folder", "descriptors", "CPU", "CPU governor", "hiccups", "OpenFOAM"]
+    {
+        let found = check(&document, name);
+        let said = !found["way_out"].as_str().expect("text").is_empty();
+        assert_eq!(found["status"] != "ok", said, "whatever is not well has a way out: {found}");
+    }
+    let (code, document) = doctor(&settings("nowhere"));
+    assert_eq!(code, Some(1), "{document:#}");
 }

@@ -2,6 +2,7 @@
 
 mod campaign;
 mod dataset;
+mod doctor;
 mod eval;
 mod gap;
 mod gap_bench;
@@ -12,6 +13,7 @@ mod progress;
 mod query;
 mod running;
 mod serve;
+mod shell;
 mod soak;
 mod soak_server;
 mod state;
@@ -64,6 +66,9 @@ enum Command {
     Validate(validate::Validate),
     Gap(gap::Gap),
     Vehicle(vehicle::Vehicle),
+    Doctor(doctor::Doctor),
+    Completions(shell::Completions),
+    Man(shell::Man),
 }
 
 impl Cli {
@@ -81,6 +86,9 @@ impl Cli {
             Command::Validate(command) => command.run(),
             Command::Gap(command) => command.run(),
             Command::Vehicle(command) => command.run(),
+            Command::Doctor(command) => command.run(),
+            Command::Completions(command) => command.run(),
+            Command::Man(command) => command.run(),
         }
     }
 }
