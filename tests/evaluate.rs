@@ -249,7 +249,7 @@ fn what_was_learnt_from_is_no_judge() {
     let case = leak.split.training_cases.first().unwrap().clone();
     leak.split.held_out_cases.insert(case.clone());
     let error = held_out::of(&leak, &file, &source).unwrap_err().to_string();
-    assert!(error.contains(&case) && error.contains("was learnt from"), "{error}");
+    assert!(error.contains(&case) && error.contains("was trained on"), "{error}");
     let mut stranger = record.clone();
     stranger.split.training_cases.remove(&case);
     assert!(matches!(held_out::of(&stranger, &file, &source), Err(EvaluateError::UnknownCase { .. })));
@@ -339,7 +339,7 @@ fn the_program_judges_bundles_by_what_their_training_held_out() {
 
     let refused = eval(&other, &[]);
     assert!(
-        stderr(&refused).contains("is not the data set that the weights learnt from"),
+        stderr(&refused).contains("is not the data set that the weights were trained on"),
         "{}",
         stderr(&refused)
     );

@@ -98,7 +98,7 @@ fn a_client_that_finds_nobody_says_each_reason_once_with_the_way_out() {
     let socket = folder.path().join("wade.sock");
     let url = format!("unix:{}", socket.display());
     let of_client = GrpcClient::unix(socket, "husky", Method::Unary, PATIENCE).map(|_| ());
-    let of_reload = wade::client::reload(&url, "husky", PATIENCE).map(|_| ());
+    let of_reload = wade::client::reload(&url, proto::ReloadRequest::default(), PATIENCE).map(|_| ());
     for error in [of_client.expect_err("nobody"), of_reload.expect_err("nobody")] {
         let text = error.to_string();
         assert_eq!(text.matches("No such file").count(), 1, "{text}");

@@ -98,8 +98,19 @@ fn ctrl_c_ends_a_soak_with_its_report_and_its_server() {
         assert!(begun.elapsed() < common::PATIENCE, "no server was started");
         std::thread::sleep(Duration::from_millis(20));
     };
-    // some requests; that none is answered is told by the assertion below
-    std::thread::sleep(Duration::from_secs(2));
+    // the thread that waits for Ctrl-C is there once the server has answered and the load begins
+    let tasks = format!("/proc/{}/task", child.id());
+    let waits = || {
+        let names = std::fs::read_dir(&tasks).into_iter().flatten().flatten();
+        names
+            .map(|task| std::fs::read_to_string(task.path().join("comm")).unwrap_or_default())
+            .any(|name| name.trim() == "wade-signals")
+    };
+    while !waits() {
+        assert!(begun.elapsed() < 2 * common::PATIENCE, "the load never began");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_secs(1));
     let pid = nix::unistd::Pid::from_raw(child.id().cast_signed());
     nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGINT).expect("it lives");
     let status = child.wait().expect("it ends");

@@ -48,7 +48,7 @@ fn checks(report: &Report) -> String {
         let error = 100.0 * (rest.computed_n / rest.mesh_n - 1.0);
         let numbers = [rest.computed_n, rest.mesh_n].map(|force| format!("{force:.1}"));
         let hull = [rest.hull_dry_n, rest.hull_wetted_n].map(|force| format!("{force:.1}"));
-        let error = format!("{error:+.1}");
+        let error = if error.abs() < 0.05 { "0.0".to_owned() } else { format!("{error:+.1}") };
         [format!("{:.3}", rest.depth_m)].into_iter().chain(numbers).chain([error]).chain(hull).collect()
     });
     let heads = [

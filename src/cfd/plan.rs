@@ -312,7 +312,7 @@ pub enum PlanError {
     },
     /// The plan of another vehicle, or of this one before it changed.
     #[error(
-        "{path}: the plan was made for a `{vehicle}` with another hull: plan anew, or bring that bundle back"
+        "{path}: the plan was made for a `{vehicle}` with another hull: make a new plan, or bring that bundle back"
     )]
     Changed {
         /// The file.

@@ -78,14 +78,16 @@ pub enum RunError {
         jobs: usize,
     },
     /// A case folder that somebody changed.
-    #[error("{path} is not as wade wrote it: move it away to keep it, or remove it to compute the case anew")]
+    #[error(
+        "{path} is not as wade wrote it: move it away to keep it, or remove it to compute the case again"
+    )]
     Edited {
         /// The file that differs.
         path: PathBuf,
     },
     /// An outcome that does not belong to the plan.
     #[error(
-        "{path} is the outcome of another state, other settings or another hull than `{id}` has now: bring them back, name another folder of work, or move it away to compute the case anew"
+        "{path} is the outcome of another state, other settings or another hull than `{id}` has now: bring them back, name another folder of work, or move it away to compute the case again"
     )]
     Foreign {
         /// The outcome.
@@ -94,7 +96,7 @@ pub enum RunError {
         id: String,
     },
     /// An outcome that does not parse.
-    #[error("{path}: {message}: remove it to compute the case anew")]
+    #[error("{path}: {message}: remove it to compute the case again")]
     Outcome {
         /// The outcome.
         path: PathBuf,

@@ -287,8 +287,8 @@ impl ImportCases {
         if let Some(first) = without.first() {
             let count = without.len();
             eprintln!(
-                "warning: {count} of the cases, `{first}` the first, have no moments: where their forces act can neither \
-                 be learnt from them nor judged on them"
+                "warning: {count} of the cases, `{first}` the first, have no moments: where their forces act can neither be \
+                 trained on nor judged"
             );
         }
         write(&self.out, &data)

@@ -23,8 +23,8 @@ use super::{PROGRAM, begin_page, emit, usage_error};
 /// Judge the weights of the bundles by the states that their training held out
 ///
 /// The model is asked as it is served, with the ground contact of the data set. Beside it stand three simple models that
-/// are fitted to the same training states, and the paper's figures, which are of other data. States that the weights have
-/// learnt from are refused: the report of the training says which these are.
+/// are fitted to the same training states, and the paper's figures, which are of other data. States that the weights were
+/// trained on are refused: the report of the training says which these are.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   wade eval --data cfd.parquet --trained training --html eval.html

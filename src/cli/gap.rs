@@ -41,7 +41,7 @@ const SETTINGS: &str = "  # library = [\"added_mass\", \"current\"]   # default:
 /// Find where a model and measured trials disagree, name the missing effect, and show the gap shrink
 ///
 /// Says `nothing_missing`, `named`, `ambiguous` (with the trial that would tell the candidates apart) or
-/// `no_candidate_fits`. Trials with sim_fx ... columns are held against that simulator, on any body that trials.toml
+/// `no_candidate_fits`. Trials with sim_fx ... columns are compared with that simulator, on any body that trials.toml
 /// describes; others against the model of the vehicle's bundle, without the effects that were added to it before.
 /// Exit status 1: --apply was asked for and there is nothing to trust.
 #[derive(Debug, Args)]
@@ -130,7 +130,7 @@ struct Adding {
     running: Running,
 }
 
-/// One step of the workflow; each looks at the trials anew, and only the last two write.
+/// One step of the workflow; each reads the trials again, and only the last two write.
 #[derive(Debug, Subcommand)]
 enum Step {
     /// Where the gap is: regions of the state space
@@ -317,7 +317,7 @@ impl Source {
                     bundle.display(),
                     report.vehicle
                 );
-                apply.running.reload(&report.vehicle);
+                apply.running.reload(&report.vehicle, &bundle);
                 Ok(ExitCode::SUCCESS)
             }
             (Some(Ok(_)), None, _) => {

@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use tracing_subscriber::EnvFilter;
 use wade::config::{Config, Log};
 use wade::server::Running;
+use wade::service::health::{Part, State};
 use wade::service::shm::Wait;
 
 /// Logs to standard error, with colors only on a terminal and only where NO_COLOR is unset or empty (no-color.org).
@@ -44,13 +45,13 @@ pub fn ready(config: &Config, running: &Running, elapsed: Duration) {
     if let Some(path) = running.unix_path() {
         tracing::info!(address = %format!("unix:{}", path.display()), "gRPC");
     }
-    match (config.shm.enabled, config.shm.wait) {
-        (true, wait) => tracing::info!(
+    match running.health().state(Part::Shm) {
+        State::Ok => tracing::info!(
             address = %format!("shm:{}", config.shm.namespace),
-            wait = if wait == Wait::Spin { "spin" } else { "block" },
+            wait = if config.shm.wait == Wait::Spin { "spin" } else { "block" },
             "shared memory"
         ),
-        (false, _) => tracing::info!("shared memory: off"),
+        state => tracing::info!("shared memory: {state}"),
     }
     if let Some(address) = running.http_address() {
         tracing::info!("page at http://{address}/");

@@ -169,7 +169,9 @@ impl Query {
 fn to_table(vehicle: &str, about: &About, reply: &Reply) -> String {
     use std::fmt::Write;
     let mut text = String::new();
-    let row = |[x, y, z]: [f32; 3]| format!("{x:>10.2} {y:>10.2} {z:>10.2}");
+    // what is rounded to nothing has no sign
+    let two = |x: f32| if x.abs() < 0.005 { "0.00".into() } else { format!("{x:.2}") };
+    let row = |[x, y, z]: [f32; 3]| format!("{:>10} {:>10} {:>10}", two(x), two(y), two(z));
     // writing to a String cannot fail
     let mut line = |line: String| {
         let _ = writeln!(text, "{line}");

@@ -125,7 +125,7 @@ fn set<T>(place: &mut T, value: Option<T>) {
 /// Tells systemd, where it is systemd that started us.
 fn notify(states: &[sd_notify::NotifyState]) {
     if let Err(error) = sd_notify::notify(states) {
-        tracing::warn!(%error, "systemd was not told");
+        tracing::warn!(%error, "cannot notify systemd");
     }
 }
 
@@ -191,7 +191,7 @@ fn start_reload(running: &Running) {
         tracing::info!("SIGHUP: reading every bundle again");
         match reloader.reload("") {
             Ok(reloads) => {
-                for Reload { vehicle, served_version, refusal } in reloads {
+                for Reload { vehicle, served_version, refusal, .. } in reloads {
                     let refusal = refusal.map(|refusal| refusal.to_string());
                     tracing::info!(vehicle, version = served_version, refusal, "serves");
                 }

@@ -36,7 +36,7 @@ const SETTINGS: &str = "  ground_contact = \"wetted\"    # or \"dry\": water und
   sections = 3                 # fewest from which a depth is judged
 ";
 
-/// Hold a vehicle's model against two laws of physics along the motion of trials
+/// Test a vehicle's model by two laws of physics along the motion of trials
 ///
 /// Test 1: drag grows with the square of the speed. Test 2: the vertical force is buoyancy, which grows with depth, plus
 /// lift. Only motion is needed, no measured force. Exit status 1: a check does not hold.

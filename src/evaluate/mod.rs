@@ -22,7 +22,7 @@ use baseline::BaselineError;
 pub enum EvaluateError {
     /// Another file than the one that was learnt from.
     #[error(
-        "{file} is not the data set that the weights learnt from, {learnt_from} (sha256 {sha256}): which of its cases they \
+        "{file} is not the data set that the weights were trained on, {learnt_from} (sha256 {sha256}): which of its cases they \
          have seen is not known. Give that data set, or train on this one"
     )]
     OtherData {
@@ -35,7 +35,7 @@ pub enum EvaluateError {
     },
     /// Weights that the report of the training does not know.
     #[error(
-        "the weights of `{vehicle}` are not those of the training report: which cases they have learnt from is not known. \
+        "the weights of `{vehicle}` are not those of the training report: which cases they were trained on is not known. \
          Give the report of their training with --trained"
     )]
     OtherWeights {
@@ -49,7 +49,7 @@ pub enum EvaluateError {
         case: String,
     },
     /// A report that lists a case on both sides of a split that keeps cases together.
-    #[error("case `{case}` was learnt from and is listed as held out: a score on it would be none")]
+    #[error("case `{case}` was trained on and is listed as held out: it cannot judge the model")]
     TrainingCase {
         /// The case.
         case: String,

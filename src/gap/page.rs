@@ -219,7 +219,7 @@ fn held_out(report: &Report) -> String {
     let heads = ["component", "before", "after", "noise floor", "closure", "90 % interval"];
     let mut text = format!(
         "<h2>Before and after, on trials that took no part</h2>{}<p class=\"small\">Root mean square over samples. Closure: \
-         (before - after) / (before - noise floor). Kept back: {}.</p>\n",
+         (before - after) / (before - noise floor). Held out: {}.</p>\n",
         table(&heads, NO_PAPER, rows),
         escape(&report.gap.held_out_trials.join(", ")),
     );

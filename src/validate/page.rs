@@ -48,7 +48,7 @@ fn summary(report: &Report) -> String {
     format!(
         "<p class=\"small\">bundle version {} · weights: {} · ground contact: {contact} · {} trials from {source}, {} \
          planar sections, {:.0} % of whose samples lie in the ranges that the weights were learnt in. No force was \
-         measured: the model's own forces, along the motion of the trials, are held against known laws.</p>",
+         measured: the model's own forces, along the motion of the trials, are tested by known laws.</p>",
         subject.version,
         escape(&subject.weights),
         data.trials,
