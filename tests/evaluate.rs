@@ -216,7 +216,7 @@ fn the_figures_are_those_of_planted_errors() {
     assert_eq!(calibration.cases, 20);
     assert_eq!(husky.paper.unwrap().mae, [1.25, 3.42, 4.38]);
     let page = report.page().unwrap();
-    assert!(page.contains("paper, other data") && page.contains("<svg") && page.contains("12.96"));
+    assert!(page.contains("published, different data") && page.contains("<svg") && page.contains("12.96"));
     for title in ["obliqueness [1]", "share of the errors within", "epoch"] {
         assert!(page.contains(title), "{title}");
     }

@@ -170,7 +170,7 @@ fn repeats_that_leave_nothing_to_keep_back_are_refused() {
     let output = wade_on(&common::copy_of_vehicles(), &arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{message}");
-    assert!(message.contains("cannot be kept back") && message.contains("raise held_out"), "{message}");
+    assert!(message.contains("cannot be held out") && message.contains("raise held_out"), "{message}");
     assert!(!place.exists());
 }
 

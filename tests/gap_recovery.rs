@@ -832,7 +832,7 @@ fn what_passes_and_leaves_too_much_is_told_and_not_named() {
     let drag = report.rejected.iter().find(|rejected| rejected.name == "drag_coefficient_error");
     assert_eq!(drag.and_then(|drag| drag.why), Some(gap::Refusal::Incomplete), "{:?}", report.rejected);
     let left = report.gap.unexplained.expect("told");
-    assert!(left.contains("; nearest comes drag coefficient error"), "{left}");
+    assert!(left.contains("; the closest candidate is drag coefficient error"), "{left}");
 }
 
 #[test]

@@ -404,7 +404,7 @@ fn the_whole_way_from_a_seed_to_a_report_and_again_from_its_files() {
     for key in ["passed", "failures", "not_tested", "subject", "checks", "left_out", "config", "commit"] {
         assert!(!first[key].is_null(), "{key}");
     }
-    assert_eq!(first["paper_label"], "paper: other data");
+    assert_eq!(first["paper_label"], "published, different data");
     assert_eq!(first["subject"]["weights"], common::model("warthog").provenance());
     assert_eq!((&first["data"]["trials"], &first["data"]["source"]), (&71.into(), &"generated".into()));
     assert!(first["data"]["generated"].as_str().expect("text").starts_with("generated"));
@@ -420,7 +420,7 @@ fn the_whole_way_from_a_seed_to_a_report_and_again_from_its_files() {
     assert_eq!(depth["paper"]["f0_n"], 784.0);
 
     let page = std::fs::read_to_string(out.join("index.html")).expect("written");
-    assert!(page.contains("Generated motion, not measured") && page.contains("paper: other data"));
+    assert!(page.contains("Generated motion, not measured") && page.contains("published, different data"));
     assert_eq!(page.matches("<svg").count(), 3);
     assert_eq!(page.matches("(generated motion)").count(), 3, "every figure says so itself");
     assert!(!page.contains("http://") || page.matches("http://").all(|_| page.contains("www.w3.org")));

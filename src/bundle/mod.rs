@@ -181,7 +181,9 @@ pub enum Fault {
     #[error("provenance and domain are stated where there are weights, and only there")]
     Untrained,
     /// The effects.
-    #[error("{0}; write it anew with wade gap --apply, or take it back with wade vehicle rollback")]
+    #[error(
+        "{0}; write it again with wade gap --apply, or restore the previous version with wade vehicle rollback"
+    )]
     Effects(#[from] EffectsFileError),
     /// A folder of kept versions that holds another.
     #[error("holds version {found}")]

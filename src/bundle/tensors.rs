@@ -74,7 +74,7 @@ pub enum TensorError {
         found: String,
     },
     /// Weights for a remainder of something else.
-    #[error("the weights answer what is left of {found}, not of {expected}: train them anew", expected = anchor::BASE)]
+    #[error("the weights are a remainder of {found}, not of {expected}: train them again", expected = anchor::BASE)]
     Base {
         /// What the file says.
         found: String,

@@ -302,7 +302,7 @@ pub enum PlanError {
     },
     /// Driving twins need steady cases over a parked bed.
     #[error(
-        "there are {available} steady cases without a driving twin, {wanted} are asked for: plan more of the paper set first"
+        "there are {available} steady cases without a driving twin, {wanted} are required: plan more of the paper set first"
     )]
     NoTwin {
         /// Cases to take a twin of.

@@ -122,7 +122,7 @@ impl Baseline {
 }
 
 /// The name of [`known`] in reports.
-pub const KNOWN: &str = "physics alone, nothing learnt";
+pub const KNOWN: &str = "known physics alone";
 
 /// What the `anchored` model knows before anything is learnt ([`crate::anchor`]) says of states.
 pub fn known(vehicle: &Vehicle, states: &[&State]) -> Vec<Prediction> {

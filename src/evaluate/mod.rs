@@ -55,9 +55,7 @@ pub enum EvaluateError {
         case: String,
     },
     /// A split by sample that does not come out as it was recorded.
-    #[error(
-        "the split of the training report does not come out again: it was made by another version of wade"
-    )]
+    #[error("the split of the training report cannot be reproduced: another version of wade made it")]
     OtherSplit,
     /// Nothing to judge by.
     #[error("nothing is held out")]

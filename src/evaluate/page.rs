@@ -14,7 +14,7 @@ const AXES: [&str; 3] = ["F<sub>x</sub>", "F<sub>y</sub>", "F<sub>z</sub>"];
 pub(super) fn page(report: &Report) -> Result<String, PlotError> {
     let mut text = format!(
         "<p>Loads: {}. Held out: {}.</p>\n<p class=\"small\">Shaded: {LABEL}. The source paper's CFD is not public, so its \
-         figures are of other cases and another mesh; they say where it stands, not which network is better.</p>\n",
+         figures are of other cases and another mesh; they show the order of magnitude, not which network is better.</p>\n",
         escape(&report.about.data.label()),
         escape(&report.about.splits.join("; ")),
     );
@@ -224,15 +224,15 @@ fn calibration(vehicle: &VehicleReport) -> Result<String, PlotError> {
         |name: &str, values: [String; 3]| std::iter::once(name.to_owned()).chain(values).collect::<Vec<_>>();
     let rows = [
         row(
-            "errors of the mean within one stated deviation (68.3 % where normal)",
+            "errors of the mean within one predicted standard deviation (68.3 % where normal)",
             calibration.within_one.map(percent),
         ),
         row("within two (95.4 %)", calibration.within_two.map(percent)),
-        row("RMS of error over stated deviation (1)", calibration.error_over_stated.map(number)),
-        row("RMS swing of sections around their mean [N]", calibration.swing.map(number)),
+        row("RMS of error over predicted standard deviation (1)", calibration.error_over_stated.map(number)),
+        row("RMS deviation of sections from their mean [N]", calibration.swing.map(number)),
     ];
     let note = format!(
-        "<p class=\"small\">What is stated is how far the mean flow may be off, not how it swings: errors are means over the \
+        "<p class=\"small\">The predicted standard deviation is that of the mean flow, without its oscillation: errors are means over the \
          sections of a case, of {} cases.</p>\n",
         calibration.cases,
     );
@@ -256,5 +256,5 @@ fn reliability(vehicle: &VehicleReport) -> Result<String, PlotError> {
         (0..=30).map(|step| (at(step), within(at(step)) / ratios.len().max(1) as f64)).collect()
     });
     series.push(Series { name: "normal".to_owned(), points: NORMAL.to_vec() });
-    scatter("stated deviations", "share of the errors within", &series)
+    scatter("predicted standard deviations", "share of the errors within", &series)
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// How these figures are labelled wherever they stand beside ours.
-pub const LABEL: &str = "paper, other data";
+pub const LABEL: &str = "published, different data";
 
 /// Figures of one vehicle; section "Results".
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -168,7 +168,7 @@ fn outside(all: &[Series]) -> Option<String> {
     far.sort_by(|a, b| b.1.total_cmp(&a.1));
     let (worst, _) = far.first()?;
     Some(format!(
-        "{} of {} trials, such as {}, are in states that the model did not learn: a gap in them may be its own, and they are kept back only where there are too few others",
+        "{} of {} trials, such as {}, are in states outside the training domain: a gap there can be an error of the model, and they are held out only if there are too few other trials",
         far.len(),
         all.len(),
         worst.name

@@ -18,19 +18,17 @@ pub enum NotApplicable {
     NoCandidateFits,
     /// More than one name.
     #[error(
-        "other effects explain the gap as well; record the trial that tells them apart, and run again with it"
+        "other effects explain the gap as well; record the trial that separates them, and run again with it"
     )]
     Ambiguous,
     /// Sensors and drive alone.
     #[error("no named effect is one of the water")]
     NotPhysics,
     /// A part of the trials kept back that it makes worse.
-    #[error("on trials that took no part {0}: what was named does not hold there")]
+    #[error("on held-out trials {0}: the named effects do not hold there")]
     Worse(Worse),
     /// Seen in one condition only.
-    #[error(
-        "{effects} was seen in one condition only: record another, or take it as it is with --provisional"
-    )]
+    #[error("{effects} was observed in one condition only: record another, or accept it with --provisional")]
     Provisional {
         /// Names of the effects.
         effects: String,

@@ -21,7 +21,7 @@ pub(super) fn separating(sets: &[Vec<Effect>]) -> String {
     let names = names.collect::<Vec<_>>().join(" or ");
     match parts.len() {
         0..=2 => format!("{names}: {}", parts.join("; or ")),
-        _ => format!("{names}: all but one of these tell: {}", parts.join("; ")),
+        _ => format!("{names}: all but one of these trials separate them: {}", parts.join("; ")),
     }
 }
 

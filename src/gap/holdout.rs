@@ -271,7 +271,7 @@ fn places(points: &[Point], regions: &[Region]) -> Vec<(String, Limits)> {
             places.push((format!("{third} third of {name}"), limits));
         }
     }
-    places.push(("all trials kept back".to_owned(), OPEN));
+    places.push(("all held-out trials".to_owned(), OPEN));
     places
 }
 

@@ -273,7 +273,7 @@ pub enum GapError {
     },
     /// A trial that is kept back and repeats one that is not: what was named would be tested on what it was named by.
     #[error(
-        "{trial}.csv cannot be kept back, since it repeats {other}.csv, which takes part in naming (measured.repeats of trials.toml): record trials that repeat none, raise held_out so that a whole group is kept back, or list only trials of one and the same command"
+        "{trial}.csv cannot be held out, since it repeats {other}.csv, which is used for naming (measured.repeats of trials.toml): record trials that repeat none, raise held_out so that a whole group is held out, or list only trials of one and the same command"
     )]
     RepeatKeptBack {
         /// Name of the trial.
@@ -303,7 +303,7 @@ pub enum GapError {
     },
     /// A twin that ends before its trial.
     #[error(
-        "{twin}.csv, the dry twin of {trial}.csv, is {seconds:.2} s shorter: cut the one, or record the other anew"
+        "{twin}.csv, the dry twin of {trial}.csv, is {seconds:.2} s shorter: cut the one, or record the other again"
     )]
     ShortTwin {
         /// Name of the trial.

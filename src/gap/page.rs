@@ -17,8 +17,20 @@ const NO_PAPER: usize = usize::MAX;
 impl Report {
     /// The page for people.
     pub fn page(&self) -> Result<String, PlotError> {
-        let mut body = format!(
-            "<p class=\"small\">{} trials, {} samples; {} of the trials took no part in naming and fitting.</p>\n",
+        // the answer first, then what it rests on
+        let class = match self.verdict {
+            Verdict::NothingMissing => "pass",
+            Verdict::Named => "",
+            Verdict::Ambiguous => "notice",
+            Verdict::NoCandidateFits => "fail",
+        };
+        let mut body = verdict(class, &format!("<b>{}</b>", escape(&self.summary)));
+        if let Some(experiment) = &self.separating_experiment {
+            body += &verdict("notice", &format!("<b>To separate them:</b> {}.", escape(&plain(experiment))));
+        }
+        let _ = writeln!(
+            body,
+            "<p class=\"small\">{} trials, {} samples; {} trials are held out from naming and fitting.</p>",
             self.trials,
             self.samples,
             self.gap.held_out_trials.len(),
@@ -28,17 +40,6 @@ impl Report {
                 "notice",
                 &format!("<b>Generated, not measured.</b> These trials are {}", escape(how)),
             );
-        }
-        let class = match self.verdict {
-            Verdict::NothingMissing => "pass",
-            Verdict::Named => "",
-            Verdict::Ambiguous => "notice",
-            Verdict::NoCandidateFits => "fail",
-        };
-        body += &verdict(class, &format!("<b>{}</b>", escape(&self.summary)));
-        if let Some(experiment) = &self.separating_experiment {
-            body +=
-                &verdict("notice", &format!("<b>To tell them apart:</b> {}.", escape(&plain(experiment))));
         }
         body += &shares(self);
         body += &effects(self);
@@ -136,12 +137,12 @@ fn effects(report: &Report) -> String {
         "90 % interval",
         &published,
         "share of gap",
-        "best placebo",
+        "best surrogate",
     ];
     let mut text = format!(
-        "<h2>Named effects</h2>{}<p class=\"small\">Share of gap: what comes back when the effect alone is left out. Best \
-         placebo: the most that the same effect, shifted in time within each trial, explains of what the real one does. \
-         Provisional: seen in one condition only. Published: the band of the literature in gray, the estimate with its \
+        "<h2>Named effects</h2>{}<p class=\"small\">Share of gap: increase of the gap if this effect alone is removed. Best \
+         surrogate: the largest share that phase-shifted copies of the effect explain, over the share of the effect itself. \
+         Provisional: observed in one condition only. Published: range of the literature in gray, the estimate with its \
          interval over it.</p>\n",
         table(&heads, NO_PAPER, rows)
     );
@@ -200,7 +201,7 @@ fn against(band: [f64; 2], value: f64, around: [f64; 2]) -> String {
     )
 }
 
-/// In the place of a closure: no gap above the floor, or one of which no share can be said.
+/// Instead of a closure: no gap above the floor, or a gap whose share is not defined.
 fn nothing(closure: &Closure) -> &'static str {
     if closure.before > closure.noise_floor { "–" } else { "no gap" }
 }
@@ -218,7 +219,7 @@ fn held_out(report: &Report) -> String {
     });
     let heads = ["component", "before", "after", "noise floor", "closure", "90 % interval"];
     let mut text = format!(
-        "<h2>Before and after, on trials that took no part</h2>{}<p class=\"small\">Root mean square over samples. Closure: \
+        "<h2>Before and after, on held-out trials</h2>{}<p class=\"small\">Root mean square over samples. Closure: \
          (before - after) / (before - noise floor). Held out: {}.</p>\n",
         table(&heads, NO_PAPER, rows),
         escape(&report.gap.held_out_trials.join(", ")),
@@ -237,7 +238,7 @@ fn worst(report: &Report) -> Result<String, PlotError> {
     );
     for trace in &report.traces {
         let held = report.gap.held_out_trials.contains(&trace.trial);
-        let part = if held { "took no part in naming" } else { "took part in naming" };
+        let part = if held { "held out" } else { "used for naming" };
         let figure = figure(trace, !report.effects.is_empty())?;
         let _ = writeln!(text, "<h3>{} ({part})</h3>{figure}", escape(&trace.trial));
     }
@@ -264,7 +265,7 @@ fn sizes(report: &Report) -> String {
         let of = |value: Option<f64>| value.map_or("–".into(), number);
         let source = floor.map_or("", |floor| match floor.source {
             FloorSource::Repeats => "trials that repeat each other",
-            FloorSource::HighFrequency => "what changes from sample to sample",
+            FloorSource::HighFrequency => "changes from sample to sample",
             FloorSource::Stated => "stated in trials.toml",
         });
         vec![
@@ -284,7 +285,7 @@ fn sizes(report: &Report) -> String {
         "90 % interval",
         "noise of a sample",
         "zero from trial to trial",
-        "model's own error",
+        "predicted std. dev. of the model",
         &source,
     ];
     format!(
@@ -331,21 +332,21 @@ fn rivals(report: &Report) -> String {
         return String::new();
     }
     let why = prose("why not");
-    let heads = ["effect", "explains alone", "beside the named", &why];
-    format!("<h2>Rivals</h2>{}", table(&heads, NO_PAPER, rows))
+    let heads = ["effect", "explains alone", "in addition to the named", &why];
+    format!("<h2>Rejected alternatives</h2>{}", table(&heads, NO_PAPER, rows))
 }
 
 fn refusal(why: Refusal) -> &'static str {
     match why {
-        Refusal::NotSignificant => "as likely chance beside the named",
+        Refusal::NotSignificant => "not significant in addition to the named effects",
         Refusal::OutOfBounds => "physically impossible value",
         Refusal::Irrelevant => "smaller than the noise of a sample or the model's own error",
-        Refusal::SmallShare => "explains too little of what is left",
-        Refusal::Unstable => "not in most parts, or of changing sign",
-        Refusal::NotNew => "says the same as the named",
-        Refusal::SharedNoise => "agrees from sample to sample alone, as noise of the motion does",
-        Refusal::Placebo => "no better than its placebos",
-        Refusal::Incomplete => "passes, but all that passes leaves too much to be named",
+        Refusal::SmallShare => "explains too little of the remaining gap",
+        Refusal::Unstable => "absent in most folds, or its sign changes",
+        Refusal::NotNew => "collinear with the named effects",
+        Refusal::SharedNoise => "correlates only from sample to sample, as noise of the motion does",
+        Refusal::Placebo => "no better than its surrogates",
+        Refusal::Incomplete => "passes, but all passing effects together explain too little",
     }
 }
 

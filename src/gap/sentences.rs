@@ -27,7 +27,7 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
     let mut text = match (100.0 * share).clamp(0.0, 100.0).round() {
         0.0 => "no smooth function of the state predicts the gap".to_owned(),
         share => format!(
-            "{share:.0} % of the gap above the floor can be predicted from the state{beyond}; it goes most with {}",
+            "{share:.0} % of the gap above the noise floor can be predicted from the state{beyond}; the strongest functions are {}",
             functions.join(", ")
         ),
     };
@@ -35,20 +35,24 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
         let names = judge.names(&found.members).join(" and ").replace('_', " ");
         text += &match unfit {
             Unfit::Explains(share, asked) => format!(
-                "; nearest comes {names}, with {:.0} % of it, where {:.0} % are asked for",
+                "; the closest candidate is {names}, which explains {:.0} % of it; {:.0} % are required",
                 100.0 * share.max(0.0),
                 100.0 * asked
             ),
             Unfit::Unresolved => {
-                format!("; nearest comes {names}, which would fade faster than these samples resolve")
+                format!(
+                    "; the closest candidate is {names}, which would decay faster than these samples resolve"
+                )
             }
-            Unfit::Imitates => format!("; nearest comes {names}, but one effect in a region explains more"),
-            Unfit::Leaves => format!("; nearest comes {names}, but much of what lasts is still there"),
+            Unfit::Imitates => {
+                format!("; the closest candidate is {names}, but one effect in a region explains more")
+            }
+            Unfit::Leaves => format!("; the closest candidate is {names}, but serial correlation remains"),
         };
     }
     if let Some(gated) = found.gated.filter(|_| found.verdict == Verdict::NoCandidateFits) {
         text += &format!(
-            "; where {} it is like {}, and {:.0} % of it goes with that there",
+            "; where {}, it resembles {}, which explains {:.0} % of it there",
             locate::in_words(&gated.limits),
             gated.effect.name().replace('_', " "),
             100.0 * gated.share.min(1.0)
@@ -58,18 +62,18 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
         let names = judge.names(&found.members).join(" and ").replace('_', " ");
         text += &if share > 0.0 {
             format!(
-                "; {names} would explain {:.0} % of the squared gap of the trials kept back",
+                "; {names} would explain {:.0} % of the squared gap of the held-out trials",
                 100.0 * share
             )
         } else {
-            format!("; {names} would make the gap of the trials kept back larger")
+            format!("; {names} would increase the gap of the held-out trials")
         };
     }
     Some(text)
 }
 
 /// Says so where the gap is clearly larger than the noise: only the model's own error keeps it from counting, or nothing that
-/// the trials tell goes with it.
+/// that the trials measure correlates with it.
 fn hidden(report: &Report) -> Option<String> {
     const CLEARLY: f64 = 2.0;
     const BEYOND: f64 = 1.5;
@@ -87,7 +91,7 @@ fn hidden(report: &Report) -> Option<String> {
     };
     if let Some((name, floor, size)) = most(&Floor::with_model, &is_beyond) {
         return Some(format!(
-            ". Yet the gap of {name} is {:.3}, where {:.3} are expected of noise and model: it hangs together with nothing that these trials tell.",
+            ". The gap of {name} is {:.3}, more than the {:.3} expected from noise and model error, but it does not correlate with any measured quantity.",
             size.rms,
             floor.with_model(),
         ));
@@ -97,7 +101,7 @@ fn hidden(report: &Report) -> Option<String> {
     };
     most(&Floor::total, &is_hidden).map(|(name, floor, size)| {
         format!(
-            " and what the model states of itself. Of {name} the noise is {:.3} and the model's own error {:.3}: the gap of {:.3} may be either's.",
+            " and the predicted standard deviation. For {name} the noise is {:.3} and the predicted standard deviation {:.3}: either can cause the gap of {:.3}.",
             floor.total(),
             floor.model,
             size.rms,
@@ -114,29 +118,30 @@ pub(super) fn summary(report: &Report, gated: Option<Gated>) -> String {
     let closed = held.and_then(|all| Some((all.closure?, all.interval))).map_or_else(String::new, |(c, interval)| {
         match interval.filter(|[low, _]| *low <= 0.0 && c > 0.0) {
             Some([low, high]) => format!(
-                " The trials that took no part are too few, or their gap too small, to show how much of it that closes ({:.0} to {:.0} %).",
+                " The held-out trials are too few, or their gap is too small, to show how much of it that explains ({:.0} to {:.0} %).",
                 100.0 * low,
                 100.0 * high
             ),
-            None => format!(" On trials that took no part it closes {:.0} % of the gap above the noise.", 100.0 * c),
+            None => format!(" On held-out trials it explains {:.0} % of the RMS gap above the noise floor.", 100.0 * c),
         }
     });
     match report.verdict {
         Verdict::NothingMissing => {
             let within =
-                "Nothing is missing that these trials can show: the gap holds no structure beyond its noise";
+                "These trials do not show that anything is missing: the gap has no structure beyond noise";
             hidden(report).map_or_else(|| format!("{within}."), |why| format!("{within}{why}"))
         }
         Verdict::Named => {
             let there = gated.map_or_else(String::new, |gated| {
-                format!(" It explains more of it where {} alone.", locate::in_words(&gated.limits))
+                format!(" It explains more if it acts only where {}.", locate::in_words(&gated.limits))
             });
             let worse = report.gap.worse_regions.first();
-            let worse = worse.map_or_else(String::new, |worse| format!(" But in a part of those {worse}."));
-            format!("What is missing is {}.{closed}{worse}{there}", names(&report.effects))
+            let worse = worse
+                .map_or_else(String::new, |worse| format!(" But in part of the held-out trials {worse}."));
+            format!("The model lacks {}.{closed}{worse}{there}", names(&report.effects))
         }
         Verdict::Ambiguous => format!(
-            "What is missing is {}, or {}: these trials cannot tell them apart.{closed}",
+            "The model lacks {}, or {}: these trials cannot separate them.{closed}",
             names(&report.effects),
             report
                 .alternatives
@@ -146,8 +151,7 @@ pub(super) fn summary(report: &Report, gated: Option<Gated>) -> String {
                 .join(", or "),
         ),
         Verdict::NoCandidateFits => {
-            "There is a gap with structure, and no effect of the library explains it; nothing is applied."
-                .into()
+            "The gap has structure that no effect of the library explains; nothing is applied.".into()
         }
     }
 }

@@ -38,7 +38,7 @@ pub(super) fn page(report: &Report) -> Result<String, PlotError> {
 
 fn summary(report: &Report) -> String {
     let rate = match report.target_rate_hz {
-        Some(hz) => format!("{hz} requests a second asked for, {:.1} answered", report.rate_hz),
+        Some(hz) => format!("{hz} requests a second requested, {:.1} answered", report.rate_hz),
         None => format!(
             "as fast as the answers came (closed loop, so a stall delays one request only), {:.1} a second",
             report.rate_hz
@@ -69,7 +69,7 @@ fn verdict(report: &Report) -> String {
         let _ = write!(text, "<li>{}</li>", escape(failure));
     }
     if let Some(error) = &report.first_error {
-        let _ = write!(text, "<li>The first refusal said: {}</li>", escape(error));
+        let _ = write!(text, "<li>The first error was: {}</li>", escape(error));
     }
     text.push_str(if report.passed { "<ul>" } else { "" });
     for (name, outcome) in report.slo.iter().filter(|(_, outcome)| outcome.holds) {

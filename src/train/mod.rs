@@ -89,7 +89,7 @@ pub enum TrainError {
     },
     /// A state that accelerates: what is learnt has no input for it.
     #[error(
-        "case `{case}` accelerates by {acceleration:.2} m/s2, which no network here is told: leave its set out with `wade dataset merge --set`"
+        "case `{case}` accelerates by {acceleration:.2} m/s2, which is not an input of any network here: leave its set out with `wade dataset merge --set`"
     )]
     Unsteady {
         /// The case.
@@ -99,7 +99,7 @@ pub enum TrainError {
     },
     /// Two kinds of bed for one vehicle: states that look the same to the network have different loads.
     #[error(
-        "vehicle `{vehicle}`: the bed moves with the water in case `{moving}` and is at rest in `{resting}`, which the paper's network is not told: keep one of the sets with `wade dataset merge --set`, or train the anchored one"
+        "vehicle `{vehicle}`: the bed moves with the water in case `{moving}` and is at rest in `{resting}`, which is not an input of the paper's network: keep one of the sets with `wade dataset merge --set`, or train the anchored network"
     )]
     Beds {
         /// The vehicle.
@@ -127,7 +127,9 @@ pub enum TrainError {
         side: &'static str,
     },
     /// A state on both sides of a split that promises to keep states together.
-    #[error("the split leaks: the states of {count} held-out cases are learnt from, the first is `{first}`")]
+    #[error(
+        "the split leaks: the states of {count} held-out cases are training states too, the first is `{first}`"
+    )]
     Leak {
         /// How many.
         count: usize,

@@ -38,7 +38,7 @@ fn summary(record: &Record) -> String {
     let split = &record.split;
     let time = record.epoch_s.map_or_else(String::new, |s| format!(", {s:.2} s an epoch"));
     let mut text = format!(
-        "<p>Loads: {}. Held out: {}. {} samples to learn from, {} held out. {} epochs{time}; weights of epoch {} kept.</p>\n",
+        "<p>Loads: {}. Held out: {}. {} training samples, {} held out. {} epochs{time}; weights of epoch {} kept.</p>\n",
         escape(&record.data.label()),
         escape(&split.name),
         split.training_samples,

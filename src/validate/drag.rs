@@ -159,7 +159,7 @@ impl DragScaling {
                 match worst {
                     Some((r2, depth)) => format!(
                         "|Fx| against v^2 through the origin: the least R2 is {r2:.4}, at {depth:.3} m; {least} is \
-                         asked for."
+                         required."
                     ),
                     None => format!(
                         "|Fx| against v^2: no depth has {} sections of different drag.",

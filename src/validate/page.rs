@@ -47,8 +47,8 @@ fn summary(report: &Report) -> String {
     let contact = format!("{:?}", report.config.ground_contact).to_lowercase();
     format!(
         "<p class=\"small\">bundle version {} · weights: {} · ground contact: {contact} · {} trials from {source}, {} \
-         planar sections, {:.0} % of whose samples lie in the ranges that the weights were learnt in. No force was \
-         measured: the model's own forces, along the motion of the trials, are tested by known laws.</p>",
+         planar sections; {:.0} % of their samples lie in the training domain. No force was \
+         measured: the test compares the model's forces along the motion of the trials with known laws.</p>",
         subject.version,
         escape(&subject.weights),
         data.trials,
@@ -319,7 +319,7 @@ fn section_tables(report: &Report) -> String {
     let sections = table(&heads, usize::MAX, rows);
     let mut text = format!(
         "<details><summary>{} planar sections</summary><p class=\"small\">\"in domain\" is the share of samples in the \
-         ranges that the weights were learnt in; noise in the angular velocity alone can lead out of them.</p>{sections}\
+         training domain; noise in the angular velocity alone can leave it.</p>{sections}\
          </details>",
         report.sections.len()
     );

@@ -207,7 +207,7 @@ impl VerticalForce {
                 f0.map(|f0| f0.r2 >= least),
                 match f0 {
                     Some(f0) => format!(
-                        "F0 against depth is a line through {} points with R2 {:.4}; {least} is asked for.",
+                        "F0 against depth is a line through {} points with R2 {:.4}; {least} is required.",
                         f0.points, f0.r2
                     ),
                     None => format!(

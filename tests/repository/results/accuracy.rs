@@ -10,9 +10,10 @@ pub const VEHICLES: [&str; 2] = ["husky", "warthog"];
 const SHIPPED: [&str; 2] = ["anchored", "paper"];
 
 /// Names of models in the files of `wade eval`, and what people call them.
-const NAMES: [(&str, &str); 10] = [
+const NAMES: [(&str, &str); 11] = [
     ("anchored", "`anchored`"),
     ("paper", "`paper`"),
+    ("known physics alone", "known part of `anchored` alone"),
     ("physics alone, nothing learnt", "known part of `anchored` alone"),
     ("hydrostatics + windward drag, nothing learnt", "known part of `anchored` alone"),
     ("Archimedes + one drag constant", "hydrostatics and one drag constant"),
