@@ -1,4 +1,4 @@
-//! Loads from closed formulas: hydrostatics (E1), form drag (E2) and skin friction (E8).
+//! Loads from closed formulas: hydrostatics, form drag and skin friction.
 //!
 //! They need no training, so they stand in for CFD until it is there: the first weights are learnt from them and say so.
 

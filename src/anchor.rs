@@ -1,6 +1,6 @@
-//! What is known about a state before anything is learnt, for the `anchored` model: exact hydrostatics (E1), a simple
-//! drag (E2 on the windward part of the box around the wet part), and what the network is told, all without a dimension.
-//! The drag is what is left where nothing was learnt, so it has to be right in the mean: that of whole boxes, a front, a rear
+//! What is known about a state without training, for the `anchored` model: exact hydrostatics, a simple
+//! drag (on the windward part of the box around the wet part), and the inputs of the network, all without a dimension.
+//! The drag is what is left far from the training data, so it has to be right in the mean: that of whole boxes, a front, a rear
 //! and four wheels one behind the other, was twice the Warthog's.
 //!
 //! The model is `F_s = H_s + D_s + q A_s R_s`: the pressure load `H_s` of still water, the drag `D_s`, and a remainder
@@ -32,7 +32,7 @@ use crate::geometry::wetting::{Wetting, WettingTable};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
-/// What the network's answer is a remainder of: weights that were taught beside another are of no use here.
+/// What the network's answer is a remainder of: weights that were trained with another base are refused.
 pub const BASE: &str = "archimedes + windward drag of the soaked part, force and moment";
 
 /// Names of what is told of a state, in order.

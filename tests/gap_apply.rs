@@ -185,7 +185,7 @@ fn what_one_condition_shows_is_added_where_that_is_asked_for() {
     let bundle = place.bundle();
     let refused = place.gap("trials", &[]);
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(said.contains("added_mass was seen in one condition only"), "{said}{:?}", refused.stdout);
+    assert!(said.contains("added_mass was observed in one condition only"), "{said}{:?}", refused.stdout);
     assert!(said.contains("--provisional"), "{said}");
     assert_eq!(place.bundle(), bundle);
     assert!(!place.path("gap/effects.toml").exists());

@@ -159,7 +159,9 @@ fn a_case_on_both_sides_is_refused_but_of_a_split_by_sample() {
     };
     let error = train(BY, &leak).unwrap_err().to_string();
     assert!(
-        error.contains("the split leaks: the states of 1 held-out cases are training states too, the first is `"),
+        error.contains(
+            "the split leaks: the states of 1 held-out cases are training states too, the first is `"
+        ),
         "{error}"
     );
     let by = By::Sample { share: 0.2 };

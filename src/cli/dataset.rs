@@ -24,7 +24,7 @@ use wade::vehicle::Vehicle;
 use super::train::Rule;
 use super::{Vehicles, begin_page, emit, keep_inputs, usage_error};
 
-/// Most cases a vehicle: far beyond what a network of this size can learn, and well within memory.
+/// Most cases a vehicle: far more than a network of this size can use, and well within memory.
 const MOST_CASES: u64 = 1_000_000;
 
 /// Import CFD results, augment, split and describe data sets
@@ -96,7 +96,7 @@ case.toml, with z of the CFD forward, y up and so x to the left:
         #[command(flatten)]
         vehicles: Vehicles,
     },
-    /// Write what to learn from and what to be judged by as two data sets
+    /// Write the training side and the held-out side as two data sets
     ///
     /// Every split but the one by sample keeps the sections and images of a case together.
     #[command(after_help = "Examples:
@@ -347,7 +347,7 @@ impl SplitFile {
             let folder = self.out.join(place).display().to_string();
             let (training, held_out) = (training.samples.len(), held_out.samples.len());
             let (name, leaks) = (&split.name, split.leaks(&data).len());
-            writeln!(text, "{folder}: {training} samples to learn from, {held_out} held out: {name}")?;
+            writeln!(text, "{folder}: {training} training samples, {held_out} held out: {name}")?;
             if leaks > 0 {
                 writeln!(text, "  {leaks} cases are on both sides")?;
             }

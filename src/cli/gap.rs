@@ -43,7 +43,7 @@ const SETTINGS: &str = "  # library = [\"added_mass\", \"current\"]   # default:
 /// Says `nothing_missing`, `named`, `ambiguous` (with the trial that would tell the candidates apart) or
 /// `no_candidate_fits`. Trials with sim_fx ... columns are compared with that simulator, on any body that trials.toml
 /// describes; others against the model of the vehicle's bundle, without the effects that were added to it before.
-/// Exit status 1: --apply was asked for and there is nothing to trust.
+/// Exit status 1: --apply was asked for and no verdict allows it.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_help = format!("Examples:
@@ -120,7 +120,7 @@ pub struct Gap {
 /// How effects are added to a bundle.
 #[derive(Debug, Args)]
 struct Adding {
-    /// Add what was seen in one condition only as well
+    /// Also add effects that were observed in one condition only
     #[arg(long)]
     provisional: bool,
     /// Take effects out that other trials gave and these do not
@@ -135,11 +135,11 @@ struct Adding {
 enum Step {
     /// Where the gap is: regions of the state space
     Locate(Source),
-    /// Which effects explain it, what else could, and what would tell them apart
+    /// Which effects explain it, what else could, and which trials would separate them
     Name(Source),
     /// The parameters of the named effects with their intervals
     Fit(Source),
-    /// The report on trials that took no part, as files
+    /// The report on held-out trials, as files
     Report {
         #[command(flatten)]
         source: Source,
@@ -313,7 +313,7 @@ impl Source {
             (Some(Ok(effects)), Some(bundle), Some(apply)) => {
                 let version = bundle::apply(&bundle, effects)?;
                 eprintln!(
-                    "{}: version {version}; wade vehicle rollback {} takes it back",
+                    "{}: version {version}; `wade vehicle rollback {}` restores the previous version",
                     bundle.display(),
                     report.vehicle
                 );
@@ -414,7 +414,7 @@ fn pretty(value: &serde_json::Value) -> Result<String> {
 fn verdict(report: &Report) -> String {
     let mut text = format!("{}\n", report.summary);
     if let Some(experiment) = &report.separating_experiment {
-        text += &format!("To tell them apart: {experiment}.\n");
+        text += &format!("To separate them: {experiment}.\n");
     }
     if let Some(left) = &report.gap.unexplained {
         text += &format!("Left without a name: {left}.\n");

@@ -168,7 +168,7 @@ fn time_step(t: Option<f64>, before: Option<f64>, is_run: bool) -> Result<f32> {
     }
 }
 
-/// Refuses a table without a state or with forces already, and names the columns that nobody reads.
+/// Refuses a table without a state or with forces already, and names the unused columns.
 fn check_columns(headers: &csv::StringRecord) -> Result<()> {
     let has = |name: &str| headers.iter().any(|header| header.trim() == name);
     if let Some(missing) = ["vx", "vy", "vz", "depth"].into_iter().find(|name| !has(name)) {

@@ -102,7 +102,7 @@ pub struct Train {
     running: Running,
 }
 
-/// What to learn from, for commands that train.
+/// The training data, for commands that train.
 #[derive(Debug, Args)]
 pub struct Data {
     /// Data set, or "analytic" for loads by formula
@@ -336,7 +336,7 @@ impl Train {
             StagedFile::new(path).with_context(|| path.display().to_string())?;
         }
         let sides = Sides { split, by };
-        eprintln!("held out: {}; {} samples to learn from", split.name, split.training.len());
+        eprintln!("held out: {}; {} training samples", split.name, split.training.len());
         let checkpoint =
             self.checkpoint.as_ref().map(|path| Checkpoint { path: path.clone(), resume: self.resume });
         let learnt =

@@ -87,7 +87,7 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Put the version before the last wade train or wade gap --apply back into its place, or any that was kept
+    /// Restore the version before the last wade train or wade gap --apply, or any version that is still stored
     ///
     /// Versions lie in <VEHICLES>/<NAME>.versions. What leaves its place is kept too, so that --to puts it back.
     #[command(after_help = "Examples:

@@ -1,4 +1,4 @@
-//! E6, added mass: the inertia of the water that moves with the hull.
+//! Added mass: the inertia of the water that moves with the hull.
 //!
 //! `W = -(M_A nu_dot + C_A(nu) nu)` about the center of buoyancy, with a diagonal `M_A` that scales with the water
 //! displaced: `k rho V` along the axes and `k rho V (a^2 + b^2) / 12` about them, the inertia of the displaced box. A flat

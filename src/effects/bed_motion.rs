@@ -1,4 +1,4 @@
-//! E18, driving over the bed instead of standing on it in a current.
+//! Driving over the bed instead of standing on it in a current.
 //!
 //! A model learnt from parked hulls has the slow water near the bed under the hull; a hull that drives through still water
 //! has not; and its wheels roll, which bear a side force of their own where it drifts. `F = 1/2 rho A |v_g| (-C_D v_g -

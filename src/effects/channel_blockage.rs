@@ -1,4 +1,4 @@
-//! E10, the walls of a channel: the flow past the hull is faster than the hull.
+//! The walls of a channel: the flow past the hull is faster than the hull.
 //!
 //! Two laws. By windward areas, `W = k D ((1 - m)^-2 - 1)` with the section that the wet front takes as the blockage `m`: by
 //! continuity the flow beside the hull is `1 / (1 - m)` times as fast. Qi, Eames, Johnson (JFM 2014) have

@@ -1,4 +1,4 @@
-//! E14, water that moves over ground with `u`, fixed in the world.
+//! Water that moves over ground with `u`, fixed in the world.
 //!
 //! `f = D(v - w) - D(v)` on each wet panel, `w = R^T u`, with the drag of the model itself, `D(v) = -K |v| v`, `K` from
 //! what the model answers in the state ([`Input::own_drag`]). Exact for a uniform flow and a quadratic law. Written as `K |v - w0| w + K v ((2 v - w0) . w) / (|v - w0| + |v|)`, which is linear in

@@ -1,4 +1,4 @@
-//! E16, the water is denser than was said: `W = e W_model`, since every load of the model is linear in density.
+//! The water is denser than stated: `W = e W_model`, since every load of the model is linear in density.
 //!
 //! Muddy flood water reaches 1.1 of fresh water (FEMA P-646), mud flows 1.9.
 

@@ -1,4 +1,4 @@
-//! E2, another coefficient of the quadratic drag.
+//! Another coefficient of the quadratic drag.
 //!
 //! `f_i = -1/2 rho C_i A_i |v| v_i` on each wet panel, `A_i` the area that meets the flow. `C` is the difference to the
 //! drag that the model has already, so it may be negative. Bluff bodies lie between 0.3 and 2.1 (Qi, Eames, Johnson, JFM

@@ -1,4 +1,4 @@
-//! E2, form drag: pressure on the windward wet faces and the wake behind them.
+//! Form drag: pressure on the windward wet faces and the wake behind them.
 //!
 //! `F_s = -1/2 rho Cd0 w_s A_s |v| v` with `A_s = sum over wet faces of max(n . v_hat, 0) dA`.
 //!
@@ -10,7 +10,7 @@
 //! The sheltering weight `w_s` is ours and no law: a surface at the front meets the full stream, one at the rear the
 //! wake of what is before it. `w = (1 + s xi) / 2` with `xi` in -1..1, the centroid's place along the motion between
 //! the rear and the front end of the hull. `s = 1/2` was set to one CFD trial of our own, a Warthog-like body at 2 m/s
-//! in 0.203 m of fresh water: 126.5 N on a front wheel and 63.3 N on a rear one, where this with E8 gives 119.5 and
+//! in 0.203 m of fresh water: 126.5 N on a front wheel and 63.3 N on a rear one, where this with skin friction gives 119.5 and
 //! 65.2 N.
 
 use crate::condition::Condition;

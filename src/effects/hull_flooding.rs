@@ -1,4 +1,4 @@
-//! E15, water runs into the hull, and the buoyancy of what it fills is lost.
+//! Water runs into the hull, and the buoyancy of what it fills is lost.
 //!
 //! `W = -phi rho g V h_in / h_out` upwards: a share `phi` of the displaced volume fills to the level `h_in`, which follows
 //! the level outside through an orifice, `dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)` (Torricelli), with

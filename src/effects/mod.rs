@@ -4,7 +4,7 @@
 //! its share onto the force of every surface. The others are the library of [`Effect`]: what a model may lack, or what a
 //! measuring chain may add. A physical effect is linear in its coefficients once its shape (a time constant, a rate) is
 //! fixed, so the same function serves two ends: fitting takes the load of each coefficient at 1, serving the sum with the
-//! fitted values. Nothing here allocates once a [`Body`] is prepared. Hydrostatics (E1) lies in `geometry::hydrostatics`.
+//! fitted values. Nothing here allocates once a [`Body`] is prepared. Hydrostatics lies in `geometry::hydrostatics`.
 //!
 //! Reading order: `library` (names, coefficients, bounds), `body` (what an effect needs to know of a hull), `immersion`
 //! (where the water reaches), `input` (a state), then the effects. `file` is `effects.toml`, `validity` the box in which they

@@ -1,4 +1,4 @@
-//! E8, skin friction: the drag of the water that slides along the wet area.
+//! Skin friction: the drag of the water that slides along the wet area.
 //!
 //! `dF = -1/2 rho Cf |v_t| v_t dA` with the tangential velocity `v_t = v - (v . n) n` and
 //! `Cf = 0.075 / (log10 Re - 2)^2`, `Re = rho |v| L / mu`, `L` the length of the vehicle.

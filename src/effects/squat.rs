@@ -1,4 +1,4 @@
-//! E9, the hull is drawn down by its own speed.
+//! The hull sinks with its own speed.
 //!
 //! `Fz = -c rho g A_wp s` with the depression `s` of the water beside and under the hull, where it flows faster. A second
 //! coefficient trims. Three laws:

@@ -1,10 +1,10 @@
-//! E7, the blow of entering the water: momentum of the water that starts to move with the hull.
+//! Impact on entering the water: momentum of the water that starts to move with the hull.
 //!
 //! `F = C w^2 dM/dd` upwards and `-C u w dM/dd` across, on entry only, with the rate `w` at which the water rises there and the
 //! water `M(d)` that moves with the hull. The shape is 0 for `M = rho V`, the water displaced; else it is the depth `h` at
 //! which the bottom is wet from side to side, and `M = rho pi c^2 / 2` on each meter of the length (von Karman) with the half
 //! beam `c = (B / 2) min(d / h, 1)` of a wedge, in strips: one that pitches or runs down a ramp gets wet from an end, each
-//! strip at a depth and a rate of its own. Wagner's splash makes `h` smaller by pi/2 (M); above about 30 degrees of deadrise
+//! strip at a depth and a rate of its own. Wagner's splash makes `h` smaller by pi/2; above about 30 degrees of deadrise
 //! theory fails (Constantinescu 2008).
 
 use std::f64::consts::PI;

@@ -1,4 +1,4 @@
-//! E16, the water stands higher than was said.
+//! The water level is higher than stated.
 //!
 //! `W = dF/dd` per meter: `rho g A_wp` upwards at the center of the waterplane (Archimedes), and the model's drag in
 //! proportion to the wet part of each panel, whose area is taken as even over its height. Exact to first order in the

@@ -1,4 +1,4 @@
-//! E12, waves that the hull has made before and that still push it.
+//! Waves that the hull has made before and that still push it.
 //!
 //! Cummins (1962) has the radiation force as a convolution of past motion. Over the acceleration it is
 //! `F = -int K(s) a(t - s) ds` with a `K` that dies out, since steady motion makes no such force. Two kernels of one complex

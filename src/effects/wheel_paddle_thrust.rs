@@ -1,10 +1,10 @@
-//! E13, turning wheels throw water backwards.
+//! Rotating wheels push water backward.
 //!
 //! Two laws. `F = 1/2 rho C A |omega r| (omega r - v_x)` forwards on each wheel with the wet part `A` of its disc: momentum of
 //! the water that is carried along, in proportion to the slip. Or lugs, plates across the rim: one at the angle `phi` from
 //! the foot of the wheel meets the water with `u = omega r - v_x cos(phi)`, so that
 //! `F = 1/2 rho C r^2 int |u| u cos(phi) dphi` over the wet arc, which is not zero where the wheel rolls. C is of the order
-//! of 1 (M). The thrust acts at the hub; a second coefficient has the torque of the lugs, `-1/2 rho C r^3 int |u| u dphi`.
+//! of 1. The thrust acts at the hub; a second coefficient has the torque of the lugs, `-1/2 rho C r^3 int |u| u dphi`.
 //! The shape is 0 for the disc and 1 for the lugs.
 
 use super::input::{Input, Part};

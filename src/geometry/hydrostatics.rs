@@ -1,4 +1,4 @@
-//! Hydrostatic pressure integrated exactly over the wet part of a hull (effect E1).
+//! Hydrostatic pressure integrated exactly over the wet part of a hull.
 
 use super::immersion::{WetTriangle, depth_moments, wet_triangles};
 use super::mesh::Mesh;

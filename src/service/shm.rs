@@ -332,7 +332,7 @@ impl ShmServer {
         // the name is free when the service before is closed
         self.told = Told::default();
         let service = shm_served::tell(&self.node, &self.names, &vehicles).inspect_err(|error| {
-            tracing::warn!(%error, "clients are not told which vehicles there are; is another server in this namespace?");
+            tracing::warn!(%error, "clients cannot look up the vehicles; is another server in this namespace?");
         });
         self.told = Told { vehicles, _service: service.ok() };
     }

@@ -73,8 +73,17 @@ impl Steps {
     }
 
     fn page(&self) -> Result<String, WriteError> {
-        let heads =
-            ["asked for [Hz]", "answered [Hz]", "p50", "p95", "p99", "p99.9", "max", "failed", "held"];
+        let heads = [
+            "requested [Hz]",
+            "answered [Hz]",
+            "p50",
+            "p95",
+            "p99",
+            "p99.9",
+            "max",
+            "failed",
+            "objectives met",
+        ];
         let row = |step: &Step| {
             let Percentiles { p50, p95, p99, p99_9, max } = step.response_time_us;
             let mut cells = vec![format!("{:.0}", step.target_rate_hz), format!("{:.0}", step.rate_hz)];
@@ -91,7 +100,7 @@ impl Steps {
                 .collect(),
         };
         let lines = [line("p50", |p| p.p50), line("p95", |p| p.p95), line("p99", |p| p.p99)];
-        let figure = curves("requests a second asked for", "response time [us]", &lines)?;
+        let figure = curves("requested rate [Hz]", "response time [us]", &lines)?;
         let reasons = self.steps.iter().flat_map(|step| {
             let at = step.target_rate_hz;
             step.reasons

@@ -51,7 +51,7 @@ async function ask() {
     show(body);
   } catch (error) {
     const later = !error.refused || error.code === 429 || error.code === 503;
-    trouble(error.refused ? error.message : "The server does not answer. What is shown is its last answer; asking again.");
+    trouble(error.refused ? error.message : "The server does not answer. The page shows its last answer and retries.");
     if (later) setTimeout(ask, RETRY_AFTER_MS);
   } finally {
     asking = false;
