@@ -49,6 +49,7 @@ impl Served {
         config.grpc.unix_socket = folder.path().join("wade.sock");
         config.http.listen = "127.0.0.1:0".into();
         config.shm.wait = wait;
+        config.shm.program = env!("CARGO_BIN_EXE_wade").into();
         config.shm.namespace = format!("bench-{}-{wait:?}", std::process::id());
         Self { running: server::start(&config).expect("the server starts"), config, _folder: folder }
     }

@@ -118,6 +118,8 @@ struct Accounts {
     last_window: Histogram<u64>,
     /// Empty, to take the place of `current`.
     spare: Histogram<u64>,
+    /// States outside the training domain that were drained.
+    outside_drained: u64,
 }
 
 impl Recorder {
@@ -129,6 +131,7 @@ impl Recorder {
             window: histogram(),
             last_window: histogram(),
             spare: histogram(),
+            outside_drained: 0,
         };
         Self { current: Mutex::new(histogram()), accounts: Mutex::new(accounts), buckets, out_of_domain }
     }
@@ -155,6 +158,28 @@ impl Recorder {
         }
         accounts.spare.reset();
         guard
+    }
+
+    /// Takes out what has come since the last call: times [ns] with how many there were of each, and states outside the
+    /// training domain. For a process that reports to another, which alone looks at latencies.
+    pub fn drain(&self) -> (Vec<(u64, u64)>, u64) {
+        let mut guard = self.collect();
+        let accounts = &mut *guard;
+        let times = accounts.window.iter_recorded().map(|at| (at.value_iterated_to(), at.count_at_value()));
+        let times = times.collect();
+        accounts.window.reset();
+        let outside = self.out_of_domain.get();
+        (times, outside - std::mem::replace(&mut accounts.outside_drained, outside))
+    }
+
+    /// Records what another process has [drained](Self::drain).
+    pub fn record_all(&self, times: &[(u64, u64)], out_of_domain: u64) {
+        for &(ns, count) in times {
+            lock(&self.current).saturating_record_n(ns, count);
+            let seconds = Duration::from_nanos(ns).as_secs_f64();
+            (0..count).for_each(|_| self.buckets.observe(seconds));
+        }
+        self.out_of_domain.inc_by(out_of_domain);
     }
 
     fn rotate(&self) {
@@ -221,6 +246,7 @@ pub struct Metrics {
     bundle_version: Family<VehicleLabels, Gauge>,
     reloads: Family<ReloadLabels, Counter>,
     transport_up: Family<UpLabels, Gauge>,
+    shm_restarts: Counter,
 }
 
 impl Default for Metrics {
@@ -258,6 +284,12 @@ impl Metrics {
             Family::clone(&bundle_version),
         );
         registry.register("reloads", "Bundles read from disk while serving", Family::clone(&reloads));
+        let shm_restarts = Counter::default();
+        registry.register(
+            "shared_memory_restarts",
+            "Processes of shared memory that ended while they should serve",
+            shm_restarts.clone(),
+        );
         let transport_up = Family::default();
         registry.register(
             "transport_up",
@@ -273,6 +305,7 @@ impl Metrics {
             bundle_version,
             reloads,
             transport_up,
+            shm_restarts,
         }
     }
 
@@ -292,6 +325,21 @@ impl Metrics {
             .entry(labels.vehicle)
             .or_insert_with(|| Arc::new(Recorder::new(buckets, out_of_domain)));
         Arc::clone(recorder)
+    }
+
+    /// The recorders of a transport by vehicle.
+    pub fn recorders(&self, transport: Transport) -> BTreeMap<String, Arc<Recorder>> {
+        self.recorders[transport as usize].read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// How many requests were not answered.
+    pub fn refused(&self, transport: Transport, reason: &'static str) -> u64 {
+        self.refusals.get_or_create(&RefusalLabels { transport, reason }).get()
+    }
+
+    /// Counts a process of shared memory that ended while it should serve.
+    pub fn count_shm_restart(&self) {
+        self.shm_restarts.inc();
     }
 
     /// Counts a request that was not answered.

@@ -1,5 +1,12 @@
 //! The server as a whole: started, ready, drained.
 
+mod shm_host;
+mod shm_link;
+mod shm_worker;
+mod watchdog;
+
+pub use shm_worker::Worker;
+
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -10,6 +17,9 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
 
+use shm_host::{Host, Keeper};
+use watchdog::Watchdog;
+
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::metrics::Metrics;
@@ -18,8 +28,6 @@ use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
 use crate::service::health::{Health, Part, State};
 use crate::service::http::{self, HttpError};
-use crate::service::shm::ShmServer;
-use crate::service::shm_remains;
 
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -38,15 +46,9 @@ pub enum StartError {
     Thread(#[from] std::io::Error),
 }
 
-/// Longest wait at the start for shared memory, which is served as soon as it can be.
-const SHM_PATIENCE: Duration = Duration::from_millis(500);
-
-/// Pause before shared memory is opened again: the first, and the longest after it was doubled at each failure.
-const FIRST_SHM_PAUSE: Duration = Duration::from_millis(250);
-const LAST_SHM_PAUSE: Duration = Duration::from_secs(30);
-
-/// How often a pause looks whether the server is to stop.
-const LOOK: Duration = Duration::from_millis(50);
+/// Longest wait at the start for shared memory, so that a client that waits until the server is ready finds it too. Where it
+/// takes longer, the server is ready without it.
+const SHM_PATIENCE: Duration = Duration::from_millis(700);
 
 /// A server that runs on threads of its own. Dropping it stops it.
 #[derive(Debug)]
@@ -60,7 +62,7 @@ pub struct Running {
     stop: watch::Sender<bool>,
     /// Probes are answered until everything else has ended.
     stop_http: watch::Sender<bool>,
-    stop_shm: Arc<AtomicBool>,
+    shm: Option<Host>,
     runtime: Runtime,
     threads: Vec<JoinHandle<()>>,
     housekeeping: Option<JoinHandle<()>>,
@@ -92,7 +94,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         grpc: Arc::new(runtime.block_on(grpc::Server::new(config.grpc.clone(), shared.clone()))),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         health: Arc::clone(&health),
-        stop_shm: Arc::new(AtomicBool::new(false)),
+        shm: None,
         drain: Duration::from_secs_f64(config.drain_s),
         threads: Vec::new(),
         housekeeping: None,
@@ -125,8 +127,9 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     if config.shm.enabled {
         running.spawn_shm(config, engine)?;
     }
-    running.runtime.block_on(running.grpc.set_serving());
-    running.health.set_serving(true);
+    health.set_serving(true);
+    running.runtime.block_on(running.grpc.set_health(&health));
+    running.spawn_watchdog(stopped)?;
     Ok(running)
 }
 
@@ -173,10 +176,12 @@ impl Running {
     fn stop_all(&mut self) {
         let start = Instant::now();
         self.health.set_serving(false);
-        self.runtime.block_on(self.grpc.set_not_serving());
+        self.runtime.block_on(self.grpc.set_health(&self.health));
         self.runtime.block_on(self.grpc.end_health_watches());
-        self.stop_shm.store(true, Ordering::Relaxed);
         self.stop.send_replace(true);
+        if let Some(shm) = &self.shm {
+            shm.stop();
+        }
         for thread in self.threads.drain(..) {
             if thread.join().is_err() {
                 tracing::error!("a server thread panicked");
@@ -246,40 +251,37 @@ impl Running {
         Ok(())
     }
 
-    /// Opens shared memory on a thread of its own and waits a moment for it; where it cannot be opened, everything else is
-    /// served and the thread tries again.
+    /// Keeps the process that serves shared memory, and waits a moment for it.
     fn spawn_shm(&mut self, config: &Config, engine: Arc<Engine>) -> Result<(), StartError> {
-        let (settings, metrics) = (config.shm.clone(), Arc::clone(&self.metrics));
-        let (stop, health) = (Arc::clone(&self.stop_shm), Arc::clone(&self.health));
-        health.set(Part::Shm, State::Starting);
-        let thread = self.spawn("wade-shm", move || {
-            let mut pause = FIRST_SHM_PAUSE;
-            while !stop.load(Ordering::Relaxed) {
-                match ShmServer::new(settings.clone(), Arc::clone(&engine), Arc::clone(&metrics)) {
-                    Ok(server) => {
-                        health.set(Part::Shm, State::Ok);
-                        server.run(&stop);
-                    }
-                    Err(error) => {
-                        health.set(Part::Shm, State::Unavailable(error.to_string()));
-                        let end = Instant::now() + pause;
-                        while Instant::now() < end && !stop.load(Ordering::Relaxed) {
-                            std::thread::sleep(LOOK);
-                        }
-                        pause = (2 * pause).min(LAST_SHM_PAUSE);
-                    }
-                }
-            }
-        })?;
+        let (metrics, health) = (Arc::clone(&self.metrics), Arc::clone(&self.health));
+        let (keeper, host) = Keeper::new(config, engine, metrics, health);
+        self.health.set(Part::Shm, State::Starting);
+        let thread = self.spawn("wade-shm", move || keeper.run())?;
         self.threads.push(thread);
+        let follower = host.clone();
+        self.reloader.follow(move |vehicle| follower.change(vehicle));
+        self.shm = Some(host);
         let end = Instant::now() + SHM_PATIENCE;
         while self.health.state(Part::Shm) == State::Starting && Instant::now() < end {
             std::thread::sleep(Duration::from_millis(1));
         }
-        // nothing depends on it, and it may take minutes: it is not waited for at the end either
-        let stop = Arc::clone(&self.stop_shm);
-        let clearing = std::thread::Builder::new().name("wade-shm-remains".into());
-        clearing.spawn(move || shm_remains::clear(&stop))?;
+        Ok(())
+    }
+
+    fn spawn_watchdog(&mut self, stop: watch::Receiver<bool>) -> Result<(), StartError> {
+        let watchdog = Watchdog {
+            health: Arc::clone(&self.health),
+            grpc: Arc::clone(&self.grpc),
+            tcp: self.grpc_address(),
+            unix: self.unix_path().map(Path::to_owned),
+            http: self.http_address,
+        };
+        let runtime = runtime()?;
+        let thread = self.spawn("wade-watchdog", move || {
+            runtime.block_on(watchdog.run(stop));
+            runtime.shutdown_background();
+        })?;
+        self.threads.push(thread);
         Ok(())
     }
 

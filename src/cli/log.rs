@@ -46,17 +46,17 @@ pub fn ready(config: &Config, running: &Running, elapsed: Duration) {
         tracing::info!(address = %format!("unix:{}", path.display()), "gRPC");
     }
     match running.health().state(Part::Shm) {
-        State::Ok => tracing::info!(
+        State::Off => tracing::info!("shared memory: off"),
+        state => tracing::info!(
             address = %format!("shm:{}", config.shm.namespace),
             wait = if config.shm.wait == Wait::Spin { "spin" } else { "block" },
-            "shared memory"
+            "shared memory: {state}"
         ),
-        state => tracing::info!("shared memory: {state}"),
     }
     if let Some(address) = running.http_address() {
         tracing::info!("page at http://{address}/");
     }
-    tracing::info!("ready in {} ms", elapsed.as_millis());
+    tracing::info!("serving, ready in {} ms", elapsed.as_millis());
 }
 
 /// A path as whoever reads the log elsewhere needs it.

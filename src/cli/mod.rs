@@ -69,6 +69,9 @@ enum Command {
     Doctor(doctor::Doctor),
     Completions(shell::Completions),
     Man(shell::Man),
+    /// Serve shared memory for a server, which starts this by itself
+    #[command(hide = true)]
+    ServeShm,
 }
 
 impl Cli {
@@ -89,6 +92,7 @@ impl Cli {
             Command::Doctor(command) => command.run(),
             Command::Completions(command) => command.run(),
             Command::Man(command) => command.run(),
+            Command::ServeShm => serve::serve_shm(),
         }
     }
 }

@@ -79,6 +79,7 @@ impl Serve {
         config.validate()?;
         log::start(&config.log)?;
         log::starting(&config, file.as_deref());
+        raise_descriptors();
         cores::pin_to(&config.cpus).context("cpus")?;
         // before anything is served, so that no signal meets a server that does not expect it
         let mut signals = Signals::new()?;
@@ -110,6 +111,31 @@ impl Serve {
         Ok(config)
     }
 }
+
+/// Serves shared memory for the server that started this process.
+pub fn serve_shm() -> Result<ExitCode> {
+    let worker = server::Worker::read().context("this command is for `wade serve`")?;
+    let mut log = worker.config().log.clone();
+    // the server has said already what it loaded
+    log.filter += ",wade::service::admin=warn";
+    log::start(&log)?;
+    worker.run()
+}
+
+/// Raises the limit of open descriptors to what this user may have: each client of shared memory and each connection
+/// takes some.
+fn raise_descriptors() {
+    use nix::sys::resource::{Resource, getrlimit, setrlimit};
+    let raised = getrlimit(Resource::RLIMIT_NOFILE).and_then(|(soft, hard)| {
+        setrlimit(Resource::RLIMIT_NOFILE, hard.min(MAX_DESCRIPTORS).max(soft), hard)
+    });
+    if let Err(error) = raised {
+        tracing::warn!(%error, "the limit of open file descriptors stays as it is");
+    }
+}
+
+/// More descriptors than any server here needs; where the system allows a billion, nobody wants to walk through them.
+const MAX_DESCRIPTORS: u64 = 1 << 20;
 
 /// The parser of paths refuses the empty string, which here means none.
 fn path_or_nothing(text: &str) -> Result<PathBuf, std::convert::Infallible> {

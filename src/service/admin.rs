@@ -1,7 +1,7 @@
 //! Reading bundles from disk: at the start, and again when an administrator asks.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::bundle::{self, BundleError, Fault};
 use crate::engine::{Engine, UnknownVehicle};
@@ -45,7 +45,6 @@ pub struct Reload {
 }
 
 /// Knows where the bundles are.
-#[derive(Debug)]
 pub struct Reloader {
     directory: PathBuf,
     isa: Isa,
@@ -53,12 +52,24 @@ pub struct Reloader {
     metrics: Arc<Metrics>,
     /// Two reloads at once could put the older bundle last.
     one_at_a_time: Mutex<()>,
+    /// Hears of each vehicle that was loaded or unloaded.
+    follower: OnceLock<Follower>,
+}
+
+/// What [`Reloader::follow`] takes.
+type Follower = Box<dyn Fn(&str) + Send + Sync>;
+
+impl std::fmt::Debug for Reloader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Reloader").field("directory", &self.directory).finish_non_exhaustive()
+    }
 }
 
 impl Reloader {
     /// Reads bundles of this folder into this engine.
     pub fn new(directory: PathBuf, isa: Isa, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Self {
-        Self { directory, isa, engine, metrics, one_at_a_time: Mutex::new(()) }
+        let (one_at_a_time, follower) = (Mutex::new(()), OnceLock::new());
+        Self { directory, isa, engine, metrics, one_at_a_time, follower }
     }
 
     /// Reads every bundle of the folder; one that is not sound stops the start, one without weights is left out.
@@ -122,7 +133,20 @@ impl Reloader {
         self.engine.remove(vehicle)?;
         self.metrics.forget_bundle_version(vehicle);
         tracing::info!(vehicle, "bundle unloaded");
+        self.pass_on(vehicle);
         Ok(())
+    }
+
+    /// Calls this with the name of each vehicle that is loaded or unloaded from now on, before the reload returns. There is one
+    /// follower; a second call changes nothing.
+    pub fn follow(&self, follower: impl Fn(&str) + Send + Sync + 'static) {
+        let _ = self.follower.set(Box::new(follower));
+    }
+
+    fn pass_on(&self, vehicle: &str) {
+        if let Some(follower) = self.follower.get() {
+            follower(vehicle);
+        }
     }
 
     /// The vehicles that are served and those in the folder.
@@ -142,6 +166,7 @@ impl Reloader {
                 announce(&served, &self.metrics);
                 let served_version = served.model().version();
                 self.engine.swap(served);
+                self.pass_on(&vehicle);
                 Reload { vehicle, served_version, refusal: None, elsewhere: false }
             }
             Err(refusal) => {

@@ -29,6 +29,7 @@ use tower::layer::util::{Identity, Stack};
 use tower::util::MapResponseLayer;
 
 use super::admin::Reloader;
+use super::health::{Health, Part, State};
 use super::proto::admin_server::AdminServer;
 use super::proto::hydrodynamics_server::HydrodynamicsServer;
 use super::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
@@ -186,6 +187,9 @@ fn bind_unix(path: &Path) -> Result<UnixListener, GrpcError> {
 /// What a health check may ask about: the server as a whole, and its services.
 const HEALTH_NAMES: [&str; 3] = ["", "wade.v1.Hydrodynamics", "inference.GRPCInferenceService"];
 
+/// What a health check may ask about of shared memory.
+const HEALTH_OF_SHARED_MEMORY: &str = "wade.SharedMemory";
+
 /// What the handlers share.
 #[derive(Debug, Clone)]
 pub struct Shared {
@@ -199,7 +203,7 @@ pub struct Shared {
     pub window_s: f64,
 }
 
-/// A server that is bound and whose limits are set: health says NOT_SERVING until [`Server::set_serving`].
+/// A server that is bound and whose limits are set: health says NOT_SERVING until [`Server::set_health`].
 #[derive(Debug)]
 pub struct Server {
     config: Config,
@@ -219,8 +223,10 @@ impl Server {
             shared,
             health: HealthReporter::new(),
         };
-        // the crate registers the empty name as SERVING
-        server.set_health(tonic_health::ServingStatus::NotServing).await;
+        // the crate registers the empty name as SERVING, and nothing is served yet
+        for service in HEALTH_NAMES {
+            server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
+        }
         server
     }
 
@@ -229,26 +235,22 @@ impl Server {
         &self.requests
     }
 
-    /// Says SERVING to those who ask for our health.
-    pub async fn set_serving(&self) {
-        self.set_health(tonic_health::ServingStatus::Serving).await;
-    }
-
-    /// Says NOT_SERVING to those who ask for our health.
-    pub async fn set_not_serving(&self) {
-        self.set_health(tonic_health::ServingStatus::NotServing).await;
+    /// Says SERVING of what answers, and of the server as a whole where it is ready.
+    pub async fn set_health(&self, health: &Health) {
+        let status = |up| {
+            if up { tonic_health::ServingStatus::Serving } else { tonic_health::ServingStatus::NotServing }
+        };
+        for service in HEALTH_NAMES {
+            self.health.set_service_status(service, status(health.is_ready())).await;
+        }
+        let shared_memory = health.is_serving() && health.state(Part::Shm) == State::Ok;
+        self.health.set_service_status(HEALTH_OF_SHARED_MEMORY, status(shared_memory)).await;
     }
 
     /// Ends the streams of those who watch our health, once they have heard the last of it: a drain would wait for them.
     pub async fn end_health_watches(&self) {
-        for service in HEALTH_NAMES {
+        for service in HEALTH_NAMES.into_iter().chain([HEALTH_OF_SHARED_MEMORY]) {
             self.health.clone().clear_service_status(service).await;
-        }
-    }
-
-    async fn set_health(&self, status: tonic_health::ServingStatus) {
-        for service in HEALTH_NAMES {
-            self.health.set_service_status(service, status).await;
         }
     }
 

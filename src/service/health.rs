@@ -145,6 +145,11 @@ impl Health {
         self.parts().is_ready(&self.required)
     }
 
+    /// Whether vehicles are served at all.
+    pub fn is_serving(&self) -> bool {
+        self.parts().serving
+    }
+
     /// Everything at one moment.
     pub fn report(&self) -> Report {
         let parts = self.parts();

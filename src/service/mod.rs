@@ -10,7 +10,10 @@ mod sessions;
 pub mod shm;
 mod shm_convert;
 pub mod shm_layout;
+pub(crate) mod shm_owner;
+pub(crate) mod shm_probe;
 pub(crate) mod shm_remains;
+pub(crate) mod shm_room;
 pub(crate) mod shm_served;
 pub mod wire;
 

@@ -4,8 +4,9 @@
 
 use std::collections::HashMap;
 use std::mem::MaybeUninit;
-use std::sync::Arc;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use iceoryx2::active_request::ActiveRequest;
@@ -14,7 +15,9 @@ use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::{ListenerKey, Notifier};
 use iceoryx2::port::server::Server;
-use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, SignalHandlingMode, ZeroCopySend, ipc};
+use iceoryx2::prelude::{
+    BackpressureStrategy, CallbackProgression, MessagingPattern, SignalHandlingMode, ZeroCopySend, ipc,
+};
 use iceoryx2::request_mut::RequestMut;
 use iceoryx2::request_mut_uninit::RequestMutUninit;
 use iceoryx2::service::Service;
@@ -25,8 +28,10 @@ use super::sessions::{CAPACITY, Sessions};
 use super::shm_layout::{
     Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
 };
+use super::shm_probe::Own;
+use super::shm_remains::{self, Remains, ServiceFiles};
 use super::wire::{InvalidState, Refusal};
-use super::{Evaluator, nanoseconds_since, shm_remains, shm_served};
+use super::{Evaluator, nanoseconds_since, shm_served};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
 use crate::served::ServedVehicle;
@@ -54,11 +59,20 @@ pub struct Config {
     pub max_clients: usize,
     /// First part of the services' names; servers beside each other need one each.
     pub namespace: String,
+    /// The program whose command `serve-shm` serves it: this one.
+    #[serde(skip, default = "this_program")]
+    pub program: PathBuf,
+}
+
+/// The running program, also where its file has been replaced.
+fn this_program() -> PathBuf {
+    "/proc/self/exe".into()
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { enabled: true, wait: Wait::Block, max_clients: 16, namespace: NAMESPACE.into() }
+        let (namespace, program) = (NAMESPACE.into(), this_program());
+        Self { enabled: true, wait: Wait::Block, max_clients: 16, namespace, program }
     }
 }
 
@@ -122,9 +136,10 @@ where
     let service = name.try_into().map_err(|error| ShmError::new(name)(&error))?;
     node.service_builder(&service)
         .request_response::<Q, A>()
-        .max_clients(max_clients)
+        // one more for the server's own client
+        .max_clients(max_clients + 1)
         .max_servers(1)
-        .max_nodes(max_clients + 4)
+        .max_nodes(max_clients + 5)
         .max_active_requests_per_client(2)
         .max_loaned_requests(1)
         .max_response_buffer_size(1)
@@ -178,10 +193,50 @@ pub(crate) fn events<S: Service>(node: &Node<S>, name: &str) -> Result<event::Po
     let builder = node
         .service_builder(&service)
         .event()
-        .max_listeners(MAX_CLIENTS)
-        .max_notifiers(MAX_CLIENTS)
+        .max_listeners(MAX_CLIENTS + 1)
+        .max_notifiers(MAX_CLIENTS + 1)
         .max_nodes(96);
     builder.open_or_create().map_err(|error| ShmError::new(name)(&error))
+}
+
+/// As [`events`], for the owner of the namespace: a service that cannot be opened is replaced.
+fn own_events(node: &Node<ipc::Service>, name: &str) -> Result<event::PortFactory<ipc::Service>, ShmError> {
+    events(node, name).or_else(|error| {
+        replacing(name, &error);
+        shm_remains::remove(name, MessagingPattern::Event);
+        events(node, name)
+    })
+}
+
+/// As [`exchange`], for the owner of the namespace: a service that cannot be opened is replaced.
+fn own_exchange<Q, A>(
+    node: &Node<ipc::Service>,
+    name: &str,
+    max_clients: usize,
+) -> Result<Exchange<ipc::Service, Q, A>, ShmError>
+where
+    Q: ZeroCopySend + std::fmt::Debug + 'static,
+    A: ZeroCopySend + std::fmt::Debug + 'static,
+{
+    exchange(node, name, max_clients).or_else(|error| {
+        replacing(name, &error);
+        shm_remains::remove(name, MessagingPattern::RequestResponse);
+        exchange(node, name, max_clients)
+    })
+}
+
+fn replacing(name: &str, error: &ShmError) {
+    tracing::info!(name, %error, "a service that cannot be opened is replaced");
+}
+
+/// What a server needs beside its settings and its vehicles.
+pub(crate) struct Opening {
+    /// Where requests are counted.
+    pub metrics: Arc<Metrics>,
+    /// What is known of the processes before this one.
+    pub remains: Remains,
+    /// Whose requests are not counted.
+    pub own: Own,
 }
 
 type Request<Q, A> = ActiveRequest<ipc::Service, Q, (), A, ()>;
@@ -215,6 +270,7 @@ pub struct ShmServer {
     wake: Listener<ipc::Service>,
     told: Told,
     desk: Desk,
+    files: ServiceFiles,
 }
 
 /// What clients are told of this server.
@@ -236,15 +292,21 @@ struct Desk {
     done: Notifier<ipc::Service>,
     /// Listeners of the clients that sleep, by wake key.
     sleepers: HashMap<u64, ListenerKey>,
+    own: Own,
 }
 
 impl ShmServer {
-    /// Opens the services of every vehicle that is served.
-    pub fn new(config: Config, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Result<Self, ShmError> {
-        let node = node()?;
+    /// Opens the services of every vehicle that is served, for the owner of the namespace.
+    pub(crate) fn new(config: Config, engine: Arc<Engine>, opening: Opening) -> Result<Self, ShmError> {
+        let Opening { metrics, remains, own } = opening;
         let names = Names::new(&config.namespace);
-        let wake = events(&node, &names.wake())?.listener_builder().create();
-        let done = events(&node, &names.done())?.notifier_builder().create();
+        shm_remains::prepare(&names, engine.vehicles().keys(), &remains);
+        let node = node().or_else(|_| {
+            shm_remains::remove_node_counter();
+            node()
+        })?;
+        let wake = own_events(&node, &names.wake())?.listener_builder().create();
+        let done = own_events(&node, &names.done())?.notifier_builder().create();
         let desk = Desk {
             engine,
             metrics,
@@ -253,14 +315,25 @@ impl ShmServer {
             flags: if config.wait == Wait::Spin { SERVER_POLLS } else { 0 },
             done: done.map_err(|error| ShmError::new("the notifier")(&error))?,
             sleepers: HashMap::new(),
+            own,
         };
         let wake = wake.map_err(|error| ShmError::new("the listener")(&error))?;
-        let mut server = Self { config, names, node, doors: Vec::new(), wake, told: Told::default(), desk };
+        let files = ServiceFiles::default();
+        for name in [names.wake(), names.done()] {
+            files.add(&name, MessagingPattern::Event);
+        }
+        let told = Told::default();
+        let mut server = Self { config, names, node, doors: Vec::new(), wake, told, desk, files };
         for vehicle in server.without_door() {
             server.open_door(vehicle)?;
         }
         server.tell();
         Ok(server)
+    }
+
+    /// The files of its services.
+    pub(crate) fn files(&self) -> ServiceFiles {
+        self.files.clone()
     }
 
     /// Vehicles that are served and have no ports yet.
@@ -272,9 +345,12 @@ impl ShmServer {
 
     fn open_door(&mut self, vehicle: String) -> Result<(), ShmError> {
         let clients = self.config.max_clients;
-        let single = exchange::<Query, Answer>(&self.node, &self.names.evaluate(&vehicle), clients)?;
-        let batch =
-            exchange::<BatchQuery, BatchAnswer>(&self.node, &self.names.evaluate_batch(&vehicle), clients)?;
+        let names = [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)];
+        let single = own_exchange::<Query, Answer>(&self.node, &names[0], clients)?;
+        let batch = own_exchange::<BatchQuery, BatchAnswer>(&self.node, &names[1], clients)?;
+        for name in &names {
+            self.files.add(name, MessagingPattern::RequestResponse);
+        }
         // an answer that a client does not take is dropped: no client can hold up the others
         let discard = BackpressureStrategy::DiscardData;
         let port = |error: &dyn std::fmt::Display| ShmError::new(format!("a server for {vehicle}"))(error);
@@ -331,8 +407,14 @@ impl ShmServer {
         let vehicles: Vec<String> = vehicles.keys().cloned().collect();
         // the name is free when the service before is closed
         self.told = Told::default();
-        let service = shm_served::tell(&self.node, &self.names, &vehicles).inspect_err(|error| {
-            tracing::warn!(%error, "clients cannot look up the vehicles; is another server in this namespace?");
+        let tell = || shm_served::tell(&self.node, &self.names, &vehicles);
+        let told = tell().or_else(|error| {
+            replacing(&self.names.served(), &error);
+            shm_remains::remove(&self.names.served(), MessagingPattern::Event);
+            tell()
+        });
+        let service = told.inspect_err(|error| {
+            tracing::warn!(%error, "clients cannot look up the vehicles");
         });
         self.told = Told { vehicles, _service: service.ok() };
     }
@@ -431,10 +513,16 @@ impl Desk {
             wake(&self.done, &mut self.sleepers, query.wake_key);
         }
         match outcome {
+            Ok(()) if self.is_own(request.origin()) => {}
             Ok(()) => recorder.record(arrived.elapsed(), is_outside.into()),
             Err(invalid) => self.metrics.refuse(Transport::shm, Refusal::from(invalid).reason()),
         }
         tracing::debug!(target: "wade::request", transport = "shm", vehicle = at.vehicle.model().vehicle().name, status);
+    }
+
+    /// Whether the server's own client asks.
+    fn is_own(&self, client: UniqueClientId) -> bool {
+        *self.own.lock().unwrap_or_else(PoisonError::into_inner) == Some(client)
     }
 
     fn answer_batch(

@@ -1,11 +1,24 @@
-//! What servers and clients left in shared memory that were killed. Clearing it away waits half a second for each file of
-//! theirs that is damaged, minutes where a machine lost power again and again, so nobody's start waits for it.
+//! What servers and clients left in shared memory that were killed.
+//!
+//! What lies under the names of one namespace is put right before its services are opened, by the server that owns the
+//! namespace: iceoryx2 waits for whoever began a service to finish it, for ever where that process is dead. The rest of the
+//! machine is cleared beside the serving: iceoryx2 waits half a second for each damaged file, minutes where a machine lost
+//! power again and again, so nobody's start waits for it.
 
+use std::fs;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeState};
-use iceoryx2::prelude::{CallbackProgression, ipc};
+use iceoryx2::prelude::{CallbackProgression, MessagingPattern, ServiceName, ipc};
+use iceoryx2::service::Service;
+use iceoryx2::service::service_hash::ServiceHash;
+
+use super::shm_layout::Names;
+use super::shm_owner::SHARED_MEMORY;
 
 /// The settings of every node here: what was left in a service is cleared when that service is opened, and the rest of the
 /// machine by [`clear`] alone, not by whoever comes or goes.
@@ -14,6 +27,180 @@ pub(super) fn config() -> Config {
     config.global.node.cleanup_dead_nodes_on_creation = false;
     config.global.node.cleanup_dead_nodes_on_destruction = false;
     config
+}
+
+/// Longest time that a living client takes to finish a service that it has begun.
+const FINISHING: Duration = Duration::from_millis(100);
+
+/// What is known of the processes before this one.
+#[derive(Debug, Default)]
+pub(crate) struct Remains {
+    /// The last one crashed: nothing of the namespace is trusted.
+    pub crashed: bool,
+    /// Those that ended without giving back what they had.
+    pub former: Vec<u32>,
+}
+
+/// The services of a namespace that serves these vehicles.
+fn services<'n>(
+    names: &Names,
+    vehicles: impl Iterator<Item = &'n String>,
+) -> Vec<(String, MessagingPattern)> {
+    let events = [names.wake(), names.done(), names.served()];
+    let mut services: Vec<_> = events.into_iter().map(|name| (name, MessagingPattern::Event)).collect();
+    for vehicle in vehicles {
+        for name in [names.evaluate(vehicle), names.evaluate_batch(vehicle)] {
+            services.push((name, MessagingPattern::RequestResponse));
+        }
+    }
+    services
+}
+
+/// Puts the services of a namespace right, which this process owns: those that a dead process left unfinished are removed,
+/// and after a crash all of them, with everything else of the processes that crashed.
+pub(super) fn prepare<'n>(names: &Names, vehicles: impl Iterator<Item = &'n String>, remains: &Remains) {
+    let mut removed = Vec::new();
+    for (name, pattern) in services(names, vehicles) {
+        let Some(file) = service_file(&name, pattern) else { continue };
+        if is_unfinished(&file) || (remains.crashed && file.exists()) {
+            remove_service(&file);
+            removed.push(name);
+        }
+    }
+    if !removed.is_empty() {
+        tracing::info!(services = removed.join(" "), "removed what a process left that was killed");
+    }
+    if remains.crashed {
+        for process in &remains.former {
+            remove_files_of(*process);
+        }
+    }
+}
+
+/// Removes a service that cannot be opened.
+pub(super) fn remove(name: &str, pattern: MessagingPattern) {
+    if let Some(file) = service_file(name, pattern) {
+        remove_service(&file);
+    }
+}
+
+/// Removes the counter of nodes, which every process of this machine makes where it is missing. One that a process began and
+/// did not finish keeps every node from being created.
+pub(super) fn remove_node_counter() {
+    for file in files_in(Path::new(SHARED_MEMORY)) {
+        if file.to_string_lossy().ends_with(".global_mgmt") {
+            let _ = fs::remove_file(file);
+        }
+    }
+}
+
+/// The file that says what a service is; the others are found by it.
+pub(super) fn service_file(name: &str, pattern: MessagingPattern) -> Option<PathBuf> {
+    let name: ServiceName = name.try_into().ok()?;
+    let hash = ServiceHash::new::<<ipc::Service as Service>::ServiceNameHasher>(&name, pattern);
+    let global = &Config::global_config().global;
+    let file = format!("{}{hash}{}", global.prefix, global.service.static_config_storage_suffix);
+    let folder = PathBuf::from(global.root_path().to_string());
+    Some(folder.join(global.service.directory.to_string()).join(file))
+}
+
+/// Whether a service was begun and never finished: its file is still writable, or the memory that it names is not there.
+fn is_unfinished(file: &Path) -> bool {
+    let state = || {
+        let Ok(metadata) = fs::symlink_metadata(file) else { return false };
+        metadata.permissions().mode() & 0o200 != 0
+            || fs::read_to_string(file).is_ok_and(|text| id_in(&text).is_none_or(|id| segment(id).is_none()))
+    };
+    if !state() {
+        return false;
+    }
+    std::thread::sleep(FINISHING);
+    state()
+}
+
+/// Number of a service, as its file has it.
+fn id_in(text: &str) -> Option<u128> {
+    let value = |key: &str| {
+        let line = text.lines().find_map(|line| line.trim().strip_prefix(key))?;
+        line.trim_start().strip_prefix('=')?.trim().parse::<u64>().ok()
+    };
+    Some(u128::from(value("unique_value")?) << 64 | u128::from(value("payload_value")?))
+}
+
+/// The memory that a service of this number keeps its ports in.
+fn segment(id: u128) -> Option<PathBuf> {
+    let end = format!("_{id}{}", Config::global_config().global.service.dynamic_config_storage_suffix);
+    files_in(Path::new(SHARED_MEMORY)).find(|file| file.to_string_lossy().ends_with(&end))
+}
+
+fn remove_service(file: &Path) {
+    let id = fs::read_to_string(file).ok().and_then(|text| id_in(&text));
+    if let Some(segment) = id.and_then(segment) {
+        let _ = fs::remove_file(segment);
+    }
+    if let Err(error) = fs::remove_file(file)
+        && error.kind() != std::io::ErrorKind::NotFound
+    {
+        tracing::warn!(file = %file.display(), %error, "a service that is unfinished cannot be removed");
+    }
+}
+
+/// Removes whatever bears the number of a process that is dead: segments, connections, nodes.
+fn remove_files_of(process: u32) {
+    if Path::new("/proc").join(process.to_string()).exists() {
+        // the number is another's by now
+        return;
+    }
+    let global = &Config::global_config().global;
+    let root = PathBuf::from(global.root_path().to_string());
+    let nodes = root.join(global.node.directory.to_string());
+    let prefix = global.prefix.to_string();
+    let ours = |name: &str| {
+        let numbers =
+            name.split(|c: char| !c.is_ascii_digit()).filter_map(|number| number.parse::<u128>().ok());
+        // the upper half of a number is that of its process and a counter
+        numbers.filter(|number| *number > u128::from(u64::MAX)).any(|number| (number >> 64) as u32 == process)
+    };
+    for folder in [Path::new(SHARED_MEMORY), &root, &nodes] {
+        for file in files_in(folder) {
+            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            if !ours(&name) || !(name.starts_with(&prefix) || folder == nodes) {
+                continue;
+            }
+            let _ = if file.is_dir() { fs::remove_dir_all(&file) } else { fs::remove_file(&file) };
+        }
+    }
+}
+
+fn files_in(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+/// The files of services as they were when the services were opened.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ServiceFiles(std::sync::Arc<std::sync::Mutex<Vec<(PathBuf, Identity)>>>);
+
+/// Device and number of a file.
+type Identity = (u64, u64);
+
+fn identity(file: &Path) -> Option<Identity> {
+    fs::symlink_metadata(file).ok().map(|metadata| (metadata.dev(), metadata.ino()))
+}
+
+impl ServiceFiles {
+    /// Remembers the file of a service that is open.
+    pub(super) fn add(&self, name: &str, pattern: MessagingPattern) {
+        let known = service_file(name, pattern).and_then(|file| Some((identity(&file)?, file)));
+        if let Some((identity, file)) = known {
+            self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((file, identity));
+        }
+    }
+
+    /// Whether a client that opens these services finds the ones that are served.
+    pub(crate) fn are_in_place(&self) -> bool {
+        let files = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        files.iter().all(|(file, before)| identity(file) == Some(*before))
+    }
 }
 
 /// Clears away what is left on this machine, one dead process after the other, until `stop` turns true.

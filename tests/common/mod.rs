@@ -5,7 +5,7 @@ pub mod paper;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 use wade::bundle;
@@ -16,6 +16,7 @@ use wade::model::Model;
 use wade::model::kernel::Isa;
 use wade::served::ServedVehicle;
 use wade::server::{self, Running};
+use wade::service::health::{Part, State as Up};
 use wade::service::shm::Wait;
 use wade::service::shm_layout::PROVENANCE_LEN;
 use wade::service::wire::State;
@@ -149,6 +150,7 @@ pub fn config(folder: &Path) -> Config {
     config.grpc.unix_socket = folder.join("wade.sock");
     config.http.listen = "127.0.0.1:0".into();
     config.shm.namespace = namespace();
+    config.shm.program = env!("CARGO_BIN_EXE_wade").into();
     config
 }
 
@@ -170,6 +172,10 @@ impl Served {
         change(&mut config);
         config.validate().expect("a valid configuration");
         let running = server::start(&config).expect("the server starts");
+        let start = Instant::now();
+        while running.health().state(Part::Shm) == Up::Starting && start.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(5));
+        }
         Self { running, config, _folder: folder }
     }
 

@@ -111,13 +111,26 @@ class Server {
 
   // Stops it as a debugger would; returns when every thread stands still.
   void freeze() {
+    // the server first, so that it does not start the process of shared memory again
     ::kill(process_, SIGSTOP);
     int status = 0;
     CHECK(waitpid(process_, &status, WUNTRACED) == process_ && WIFSTOPPED(status));
+    for (const pid_t child : children()) {
+      ::kill(child, SIGSTOP);
+      for (char state = 0; state != 'T'; std::this_thread::sleep_for(1ms)) {
+        std::ifstream stat("/proc/" + std::to_string(child) + "/stat");
+        const std::string text(std::istreambuf_iterator<char>(stat), {});
+        CHECK(!text.empty());
+        state = text[text.rfind(')') + 2];
+      }
+    }
   }
 
   // Lets it go on.
-  void thaw() { ::kill(process_, SIGCONT); }
+  void thaw() {
+    for (const pid_t child : children()) ::kill(child, SIGCONT);
+    ::kill(process_, SIGCONT);
+  }
 
   // Starts this binary from now on.
   void serve_with(const std::filesystem::path &binary) { binary_ = binary; }
@@ -130,6 +143,16 @@ class Server {
   std::vector<std::string> addresses() const { return {shm(), tcp_, "unix:" + unix_}; }
 
  private:
+  // The process that serves shared memory.
+  std::vector<pid_t> children() const {
+    std::vector<pid_t> found;
+    for (const auto &task : std::filesystem::directory_iterator("/proc/" + std::to_string(process_) + "/task")) {
+      std::ifstream file(task.path() / "children");
+      for (pid_t child = 0; file >> child;) found.push_back(child);
+    }
+    return found;
+  }
+
   std::filesystem::path folder_, binary_ = environment("WADE_BIN");
   std::string tcp_, unix_, namespace_;
   pid_t process_ = 0;

@@ -71,8 +71,9 @@ class Server:
         with grpc.insecure_channel(self.address) as channel:
             check = channel.unary_unary("/grpc.health.v1.Health/Check")
             try:
-                # an empty request means the server as a whole; the answer's one field is 1 where it serves
-                return bool(check(b"", timeout=1) == b"\x08\x01")
+                # an empty request means the server as a whole, the other names shared memory; the answer's one field is 1
+                # where it serves
+                return all(check(name, timeout=1) == b"\x08\x01" for name in (b"", b"\x0a\x11wade.SharedMemory"))
             except grpc.RpcError:
                 return False
 
@@ -84,14 +85,24 @@ class Server:
     def freeze(self) -> None:
         """Stops it as a debugger would; returns when every thread stands still."""
         assert self.process is not None
-        self.send(signal.SIGSTOP)
-        threads = Path(f"/proc/{self.process.pid}/task")
-        while any(") T " not in (thread / "stat").read_text() for thread in threads.iterdir()):
-            time.sleep(0.001)
+        # the server first, so that it does not start the process of shared memory again
+        for process in [self.process.pid, *self._children()]:
+            os.kill(process, signal.SIGSTOP)
+            threads = Path(f"/proc/{process}/task")
+            while any(") T " not in (thread / "stat").read_text() for thread in threads.iterdir()):
+                time.sleep(0.001)
 
     def thaw(self) -> None:
         """Lets it go on."""
+        for process in self._children():
+            os.kill(process, signal.SIGCONT)
         self.send(signal.SIGCONT)
+
+    def _children(self) -> list[int]:
+        """The process that serves shared memory."""
+        assert self.process is not None
+        children = Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        return [int(child) for task in children for child in task.read_text().split()]
 
     def kill(self) -> None:
         """Ends it as a crash would."""

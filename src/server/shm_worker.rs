@@ -1,0 +1,300 @@
+//! The process that serves shared memory for a server; see `shm_host`.
+
+use std::io::{BufRead, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{SigSet, Signal};
+
+use super::shm_link::{Counted, Order, Report, Start};
+use crate::config::Config;
+use crate::engine::Engine;
+use crate::metrics::{Metrics, Transport};
+use crate::model::kernel::Isa;
+use crate::service::admin::Reloader;
+use crate::service::shm::{Opening, ShmServer};
+use crate::service::shm_owner::Owner;
+use crate::service::shm_probe::{Own, Probe};
+use crate::service::shm_remains::{self, Remains, ServiceFiles};
+use crate::service::shm_room;
+
+/// How often requests are reported.
+const REPORT: Duration = Duration::from_millis(100);
+/// How often the server is asked by its own client, and how long that waits.
+const ASK: Duration = Duration::from_secs(1);
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Questions without an answer, one after the other, after which the services are opened again.
+const UNANSWERED: u32 = 3;
+
+/// Why requests are refused over shared memory, as metrics have it.
+const INVALID: &str = "invalid_argument";
+
+/// Exit status of a process that has said why it cannot serve.
+const UNAVAILABLE: i32 = 2;
+/// Exit status of a process whose server ended or did not answer.
+const BROKEN: i32 = 3;
+
+/// Serves shared memory until standard input ends.
+#[derive(Debug)]
+pub struct Worker(Start);
+
+impl Worker {
+    /// Reads the settings from standard input. From here on the process ends with its server, and with nothing else.
+    pub fn read() -> std::io::Result<Self> {
+        // a terminal and a service manager send these to every process of the server
+        let signals = [
+            Signal::SIGTERM,
+            Signal::SIGINT,
+            Signal::SIGQUIT,
+            Signal::SIGHUP,
+            Signal::SIGUSR1,
+            Signal::SIGUSR2,
+        ];
+        SigSet::from_iter(signals).thread_block()?;
+        nix::sys::prctl::set_pdeathsig(Signal::SIGKILL)?;
+        let mut line = String::new();
+        std::io::stdin().lock().read_line(&mut line)?;
+        let start: Start = serde_json::from_str(&line)?;
+        if nix::unistd::getppid().as_raw().unsigned_abs() != start.server {
+            return Err(std::io::Error::other("its server has ended"));
+        }
+        Ok(Self(start))
+    }
+
+    /// The settings of the server.
+    pub fn config(&self) -> &Config {
+        &self.0.config
+    }
+
+    /// Serves, and ends the process.
+    pub fn run(self) -> ! {
+        let Start { config, vehicles, server, crashed, former } = self.0;
+        let (engine, metrics) = (Arc::new(Engine::default()), Arc::new(Metrics::new()));
+        let isa = Isa::available()[0];
+        let reloader =
+            Reloader::new(config.vehicles_directory(), isa, Arc::clone(&engine), Arc::clone(&metrics));
+        for vehicle in &vehicles {
+            load(&reloader, vehicle);
+        }
+        let owner = Owner::new(&config.shm.namespace, server).unwrap_or_else(|error| unavailable(&error));
+        shm_room::check(vehicles.len()).unwrap_or_else(|error| unavailable(&error));
+        let owner = Arc::new(owner);
+        let remains = Remains { crashed, former: former.into_iter().chain(owner.former()).collect() };
+        let (stop, own) = (Arc::new(AtomicBool::new(false)), Own::default());
+        let watching: Arc<Mutex<Option<Watching>>> = Arc::default();
+        let counts = Arc::new(Counts::new(Arc::clone(&metrics)));
+        let serving = {
+            let (stop, counts, settings) = (Arc::clone(&stop), Arc::clone(&counts), config.shm.clone());
+            let (engine, owner) = (Arc::clone(&engine), Arc::clone(&owner));
+            let watch = Arc::clone(&watching);
+            std::thread::Builder::new().name("wade-shm".into()).spawn(move || {
+                // a panic must not leave a process that serves nothing
+                let _end = EndOfServing(Arc::clone(&stop));
+                let opening = Opening { metrics, remains, own: Arc::clone(&own) };
+                let opened = ShmServer::new(settings.clone(), Arc::clone(&engine), opening);
+                let server = opened.unwrap_or_else(|error| unavailable(&error));
+                say(&Report::Opened);
+                let (namespace, files) = (settings.namespace, server.files());
+                let thread = start_watching(Watched { namespace, engine, owner, files, own });
+                *watch.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
+                start_reporting(counts);
+                if !crashed {
+                    start_clearing(Arc::clone(&stop));
+                }
+                server.run(&stop);
+            })
+        };
+        let serving = serving.unwrap_or_else(|error| unavailable(&error));
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            match serde_json::from_str(&line) {
+                Ok(order) => obey(&reloader, &engine, order),
+                Err(error) => tracing::warn!(%error, line, "an order of the server"),
+            }
+        }
+        // the server's own client goes first, so that the last of all ports is the server's
+        let watching = watching.lock().unwrap_or_else(PoisonError::into_inner).take();
+        drop(watching);
+        stop.store(true, Ordering::Relaxed);
+        let ended = serving.join();
+        counts.report();
+        drop(owner);
+        std::process::exit(if ended.is_ok() { 0 } else { BROKEN })
+    }
+}
+
+/// Ends the process where its serving thread ends unasked, by a panic too.
+struct EndOfServing(Arc<AtomicBool>);
+
+impl Drop for EndOfServing {
+    fn drop(&mut self) {
+        if !self.0.load(Ordering::Relaxed) {
+            std::process::exit(BROKEN);
+        }
+    }
+}
+
+/// Says why there is no shared memory, and ends the process.
+fn unavailable(error: &dyn std::fmt::Display) -> ! {
+    say(&Report::Unavailable(error.to_string()));
+    std::process::exit(UNAVAILABLE)
+}
+
+/// Writes a report; a server that does not read has ended, and so does this process.
+fn say(report: &Report) {
+    let written = serde_json::to_string(report).map_err(std::io::Error::from).and_then(|line| {
+        let mut out = std::io::stdout().lock();
+        out.write_all((line + "\n").as_bytes())?;
+        out.flush()
+    });
+    if written.is_err() {
+        std::process::exit(UNAVAILABLE);
+    }
+}
+
+fn load(reloader: &Reloader, vehicle: &str) -> Option<u32> {
+    let reloads = reloader.reload(vehicle).unwrap_or_default();
+    for refusal in reloads.iter().filter_map(|reload| reload.refusal.as_ref()) {
+        tracing::warn!(vehicle, %refusal, "over shared memory");
+    }
+    reloads.first().map(|reload| reload.served_version)
+}
+
+fn obey(reloader: &Reloader, engine: &Engine, order: Order) {
+    let Order { number, vehicle, serve } = order;
+    if serve {
+        load(reloader, &vehicle);
+    } else {
+        // one that is not served is as good as unloaded
+        let _ = reloader.unload(&vehicle);
+    }
+    let version = engine.vehicle(&vehicle).ok().map(|served| served.model().version());
+    say(&Report::Done { number, version });
+}
+
+/// What has been reported of the requests.
+struct Counts {
+    metrics: Arc<Metrics>,
+    /// Refusals so far, of single queries and of batches.
+    refused: Mutex<[u64; 2]>,
+}
+
+impl Counts {
+    fn new(metrics: Arc<Metrics>) -> Self {
+        Self { metrics, refused: Mutex::default() }
+    }
+
+    /// Reports what has come since the last report.
+    fn report(&self) {
+        let mut refused = self.refused.lock().unwrap_or_else(PoisonError::into_inner);
+        for (before, (transport, batch)) in
+            refused.iter_mut().zip([(Transport::shm, false), (Transport::shm_batch, true)])
+        {
+            for (vehicle, recorder) in self.metrics.recorders(transport) {
+                let (times, outside) = recorder.drain();
+                if !times.is_empty() {
+                    say(&Report::Counted(Counted { vehicle, batch, times, outside }));
+                }
+            }
+            let now = self.metrics.refused(transport, INVALID);
+            if now > *before {
+                say(&Report::Refused { batch, requests: now - *before });
+                *before = now;
+            }
+        }
+    }
+}
+
+fn start_reporting(counts: Arc<Counts>) {
+    start("wade-shm-counts", move || {
+        loop {
+            std::thread::sleep(REPORT);
+            counts.report();
+        }
+    });
+}
+
+fn start_clearing(stop: Arc<AtomicBool>) {
+    start("wade-shm-remains", move || shm_remains::clear(&stop));
+}
+
+fn start(name: &str, body: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
+    let thread = std::thread::Builder::new().name(name.into()).spawn(body);
+    thread.unwrap_or_else(|error| unavailable(&format_args!("cannot start a thread: {error}")))
+}
+
+/// What shows that shared memory is served.
+struct Watched {
+    namespace: String,
+    engine: Arc<Engine>,
+    owner: Arc<Owner>,
+    files: ServiceFiles,
+    own: Own,
+}
+
+/// A thread that ends, and is waited for, when this is dropped.
+struct Watching {
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        self.stop = None;
+        // one that panicked has nothing left to end
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+/// Asks the server as a client does, and ends the process where that finds what a client would suffer from.
+fn start_watching(watched: Watched) -> Watching {
+    let (stop, stopped) = channel::<()>();
+    let thread = start("wade-shm-watch", move || {
+        let mut asking = Asking { probe: None, unanswered: 0 };
+        while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(ASK) {
+            if !watched.owner.is_in_place() || !watched.files.are_in_place() {
+                unavailable(&"its files were removed or replaced by somebody else; they are made again");
+            }
+            asking.ask(&watched);
+        }
+    });
+    Watching { stop: Some(stop), thread: Some(thread) }
+}
+
+struct Asking {
+    probe: Option<(String, Probe)>,
+    unanswered: u32,
+}
+
+impl Asking {
+    fn ask(&mut self, watched: &Watched) {
+        let Watched { namespace, engine, own, .. } = watched;
+        let vehicles = engine.vehicles();
+        if self.probe.as_ref().is_none_or(|(vehicle, _)| !vehicles.contains_key(vehicle)) {
+            let Some(vehicle) = vehicles.keys().next() else {
+                // nothing is served that could be asked for
+                return say(&Report::Answered);
+            };
+            self.probe = match Probe::new(namespace, vehicle, own) {
+                Ok(probe) => Some((vehicle.clone(), probe)),
+                Err(error) => {
+                    tracing::debug!(%error, "the server's own client");
+                    None
+                }
+            };
+        }
+        let start = Instant::now();
+        if self.probe.as_mut().is_some_and(|(_, probe)| probe.is_answered(PATIENCE)) {
+            self.unanswered = 0;
+            return say(&Report::Answered);
+        }
+        tracing::debug!(elapsed = ?start.elapsed(), "the server's own client has no answer");
+        self.probe = None;
+        self.unanswered += 1;
+        if self.unanswered >= UNANSWERED {
+            std::process::exit(BROKEN);
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The one server of a namespace. Its lock ends with its process, at whatever instruction that is killed, so that whoever
+//! holds it may replace every service of the namespace that a dead server left unfinished.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+use nix::errno::Errno;
+use nix::fcntl::{Flock, FlockArg, OFlag};
+
+/// Where the segments lie, and so the lock: whoever sees the one sees the other.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+
+/// Why the namespace is not this process's.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum OwnerError {
+    /// A living server has it.
+    #[error(
+        "another server{}, serves the namespace \"{namespace}\"; stop it or choose another with --namespace",
+        .server.map(|pid| format!(", process {pid}")).unwrap_or_default()
+    )]
+    InUse { namespace: String, server: Option<u32> },
+    /// The lock is another user's file.
+    #[error("{} belongs to the user with the number {owner}; choose another namespace with --namespace", .path.display())]
+    Foreign { path: PathBuf, owner: u32 },
+    /// The system refused.
+    #[error("cannot lock {}: {source}", .path.display())]
+    System { path: PathBuf, source: std::io::Error },
+}
+
+/// The right to every service of a namespace. Dropping it gives it back.
+#[derive(Debug)]
+pub(crate) struct Owner {
+    lock: Flock<File>,
+    path: PathBuf,
+    former: Option<u32>,
+}
+
+impl Owner {
+    /// Takes a namespace for the server with this process number.
+    pub(crate) fn new(namespace: &str, server: u32) -> Result<Self, OwnerError> {
+        let user = nix::unistd::geteuid().as_raw();
+        let path = Path::new(SHARED_MEMORY).join(format!("wade_{user}_{namespace}.lock"));
+        loop {
+            let system = |source| OwnerError::System { path: path.clone(), source };
+            let file = OpenOptions::new()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .mode(0o600)
+                .custom_flags((OFlag::O_NOFOLLOW | OFlag::O_CLOEXEC).bits())
+                .open(&path)
+                .map_err(system)?;
+            let owner = file.metadata().map_err(system)?.uid();
+            if owner != user {
+                return Err(OwnerError::Foreign { path, owner });
+            }
+            let lock = match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
+                Ok(lock) => lock,
+                Err((mut file, Errno::EWOULDBLOCK)) => {
+                    let [server, _] = numbers(&mut file);
+                    return Err(OwnerError::InUse { namespace: namespace.to_owned(), server });
+                }
+                Err((_, error)) => return Err(system(error.into())),
+            };
+            let mut owner = Self { lock, path: path.clone(), former: None };
+            // an owner before this one may have removed the file between the opening and the locking
+            if owner.is_in_place() {
+                let [_, former] = numbers(&mut owner.lock);
+                owner.former = former;
+                owner.note(server);
+                return Ok(owner);
+            }
+        }
+    }
+
+    /// The process that owned the namespace before and did not give it back.
+    pub(crate) fn former(&self) -> Option<u32> {
+        self.former
+    }
+
+    /// Whether the lock is the one that another process would find.
+    pub(crate) fn is_in_place(&self) -> bool {
+        let identity = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+        let held = self.lock.metadata().map(identity).ok();
+        held.is_some() && held == std::fs::symlink_metadata(&self.path).map(identity).ok()
+    }
+
+    /// Writes the numbers of the server and of this process, for the message of another server and for the next owner.
+    fn note(&mut self, server: u32) {
+        let written = self.lock.set_len(0).and_then(|()| {
+            self.lock.rewind()?;
+            write!(self.lock, "{server} {}", std::process::id())
+        });
+        if let Err(error) = written {
+            tracing::debug!(%error, "the lock of the namespace names no process");
+        }
+    }
+}
+
+impl Drop for Owner {
+    fn drop(&mut self) {
+        if self.is_in_place() {
+            // one that cannot be removed is taken over by the next server
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// The numbers of the processes in a lock, as far as they can be read.
+fn numbers(file: &mut File) -> [Option<u32>; 2] {
+    let mut text = String::new();
+    // two numbers of ten digits
+    if file.rewind().and_then(|()| file.take(32).read_to_string(&mut text)).is_err() {
+        return [None; 2];
+    }
+    let mut numbers = text.split_whitespace().map(|number| number.parse().ok());
+    [(); 2].map(|()| numbers.next().flatten())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn a_namespace_has_one_owner_at_a_time_and_the_next_knows_the_one_that_died() {
+        let namespace = format!("owner-{}", std::process::id());
+        let first = Owner::new(&namespace, 7).unwrap();
+        assert!(first.is_in_place() && first.former().is_none());
+        let second = Owner::new(&namespace, 8).unwrap_err();
+        assert!(second.to_string().starts_with("another server, process 7, serves"), "{second}");
+        // a lock that was deleted under its owner is no lock any more
+        std::fs::remove_file(&first.path).unwrap();
+        assert!(!first.is_in_place());
+        let third = Owner::new(&namespace, 9).unwrap();
+        drop(first);
+        assert!(third.is_in_place(), "what is not in place is not removed");
+        // a process that is killed leaves its file without the lock
+        let path = third.path.clone();
+        drop(third);
+        assert!(!path.exists());
+        std::fs::write(&path, "9 12345").unwrap();
+        assert_eq!(Owner::new(&namespace, 10).unwrap().former(), Some(12345));
+        std::fs::write(&path, "\u{7f}no numbers").unwrap();
+        assert_eq!(Owner::new(&namespace, 10).unwrap().former(), None);
+    }
+}

@@ -1,0 +1,64 @@
+//! A client that lives beside the server and asks it, as any other client would.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use iceoryx2::identifiers::UniqueClientId;
+use iceoryx2::node::Node;
+use iceoryx2::port::client::Client;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::prelude::ipc;
+
+use super::shm::{self, ShmError};
+use super::shm_layout::{Answer, Names, Query};
+use super::wire::State;
+
+/// How often an answer is looked for.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Whose questions are the server's own, and so are not counted.
+pub(crate) type Own = Arc<Mutex<Option<UniqueClientId>>>;
+
+/// A connection to the service of one vehicle.
+pub(crate) struct Probe {
+    client: Client<ipc::Service, Query, (), Answer, ()>,
+    wake: Notifier<ipc::Service>,
+    sequence: u64,
+    _node: Node<ipc::Service>,
+}
+
+impl Probe {
+    /// Connects to a vehicle of the namespace.
+    pub(crate) fn new(namespace: &str, vehicle: &str, own: &Own) -> Result<Self, ShmError> {
+        let names = Names::new(namespace);
+        let node = shm::node::<ipc::Service>()?;
+        let name = names.evaluate(vehicle);
+        let failed = |reason: &dyn std::fmt::Display| ShmError::new("the server's own client")(reason);
+        let service = shm::open::<_, Query, Answer>(&node, &name).map_err(|error| failed(&error))?;
+        let client = service.client_builder().create().map_err(|error| failed(&error))?;
+        let wake = shm::events(&node, &names.wake())?.notifier_builder().create();
+        let wake = wake.map_err(|error| failed(&error))?;
+        *own.lock().unwrap_or_else(PoisonError::into_inner) = Some(client.id());
+        Ok(Self { client, wake, sequence: 0, _node: node })
+    }
+
+    /// Whether a query is answered in this time.
+    pub(crate) fn is_answered(&mut self, timeout: Duration) -> bool {
+        self.sequence += 1;
+        let query = Query { sequence: self.sequence, ..Query::from(&State::default()) };
+        let Ok(pending) = self.client.send_copy(query) else { return false };
+        let _ = self.wake.notify();
+        let end = Instant::now() + timeout;
+        loop {
+            match pending.receive() {
+                Ok(Some(answer)) if answer.sequence == self.sequence => return true,
+                Ok(_) => {}
+                Err(_) => return false,
+            }
+            if Instant::now() >= end {
+                return false;
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
