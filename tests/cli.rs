@@ -426,3 +426,31 @@ fn the_doctor_names_what_is_wrong_and_the_way_out() {
     let (code, document) = doctor(&settings("nowhere"));
     assert_eq!(code, Some(1), "{document:#}");
 }
+
+/// Flags behind which commands name what they write.
+const WRITES: [&str; 3] = ["--out", "--html", "--checkpoint"];
+
+#[test]
+fn git_ignores_what_the_commands_of_the_manual_write() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let guide = std::fs::read_dir(root.join("docs/src/guide")).expect("the guide");
+    let pages = guide.map(|page| page.expect("readable").path()).chain([root.join("README.md")]);
+    let mut written = std::collections::BTreeSet::new();
+    for page in pages {
+        let text = std::fs::read_to_string(&page).expect("readable");
+        for block in text.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next()) {
+            let words: Vec<&str> = block.split_whitespace().collect();
+            let outputs =
+                words.windows(2).filter(|pair| WRITES.contains(&pair[0])).map(|pair| pair[1].to_owned());
+            written.extend(outputs.filter(|path| !path.starts_with(['/', '~', '$'])));
+        }
+    }
+    assert!(written.len() > 3, "{written:?}");
+    for path in written {
+        let status = Command::new("git").args(["check-ignore", "--quiet", &path]).current_dir(root).status();
+        assert!(
+            status.expect("git runs").success(),
+            "{path} is left in the working directory: see .gitignore"
+        );
+    }
+}

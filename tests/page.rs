@@ -220,3 +220,81 @@ fn the_page_of_a_gap_report_says_its_verdict_and_fits_a_window_and_a_telephone()
         assert!(colors.len() > 30, "a blank picture has few colors: {}", colors.len());
     }
 }
+
+/// Widths of a telephone and of a window [px].
+const WIDTHS: [usize; 2] = [390, 1400];
+
+/// How far a page reaches beyond a window of this width [px]. The browser's own window cannot be as narrow as a telephone, so
+/// the page lies in a frame.
+fn beyond(text: &str, name: &str, width: usize) -> Option<i64> {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let told =
+        "<script>parent.postMessage(document.documentElement.scrollWidth - window.innerWidth, '*')</script>";
+    std::fs::write(folder.path().join("page.html"), format!("{text}{told}")).expect("written");
+    let frame = format!(
+        "<title>nothing</title><body style='margin:0'><script>onmessage = (e) => {{ document.title = `beyond ${{e.data}}` }}\
+         </script><iframe src='page.html' style='border:0;width:{width}px;height:2400px'></iframe>"
+    );
+    let path = folder.path().join("frame.html");
+    std::fs::write(&path, frame).expect("written");
+    let url = format!("file://{}", path.display());
+    let output = browse(&["--dump-dom".into(), "--window-size=1500,2400".into(), url])?;
+    let frame = String::from_utf8(output.stdout).expect("text");
+    let title =
+        frame.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next()).expect("a title");
+    Some(
+        title
+            .strip_prefix("beyond ")
+            .and_then(|number| number.parse().ok())
+            .unwrap_or_else(|| panic!("{name}: {title}")),
+    )
+}
+
+#[test]
+fn the_page_and_every_report_fit_a_telephone_and_a_window() {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let wade = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_wade"))
+            .args(arguments)
+            .current_dir(root)
+            .env("WADE_VEHICLES", common::vehicles())
+            .output()
+            .expect("the program runs");
+        // a busy machine makes the generator of a soak late, and the report says so
+        let usual = matches!(output.status.code(), Some(0 | 1));
+        assert!(usual, "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    let (soak, gap, data, campaign) = (at("soak"), at("gap"), at("data.html"), at("campaign.html"));
+    let load = ["soak", "--vehicle", "husky", "--transport", "inproc", "--warm-up", "10ms", "--out", &soak];
+    wade(&[&load[..], &["--duration", "300ms", "--rate", "100,200", "--slo", "p99=1s"]].concat());
+    wade(&["gap", "--vehicle", "husky", "--trials", "tests/data/wading", "--out", &gap]);
+    wade(&["dataset", "describe", "campaigns/husky/sections.parquet", "--html", &data]);
+    wade(&["campaign", "report", "campaigns/husky", "--html", &campaign]);
+    let read = |path: &str| std::fs::read_to_string(path).expect(path);
+    let served = Served::start();
+    let url = format!("http://{}/#vehicle=husky&speed=0.8&direction=0&depth=0.18", address(&served));
+    let Some(output) = browse(&["--dump-dom".into(), "--window-size=500,900".into(), url]) else { return };
+    let style = read(&root.join("src/service/http/page/style.css").display().to_string());
+    // what the page has become, with its look and without its program
+    let page = String::from_utf8(output.stdout).expect("text");
+    let page = page
+        .replace("<link rel=\"stylesheet\" href=\"/page/style.css\">", &format!("<style>{style}</style>"));
+    let page = page.replace("<script type=\"module\" src=\"/page/main.js\"></script>", "");
+    assert!(page.contains("<style>") && page.contains("wheel_fl"), "{page}");
+    for (name, text) in [
+        ("page", page),
+        ("soak", read(&format!("{soak}/100hz/soak.html"))),
+        ("steps", read(&format!("{soak}/steps.html"))),
+        ("gap", read(&format!("{gap}/index.html"))),
+        ("dataset", read(&data)),
+        ("campaign", read(&campaign)),
+    ] {
+        assert!(!text.contains(">-0.0<") && !text.contains(">-0<"), "{name}: a tick of -0");
+        for width in WIDTHS {
+            let Some(beyond) = beyond(&text, name, width) else { return };
+            assert!(beyond <= 0, "{name}: {beyond} px beyond a window of {width}");
+        }
+    }
+}

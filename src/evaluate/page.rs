@@ -73,27 +73,32 @@ fn of_paper(quantity: &str) -> [String; 3] {
 }
 
 fn net_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
-    let mut heads = heads("model", &["MAE [N]", "RMSE [N]", "sMAPE [%]", "MAE on a surface [N]"]);
-    heads.extend(["MAE [N]", "RMSE [N]", "sMAPE [%]"].into_iter().flat_map(of_paper));
+    let quantities = ["MAE [N]", "RMSE [N]", "sMAPE [%]"];
+    let heads_of_ours = heads("model", &[&quantities[..], &["MAE on a surface [N]"]].concat());
     let row = |model: &ModelReport| {
-        let is_paper = model.name == vehicle.models[0].name;
-        let papers: Vec<Option<f64>> = match paper {
-            Some(paper) if is_paper => {
-                [paper.mae, paper.rmse, paper.smape].concat().into_iter().map(Some).collect()
-            }
-            Some(paper) => [entry(paper.ablations, &model.name), [None; 3], [None; 3]].concat(),
-            None => vec![None; 9],
-        };
         let force = &model.force;
         let ours = [force.mae, force.rmse, force.smape].concat().into_iter().map(number);
         let surfaces = model.surface_mae_n.map_or([None; 3], |mae| mae.map(Some)).map(stated);
-        std::iter::once(escape(&model.name))
-            .chain(ours)
-            .chain(surfaces)
-            .chain(papers.into_iter().map(stated))
-            .collect()
+        std::iter::once(escape(&model.name)).chain(ours).chain(surfaces).collect()
     };
     let rows: Vec<Vec<String>> = vehicle.models.iter().map(row).collect();
+    // a table of its own: both in one are wider than a window
+    let published = |model: &ModelReport| {
+        let paper = paper?;
+        let is_paper = model.name == vehicle.models[0].name;
+        let values: Vec<Option<f64>> = match is_paper {
+            true => [paper.mae, paper.rmse, paper.smape].concat().into_iter().map(Some).collect(),
+            false => [entry(paper.ablations, &model.name), [None; 3], [None; 3]].concat(),
+        };
+        let is_stated = values.iter().any(Option::is_some);
+        is_stated
+            .then(|| std::iter::once(escape(&model.name)).chain(values.into_iter().map(stated)).collect())
+    };
+    let published: Vec<Vec<String>> = vehicle.models.iter().filter_map(published).collect();
+    let published = match published.is_empty() {
+        true => String::new(),
+        false => table(&heads(LABEL, &quantities), 0, published),
+    };
     let note = paper.map_or_else(String::new, |paper| {
         let of = |values: [Option<f64>; 3]| values.map(stated).join(", ");
         let merged = of(entry(paper.ablation_surfaces, "merged_plates"));
@@ -104,7 +109,7 @@ fn net_table(vehicle: &VehicleReport, paper: Option<&Paper>) -> String {
             of(paper.surface_mae.map(Some)),
         )
     });
-    table(&heads, 13, rows) + &note
+    table(&heads_of_ours, usize::MAX, rows) + &published + &note
 }
 
 fn moment_table(vehicle: &VehicleReport) -> String {
