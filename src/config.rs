@@ -10,7 +10,7 @@ use crate::service::{grpc, health, http, shm};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Folder of the vehicle bundles.
+    /// Folder of the vehicle bundles; empty: the first that exists of the usual ones. See [`crate::bundle::Library`].
     pub vehicles: PathBuf,
     /// CPUs that the server may use; empty: all.
     pub cpus: Vec<usize>,
@@ -33,7 +33,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            vehicles: "vehicles".into(),
+            vehicles: PathBuf::new(),
             cpus: Vec::new(),
             drain_s: 5.0,
             latency_window_s: 10.0,
@@ -136,16 +136,8 @@ impl Config {
         range(!silent, "shm.enabled", &false, "true where grpc.listen and grpc.unix_socket are both empty")
     }
 
-    /// The folder of bundles, found where the default is not in the working directory.
-    pub fn vehicles_directory(&self) -> PathBuf {
-        find_vehicles(&self.vehicles)
+    /// The folder of bundles, where one is named.
+    pub fn named_vehicles(&self) -> Option<&Path> {
+        Some(self.vehicles.as_path()).filter(|folder| !folder.as_os_str().is_empty())
     }
-}
-
-/// The folder of bundles: as configured, or where an installation has it.
-fn find_vehicles(configured: &Path) -> PathBuf {
-    let installed =
-        std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join("../share/wade/vehicles")));
-    let fallback = configured == Path::new("vehicles") && !configured.exists();
-    installed.filter(|path| fallback && path.exists()).unwrap_or_else(|| configured.to_owned())
 }

@@ -21,13 +21,24 @@ pub struct Loads {
 pub struct ServedVehicle {
     model: Model,
     effects: Option<ActiveEffects>,
+    origin: String,
 }
 
 impl ServedVehicle {
     /// A model with the effects of its bundle, where it has any.
     pub fn new(model: Model, effects: Option<EffectsFile>) -> Self {
         let effects = effects.map(|file| ActiveEffects::new(file, model.vehicle()));
-        Self { model, effects }
+        Self { model, effects, origin: String::new() }
+    }
+
+    /// The same, which knows where it is from.
+    pub fn with_origin(self, origin: String) -> Self {
+        Self { origin, ..self }
+    }
+
+    /// Where the bundle is: its folder, or "carried by the binary"; empty of one made in memory.
+    pub fn origin(&self) -> &str {
+        &self.origin
     }
 
     /// The model without its effects.

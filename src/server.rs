@@ -76,8 +76,12 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     let metrics = Arc::new(Metrics::new());
     let engine = Arc::new(Engine::default());
     let isa = Isa::available()[0];
-    let reloader =
-        Arc::new(Reloader::new(config.vehicles_directory(), isa, Arc::clone(&engine), Arc::clone(&metrics)));
+    let reloader = Arc::new(Reloader::new(
+        config.named_vehicles().map(Path::to_owned),
+        isa,
+        Arc::clone(&engine),
+        Arc::clone(&metrics),
+    ));
     let listeners = Arc::new(Listeners::bind(&config.grpc)?);
     let http_listener = http::bind(&config.http)?;
     let shared = grpc::Shared {

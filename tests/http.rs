@@ -6,20 +6,15 @@ mod http;
 
 mod common;
 
-use std::fs::{File, OpenOptions};
-use std::io::Write as _;
+use std::fs::File;
 use std::net::{SocketAddr, TcpListener};
-use std::os::unix::fs::OpenOptionsExt as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use common::{Numbers, PATIENCE, Served, VEHICLES};
 use http::{Answer, get, post, send};
-use nix::libc;
-use nix::sys::stat::Mode;
-use nix::unistd::mkfifo;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use wade::client::{Client, GrpcClient, Method};
@@ -61,31 +56,18 @@ fn probes_say_live_and_ready() {
     assert!(nothing.body.contains("/v1/query"), "{nothing:?}");
 }
 
-/// A bundle whose weights are a pipe, so that reading it lasts until somebody writes them.
-fn slow_to_read(bundles: &Path) -> (PathBuf, Vec<u8>) {
-    let pipe = bundles.join("warthog/network.safetensors");
-    let weights = std::fs::read(&pipe).expect("readable");
-    std::fs::remove_file(&pipe).expect("removed");
-    mkfifo(&pipe, Mode::S_IRWXU).expect("a pipe");
-    (pipe, weights)
-}
-
-/// The end to write to, once somebody reads; none where nobody will.
-fn opened(pipe: &Path, will_be_read: impl Fn() -> bool) -> Option<File> {
-    let is_read = || OpenOptions::new().write(true).custom_flags(libc::O_NONBLOCK).open(pipe).ok();
-    while will_be_read() {
-        if let Some(_reader_is_there) = is_read() {
-            return OpenOptions::new().write(true).open(pipe).ok();
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    None
+/// A bundle that somebody writes, so that reading it lasts until the file is dropped, or for some seconds.
+fn being_written(bundle: &Path) -> File {
+    let name = bundle.file_name().expect("a name").to_string_lossy().into_owned();
+    let lock = File::create(bundle.with_file_name(format!(".{name}.lock"))).expect("made");
+    lock.lock().expect("nobody else writes");
+    lock
 }
 
 #[test]
 fn who_asks_while_bundles_are_read_is_told_to_come_back() {
     let (bundles, folder) = (common::copy_of_vehicles(), TempDir::new().expect("a folder"));
-    let (pipe, weights) = slow_to_read(bundles.path());
+    let writer = being_written(&bundles.path().join("warthog"));
     let mut config = common::config(folder.path());
     config.vehicles = bundles.path().to_owned();
     let probe = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -94,7 +76,10 @@ fn who_asks_while_bundles_are_read_is_told_to_come_back() {
     config.http.listen = address.to_string();
     std::thread::scope(|scope| {
         let starting = scope.spawn(|| wade::server::start(&config));
-        let mut writer = opened(&pipe, || !starting.is_finished()).expect("the server reads its bundles");
+        while std::net::TcpStream::connect(address).is_err() {
+            assert!(!starting.is_finished(), "the server waits for the writer");
+            std::thread::sleep(Duration::from_millis(1));
+        }
         let ask = || post(address, "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
         let answers = [get(address, "/readyz"), ask(), get(address, "/v1/vehicles/husky")];
         assert_eq!(answers.each_ref().map(|answer| answer.status), [503; 3], "{answers:?}");
@@ -102,7 +87,6 @@ fn who_asks_while_bundles_are_read_is_told_to_come_back() {
         assert_eq!(answers[1].header("retry-after"), Some("1"));
         // the process lives, and a page that is open may stay so
         assert_eq!([get(address, "/livez").status, get(address, "/").status], [200; 2]);
-        writer.write_all(&weights).expect("read");
         drop(writer);
         let _running = starting.join().expect("it does not panic").expect("the server starts");
         assert_eq!([get(address, "/readyz").status, ask().status], [200; 2]);

@@ -132,15 +132,12 @@ fn a_change_of_another_folder_leaves_a_server_alone() {
 #[test]
 fn a_vehicle_that_is_added_is_served_over_every_transport() {
     let folder = copy_of_vehicles();
-    let warthog = folder.path().join("warthog");
-    let aside = tempfile::TempDir::new().expect("a folder");
-    std::fs::rename(&warthog, aside.path().join("warthog")).expect("moved");
     let served = Served::with(|config| config.vehicles = folder.path().to_owned());
-    let mut shm = served.shm("warthog", Wait::Block);
+    let mut shm = served.shm("rover", Wait::Block);
     assert!(matches!(shm.evaluate(&state()), Err(ClientError::UnknownVehicle { .. })));
-    std::fs::rename(aside.path().join("warthog"), &warthog).expect("moved back");
+    common::rover(folder.path());
     served.running.reloader().reload("").expect("reloaded");
-    served.tcp("warthog", Method::Unary).evaluate(&state()).expect("served over gRPC");
+    served.tcp("rover", Method::Unary).evaluate(&state()).expect("served over gRPC");
     let start = Instant::now();
     while let Err(error) = shm.evaluate(&state()) {
         assert!(start.elapsed() < PATIENCE, "never served over shared memory: {error}");

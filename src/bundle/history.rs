@@ -1,27 +1,66 @@
 //! Versions of a bundle: what new weights or effects replace is kept beside it in `<name>.versions/<version>/<name>`.
 //!
-//! A version that leaves its place is moved there, so that each can be put back, one after the other. What was put back keeps
-//! its number; the next version that is made gets a number that none had before.
+//! A version that leaves its place is moved there, so that each can be put back. What was put back keeps its number; the next
+//! version that is made gets a number that none had before. A version that was taken back is marked (`taken-back` beside it):
+//! going back without a number passes over it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
+use super::place::{self, copy_folder, move_folder, sync_folder, write_synced};
+use super::source::{Source, read_bounded};
 use super::{
-    Bundle, BundleError, FILES, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, at, exchange,
-    place, read, read_bounded, stage, staging_of, tensors,
+    Bundle, BundleError, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, at, checksums, lock,
+    read, stage, staging_of, tensors,
 };
 use crate::effects::EffectsFile;
 use crate::files::sha256;
 
-/// A version that was kept.
+/// Marks a version that was taken back.
+const TAKEN_BACK: &str = "taken-back";
+
+/// A version that was kept, or is in its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kept {
     /// Its number.
     pub version: u32,
     /// Name of the form of its weights, and where they were learnt from.
     pub weights: Option<(&'static str, String)>,
+    /// SHA-256 of the file of its weights.
+    pub network_sha256: Option<String>,
     /// Names of the effects that it has switched on.
     pub effects: Vec<&'static str>,
+    /// Where it is.
+    pub source: Source,
+    /// When it was written; unknown of what the program carries.
+    pub written: Option<SystemTime>,
+    /// True where it was taken back.
+    pub taken_back: bool,
+}
+
+impl Kept {
+    /// Reads a version, with every check.
+    pub(super) fn read(source: Source) -> Result<Self, BundleError> {
+        let Bundle { version, effects, trained, .. } = source.bundle()?;
+        let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.name.name()).collect();
+        let sums = checksums::parse(&source.file(SUMS_FILE)?).map_err(at(&source.path().join(SUMS_FILE)))?;
+        let written = match &source {
+            Source::Carried(_) => None,
+            Source::Folder(folder) => {
+                fs::metadata(folder.join(SUMS_FILE)).and_then(|file| file.modified()).ok()
+            }
+        };
+        Ok(Self {
+            version,
+            weights: trained.map(|(weights, _)| (weights.form.name(), weights.provenance)),
+            network_sha256: sums.get(NETWORK_FILE).cloned(),
+            effects: effects.map(names).unwrap_or_default(),
+            source,
+            written,
+            taken_back: false,
+        })
+    }
 }
 
 fn versions_of(directory: &Path) -> PathBuf {
@@ -29,12 +68,16 @@ fn versions_of(directory: &Path) -> PathBuf {
     directory.with_file_name(format!("{name}.versions"))
 }
 
-fn place_of(directory: &Path, version: u32) -> PathBuf {
+pub(super) fn place_of(directory: &Path, version: u32) -> PathBuf {
     versions_of(directory).join(version.to_string()).join(directory.file_name().unwrap_or_default())
 }
 
+fn mark_of(directory: &Path, version: u32) -> PathBuf {
+    versions_of(directory).join(version.to_string()).join(TAKEN_BACK)
+}
+
 /// Numbers of the versions that were kept, rising.
-fn numbers(directory: &Path) -> Result<Vec<u32>, BundleError> {
+pub(super) fn numbers(directory: &Path) -> Result<Vec<u32>, BundleError> {
     let versions = versions_of(directory);
     let entries = match fs::read_dir(&versions) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -49,20 +92,23 @@ fn numbers(directory: &Path) -> Result<Vec<u32>, BundleError> {
 /// The versions that were kept of the bundle in a folder, rising.
 pub fn kept(directory: &Path) -> Result<Vec<Kept>, BundleError> {
     let one = |version: u32| {
-        let Bundle { effects, trained, .. } = read(&place_of(directory, version))?;
-        let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.name.name()).collect();
-        let weights = trained.map(|(weights, _)| (weights.form.name(), weights.provenance));
-        Ok(Kept { version, weights, effects: effects.map(names).unwrap_or_default() })
+        let kept = Kept::read(Source::Folder(place_of(directory, version)))?;
+        Ok(Kept { version, taken_back: mark_of(directory, version).exists(), ..kept })
     };
     numbers(directory)?.into_iter().map(one).collect()
 }
 
 /// Puts effects in the place of those of a bundle, as its next version, and keeps the version before. Gives the new version.
-pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleError> {
-    let bundle = read(directory)?;
-    let Some((weights, _)) = &bundle.trained else { return Err(at(directory)(Fault::NoWeights)) };
+pub fn apply(directory: &Path, effects: EffectsFile) -> Result<u32, BundleError> {
+    let bundle = with_effects(read(directory)?, effects).map_err(at(directory))?;
+    succeed(directory, bundle)
+}
+
+/// The bundle with these effects, fitted to its weights.
+pub(super) fn with_effects(bundle: Bundle, mut effects: EffectsFile) -> Result<Bundle, Fault> {
+    let Some((weights, _)) = &bundle.trained else { return Err(Fault::NoWeights) };
     effects.evidence.weights_sha256 = sha256(&tensors::write_weights(weights));
-    succeed(directory, Bundle { effects: Some(effects), ..bundle })
+    Ok(Bundle { effects: Some(effects), ..bundle })
 }
 
 /// Puts a bundle in its place, as the next version of the one that is there, if any, and keeps the latter if it could be
@@ -71,11 +117,18 @@ pub fn apply(directory: &Path, mut effects: EffectsFile) -> Result<u32, BundleEr
 /// The bundle changes in one step of the file system at the end; an error before it leaves everything as it was.
 pub fn succeed(directory: &Path, bundle: Bundle) -> Result<u32, BundleError> {
     // one bundle, one version
-    Ok(succeed_together(vec![(directory.to_owned(), bundle)])?[0])
+    Ok(succeed_together(vec![(directory.to_owned(), Bundle { version: 0, ..bundle })])?[0])
 }
 
-/// As [`succeed`], of bundles that belong together: an error with one of them leaves all as they were. Gives the new versions.
+/// As [`succeed`], of bundles that belong together: an error with one of them leaves all as they were. Where there is none in
+/// place a bundle gets the number after its own `version`. Gives the new versions.
 pub fn succeed_together(bundles: Vec<(PathBuf, Bundle)>) -> Result<Vec<u32>, BundleError> {
+    // in one order, so that two writers do not wait for each other
+    let mut folders: Vec<&PathBuf> = bundles.iter().map(|(directory, _)| directory).collect();
+    folders.sort();
+    folders.dedup();
+    let _locks: Vec<lock::Lock> =
+        folders.into_iter().map(|folder| lock::exclusive(folder)).collect::<Result<_, _>>()?;
     let mut staged: Vec<Next> = Vec::new();
     for (directory, bundle) in bundles {
         let next = Next::stage(&directory, bundle);
@@ -102,7 +155,7 @@ struct Next {
 
 impl Next {
     fn stage(directory: &Path, bundle: Bundle) -> Result<Self, BundleError> {
-        let before = if directory.exists() { version_in(directory)? } else { 0 };
+        let before = if directory.exists() { version_in(directory)? } else { bundle.version };
         let last = numbers(directory)?.last().copied().unwrap_or(0).max(before);
         let version =
             last.checked_add(1).ok_or(Fault::NoVersion { last }).map_err(at(&versions_of(directory)))?;
@@ -115,7 +168,9 @@ impl Next {
     fn put(&self) -> Result<(), BundleError> {
         match self.keeps {
             Some(before) => put(&self.staged, &self.directory, before),
-            None => place(&self.staged, &self.directory).map_err(|error| at(&self.directory)(error.into())),
+            None => {
+                place::place(&self.staged, &self.directory).map_err(|error| at(&self.directory)(error.into()))
+            }
         }
     }
 
@@ -126,7 +181,7 @@ impl Next {
         if !before.exists() {
             // there was none
             let _ = fs::remove_dir_all(&self.directory);
-        } else if exchange(&before, &self.directory).is_ok() {
+        } else if place::exchange(&before, &self.directory).is_ok() {
             let _ = fs::remove_dir_all(before);
         }
     }
@@ -137,41 +192,76 @@ impl Next {
     }
 }
 
-/// Puts a kept version in its place again, by default the one before the version that is there, and keeps the latter.
-/// Gives the version that is in place now.
+/// Puts a kept version in its place again, and keeps the one that is there: by default the newest before it that was not
+/// taken back. Gives the version that is in place now.
 pub fn roll_back(directory: &Path, to: Option<u32>) -> Result<u32, BundleError> {
-    let current = version_in(directory)?;
-    let kept = numbers(directory)?;
-    let found = match to {
-        Some(to) => kept.into_iter().find(|&version| version == to && version != current),
-        None => kept.into_iter().rfind(|&version| version < current),
-    };
-    let version = found.ok_or(Fault::NotKept { asked: to }).map_err(at(directory))?;
-    let place = place_of(directory, version);
+    let _lock = lock::exclusive(directory)?;
+    let current = if directory.exists() { Some(version_in(directory)?) } else { None };
+    let version =
+        choice(directory, current, to)?.ok_or(Fault::NotKept { asked: to }).map_err(at(directory))?;
+    let kept = place_of(directory, version);
     // what is damaged must not come into service
-    let bundle = read(&place)?;
+    let bundle = read(&kept)?;
     if bundle.version != version {
-        return Err(at(&place)(Fault::KeptVersion { found: bundle.version }));
+        return Err(at(&kept)(Fault::KeptVersion { found: bundle.version }));
     }
     let staged = staging_of(directory, &bundle.vehicle.name);
-    copy(&place, &staged).map_err(|error| at(&staged)(error.into()))?;
-    put(&staged, directory, current)?;
+    copy_folder(&kept, &staged).map_err(|error| at(&staged)(error.into()))?;
+    match current {
+        Some(current) => put(&staged, directory, current)?,
+        None => place::place(&staged, directory).map_err(|error| at(directory)(error.into()))?,
+    }
+    mark(directory, version)?;
     Ok(version)
 }
 
-/// Byte for byte: what goes back is what was there.
-fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
-    let _ = fs::remove_dir_all(to);
-    fs::create_dir_all(to)?;
-    for name in FILES.into_iter().filter(|name| from.join(name).exists()) {
-        fs::copy(from.join(name), to.join(name))?;
+/// The version that [`roll_back`] would put in place.
+pub(super) fn choice(
+    directory: &Path,
+    current: Option<u32>,
+    to: Option<u32>,
+) -> Result<Option<u32>, BundleError> {
+    let mut kept = numbers(directory)?.into_iter();
+    Ok(match to {
+        Some(to) => kept.find(|&version| version == to && Some(version) != current),
+        None => {
+            let before = |version: u32| current.is_some_and(|current| version < current);
+            kept.rfind(|&version| before(version) && !mark_of(directory, version).exists())
+        }
+    })
+}
+
+/// Takes the bundle out of its folder, to the versions, so that what stands behind it, version `behind`, is served again.
+pub(super) fn withdraw(directory: &Path, behind: u32) -> Result<(), BundleError> {
+    let _lock = lock::exclusive(directory)?;
+    let kept = place_of(directory, version_in(directory)?);
+    let withdraw = || {
+        let _ = fs::remove_dir_all(&kept);
+        fs::create_dir_all(kept.parent().unwrap_or(&kept))?;
+        move_folder(directory, &kept)?;
+        sync_folder(directory.parent().unwrap_or(Path::new("")))
+    };
+    withdraw().map_err(|error| at(&kept)(error.into()))?;
+    mark(directory, behind)
+}
+
+/// Marks what came after the version that is in place now: it was taken back. That one itself was not.
+fn mark(directory: &Path, version: u32) -> Result<(), BundleError> {
+    for number in numbers(directory)? {
+        let mark = mark_of(directory, number);
+        let marked = match number {
+            number if number > version => write_synced(&mark, b""),
+            number if number == version && mark.exists() => fs::remove_file(&mark),
+            _ => Ok(()),
+        };
+        marked.map_err(|error| at(&mark)(error.into()))?;
     }
     Ok(())
 }
 
-fn version_in(directory: &Path) -> Result<u32, BundleError> {
+pub(super) fn version_in(directory: &Path) -> Result<u32, BundleError> {
     let path = directory.join(VEHICLE_FILE);
-    Ok(VehicleFile::parse(&read_bounded(&path)?, directory).map_err(at(&path))?.version)
+    Ok(VehicleFile::parse(&read_bounded(directory, VEHICLE_FILE)?, directory).map_err(at(&path))?.version)
 }
 
 /// Exchanges a staged bundle with the one in place, and moves the latter, of version `before`, to the others. An error
@@ -188,10 +278,10 @@ fn put(staged: &Path, directory: &Path, before: u32) -> Result<(), BundleError> 
             fs::remove_dir_all(&kept)?;
         }
         fs::create_dir_all(kept.parent().unwrap_or(&kept))?;
-        exchange(staged, directory)?;
-        fs::rename(staged, &kept).inspect_err(|_| {
+        place::exchange(staged, directory)?;
+        move_folder(staged, &kept).inspect_err(|_| {
             // back, so that what was in place is there again
-            let _ = exchange(staged, directory);
+            let _ = place::exchange(staged, directory);
         })?;
         Ok(())
     };

@@ -12,8 +12,13 @@
 //! | `spec.toml` | the vehicle file that the bundle was built from, for the record; may be absent |
 //! | `SHA256SUMS` | checksums of all of these, in the form of `sha256sum` |
 
+mod carried;
 mod checksums;
 mod history;
+mod library;
+mod lock;
+mod place;
+mod source;
 mod tensors;
 mod vehicle_file;
 
@@ -34,7 +39,10 @@ use crate::served::ServedVehicle;
 use crate::vehicle::{Vehicle, VehicleError};
 use vehicle_file::VehicleFile;
 
+pub use carried::Carried;
 pub use history::{Kept, apply, kept, roll_back, succeed, succeed_together};
+pub use library::{Library, LibraryError, canonical};
+pub use source::Source;
 pub use tensors::TensorError;
 
 /// The file that makes a folder a bundle.
@@ -63,9 +71,6 @@ const OPTIONAL: [&str; 4] = [SDF_FILE, NETWORK_FILE, EFFECTS_FILE, SPEC_FILE];
 
 /// Format of the bundles that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;
-
-/// No file of a bundle is larger [bytes].
-const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// Everything in a bundle.
 #[derive(Debug, Clone)]
@@ -101,10 +106,27 @@ pub enum Fault {
     #[error("{0}")]
     Io(#[from] std::io::Error),
     /// Larger than any bundle's file is.
-    #[error("{bytes} bytes, more than the {MAX_FILE_BYTES} that are read")]
+    #[error("{bytes} bytes, more than the {most} that are read of such a file")]
     TooLarge {
         /// Its size.
         bytes: u64,
+        /// The most.
+        most: u64,
+    },
+    /// A pipe, a socket, a device or a folder.
+    #[error("is no regular file")]
+    NotAFile,
+    /// A link out of the bundle.
+    #[error("is a link to {}, outside the bundle: copy the file in its place", .to.display())]
+    LeadsOut {
+        /// What it leads to.
+        to: PathBuf,
+    },
+    /// Another process writes the bundle.
+    #[error("{} is writing this bundle: wait for it to end", if .by.is_empty() { "another process" } else { .by.as_str() })]
+    Locked {
+        /// The process, as it said.
+        by: String,
     },
     /// Written by a newer program.
     #[error("format {found} is newer than {FORMAT}, the newest that this program reads: update wade")]
@@ -221,30 +243,32 @@ fn at(path: &Path) -> impl FnOnce(Fault) -> BundleError {
 
 /// The files of a bundle in memory, their checksums verified.
 struct Files {
+    /// The folder, or what stands for it in errors.
     directory: PathBuf,
     files: BTreeMap<&'static str, Vec<u8>>,
 }
 
 impl Files {
     /// Reads and verifies every file; the vehicle file first, since a newer format may well have other files.
-    fn read(directory: &Path) -> Result<(Self, VehicleFile), BundleError> {
+    fn read(source: &Source) -> Result<(Self, VehicleFile), BundleError> {
+        let directory = source.path();
+        let _lock = lock::shared(&directory);
         let path = directory.join(VEHICLE_FILE);
-        let bytes = read_bounded(&path)?;
-        let vehicle_file = VehicleFile::parse(&bytes, directory).map_err(at(&path))?;
+        let bytes = source.file(VEHICLE_FILE)?;
+        let vehicle_file = VehicleFile::parse(&bytes, &directory).map_err(at(&path))?;
         let sums_path = directory.join(SUMS_FILE);
-        let sums = checksums::parse(&read_bounded(&sums_path)?).map_err(at(&sums_path))?;
+        let sums = checksums::parse(&source.file(SUMS_FILE)?).map_err(at(&sums_path))?;
         let mut files = BTreeMap::from([(VEHICLE_FILE, bytes)]);
         for name in FILES.into_iter().filter(|name| ![VEHICLE_FILE, SUMS_FILE].contains(name)) {
-            let path = directory.join(name);
-            if OPTIONAL.contains(&name) && !path.exists() && !sums.contains_key(name) {
+            if OPTIONAL.contains(&name) && !source.has(name) && !sums.contains_key(name) {
                 continue;
             }
-            files.insert(name, read_bounded(&path)?);
+            files.insert(name, source.file(name)?);
         }
         for (name, bytes) in &files {
             checksums::verify(&sums, name, bytes).map_err(at(&directory.join(name)))?;
         }
-        Ok((Self { directory: directory.to_owned(), files }, vehicle_file))
+        Ok((Self { directory, files }, vehicle_file))
     }
 
     /// Parses one file, with the path in the error.
@@ -345,34 +369,45 @@ pub fn names_in(directory: &Path) -> std::io::Result<Vec<String>> {
 
 /// Reads the model without its effects; a signed distance grid is verified but not unpacked.
 pub fn load(directory: &Path, isa: Isa) -> Result<Model, BundleError> {
-    Ok(load_parts(directory, isa)?.0)
+    Ok(Source::Folder(directory.to_owned()).parts(isa)?.0)
 }
 
 /// Reads what serving needs: the model and the effects that were added to it.
 pub fn load_served(directory: &Path, isa: Isa) -> Result<ServedVehicle, BundleError> {
-    let (model, effects) = load_parts(directory, isa)?;
+    let (model, effects) = Source::Folder(directory.to_owned()).parts(isa)?;
     Ok(ServedVehicle::new(model, effects))
 }
 
-fn load_parts(directory: &Path, isa: Isa) -> Result<(Model, Option<EffectsFile>), BundleError> {
-    let (files, vehicle_file) = Files::read(directory)?;
-    let vehicle = files.vehicle(&vehicle_file)?;
-    let (weights, domain) = files.trained(&vehicle_file)?.ok_or(Fault::NoWeights).map_err(at(directory))?;
-    let effects = files.effects(&vehicle.name)?;
-    Ok((Model::new(vehicle, vehicle_file.version, domain, weights, isa), effects))
+impl Source {
+    fn parts(&self, isa: Isa) -> Result<(Model, Option<EffectsFile>), BundleError> {
+        let (files, vehicle_file) = Files::read(self)?;
+        let vehicle = files.vehicle(&vehicle_file)?;
+        let trained = files.trained(&vehicle_file)?.ok_or(Fault::NoWeights);
+        let (weights, domain) = trained.map_err(at(&files.directory))?;
+        let effects = files.effects(&vehicle.name)?;
+        Ok((Model::new(vehicle, vehicle_file.version, domain, weights, isa), effects))
+    }
+
+    fn bundle(&self) -> Result<Bundle, BundleError> {
+        let (files, vehicle_file) = Files::read(self)?;
+        files.bundle(&vehicle_file, files.trained(&vehicle_file)?)
+    }
+
+    fn bundle_without_weights(&self) -> Result<Bundle, BundleError> {
+        let (files, vehicle_file) = Files::read(self)?;
+        files.bundle(&vehicle_file, None)
+    }
 }
 
 /// Reads everything.
 pub fn read(directory: &Path) -> Result<Bundle, BundleError> {
-    let (files, vehicle_file) = Files::read(directory)?;
-    files.bundle(&vehicle_file, files.trained(&vehicle_file)?)
+    Source::Folder(directory.to_owned()).bundle()
 }
 
 /// Reads everything but the weights, for work that needs none or brings new ones: those in place may be of an older
 /// release, which this one cannot read.
 pub fn read_without_weights(directory: &Path) -> Result<Bundle, BundleError> {
-    let (files, vehicle_file) = Files::read(directory)?;
-    files.bundle(&vehicle_file, None)
+    Source::Folder(directory.to_owned()).bundle_without_weights()
 }
 
 /// Refuses a place that a bundle of this name may not take: another name's folder, or one with other files in it.
@@ -397,8 +432,9 @@ pub fn check_place(directory: &Path, name: &str) -> Result<(), BundleError> {
 /// Writes a bundle beside its place and then puts it there, so that a reader sees the one before or this one. The one
 /// before is deleted.
 pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
+    let _lock = lock::exclusive(directory)?;
     let staged = stage(directory, bundle)?;
-    place(&staged, directory).map_err(|error| at(directory)(error.into()))?;
+    place::place(&staged, directory).map_err(|error| at(directory)(error.into()))?;
     // the one before
     let _ = fs::remove_dir_all(staged);
     Ok(())
@@ -432,7 +468,8 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
     let stage = || {
         let _ = fs::remove_dir_all(&staged);
         fs::create_dir_all(&staged)?;
-        files.iter().try_for_each(|(name, bytes)| fs::write(staged.join(name), bytes))
+        files.iter().try_for_each(|(name, bytes)| place::write_synced(&staged.join(name), bytes))?;
+        place::sync_folder(&staged)
     };
     stage().map_err(|error| at(&staged)(error.into()))?;
     Ok(staged)
@@ -450,26 +487,4 @@ pub fn distance_of(bytes: &[u8]) -> Result<SignedDistanceGrid, TensorError> {
 
 fn staging_of(directory: &Path, name: &str) -> PathBuf {
     directory.with_file_name(format!(".{name}.new"))
-}
-
-/// Puts what was staged in its place, and what was there where that was staged.
-fn place(staged: &Path, directory: &Path) -> std::io::Result<()> {
-    if directory.exists() { Ok(exchange(staged, directory)?) } else { fs::rename(staged, directory) }
-}
-
-/// Exchanges the staged folder with the one in place in a single step of the file system.
-fn exchange(staged: &Path, directory: &Path) -> std::io::Result<()> {
-    use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
-    Ok(renameat2(AT_FDCWD, staged, AT_FDCWD, directory, RenameFlags::RENAME_EXCHANGE)?)
-}
-
-fn read_bounded(path: &Path) -> Result<Vec<u8>, BundleError> {
-    let read = || {
-        let bytes = fs::metadata(path)?.len();
-        if bytes > MAX_FILE_BYTES {
-            return Err(Fault::TooLarge { bytes });
-        }
-        Ok(fs::read(path)?)
-    };
-    read().map_err(at(path))
 }

@@ -8,7 +8,6 @@ use anyhow::{Context, Result, bail};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade::bundle;
 use wade::cfd::case::Settings;
 use wade::cfd::collect::{self, Collected};
 use wade::cfd::openfoam::OpenFoam;
@@ -164,7 +163,7 @@ enum Target {
 
 impl PlanCommand {
     fn run(self) -> Result<ExitCode> {
-        let bundle = bundle::read_without_weights(&self.vehicles.existing(&self.vehicle)?)?;
+        let bundle = self.vehicles.without_weights(&self.vehicle)?;
         let exists = self.out.join(plan::CAMPAIGN_FILE).exists();
         let of_a_campaign = [plan::PLAN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
         if let Some(left) = of_a_campaign.into_iter().find(|name| !exists && self.out.join(name).exists()) {
@@ -258,7 +257,7 @@ struct Run {
 impl Run {
     fn run(self) -> Result<ExitCode> {
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read_without_weights(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
+        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         if let Some(unknown) = self.case.iter().find(|id| !plan.cases.iter().any(|c| c.id == **id)) {
             bail!("{} has no case `{unknown}`", self.campaign.display());
@@ -329,7 +328,7 @@ struct Collect {
 impl Collect {
     fn run(self) -> Result<ExitCode> {
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read_without_weights(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
+        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: true };
         let new = collect::collect(&self.campaign, &plan, &bundle.vehicle, &work)?;
@@ -366,7 +365,7 @@ struct Trials {
 impl Trials {
     fn run(self) -> Result<ExitCode> {
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read_without_weights(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
+        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         let dataset = dataset::read(&self.campaign.join(collect::SECTIONS_FILE))?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
@@ -406,7 +405,7 @@ impl Report {
         let files = files.map(|name| self.campaign.join(name));
         let written = super::begin_page(self.html.as_deref(), files)?;
         let plan = Plan::read(&self.campaign)?;
-        let bundle = bundle::read_without_weights(&self.vehicles.existing(&plan.campaign.vehicle)?)?;
+        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
         plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
         let report = report::Report::of(&self.campaign, &plan, &bundle.vehicle)?;
         if self.json {

@@ -12,7 +12,6 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use wade::bundle;
 use wade::dataset::import::{Format, Import, LEFT_OUT};
 use wade::dataset::sections::Sections;
 use wade::dataset::split::{self, By};
@@ -363,9 +362,7 @@ fn read_vehicles<'a>(
     vehicles: &Vehicles,
     names: impl Iterator<Item = &'a String>,
 ) -> Result<BTreeMap<String, Vehicle>> {
-    names
-        .map(|name| Ok((name.clone(), bundle::read_without_weights(&vehicles.bundle(name))?.vehicle)))
-        .collect()
+    names.map(|name| Ok((name.clone(), vehicles.without_weights(name)?.vehicle))).collect()
 }
 
 fn keys<T>(map: &BTreeMap<String, T>) -> String {
@@ -392,7 +389,7 @@ fn describe(file: &Path, html: Option<&Path>, as_json: bool, vehicles: &Vehicles
         .meta
         .vehicles
         .keys()
-        .filter_map(|name| Some((name, bundle::read_without_weights(&vehicles.bundle(name)).ok()?.vehicle)))
+        .filter_map(|name| Some((name, vehicles.without_weights(name).ok()?.vehicle)))
         .collect();
     let kind = |vehicle: &str, surface: &str| {
         let vehicle = known.get(&vehicle.to_owned())?;

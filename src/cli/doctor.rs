@@ -18,7 +18,7 @@ use wade::service::occupant::{self, Occupant};
 use wade::service::shm::Wait;
 use wade::service::wire::State;
 
-use super::{PROGRAM, Vehicles, bundle_names, emit};
+use super::{PROGRAM, Vehicles, emit};
 
 /// Check what wade needs of this machine, and say the way out of what is missing
 ///
@@ -87,8 +87,8 @@ impl Doctor {
     /// Prints a line a check.
     pub fn run(self) -> Result<ExitCode> {
         let (settings, config) = self.settings();
-        let names = bundle_names(&self.vehicles.directory()).unwrap_or_default();
-        let mut checks = vec![Check::ok("program", PROGRAM), settings, self.vehicles(&names)];
+        let names = self.vehicles.library().and_then(|library| Ok(library.names()?)).unwrap_or_default();
+        let mut checks = vec![Check::ok("program", PROGRAM), settings, self.vehicles()];
         checks.extend([
             port("gRPC address", &config.grpc.listen, "--listen (grpc.listen)"),
             port("HTTP address", &config.http.listen, "--http (http.listen)"),
@@ -126,23 +126,24 @@ impl Doctor {
         }
     }
 
-    fn vehicles(&self, names: &[String]) -> Check {
-        let folder = self.vehicles.directory();
-        let broken = names.iter().find_map(|name| self.vehicles.served(name).err());
-        let at = folder.display();
-        match (names, broken) {
-            ([], _) => Check::fail(
-                "vehicles",
-                format!("none in {at}"),
-                "name their folder with --vehicles or WADE_VEHICLES",
-            ),
-            (_, Some(error)) => Check::fail(
-                "vehicles",
-                format!("{error:#}"),
-                "wade vehicle check DIR says more; put a sound version back with wade vehicle rollback",
-            ),
-            (names, None) => Check::ok("vehicles", format!("{} in {at}", names.join(", "))),
+    fn vehicles(&self) -> Check {
+        let fail = |error: &anyhow::Error| {
+            let way_out =
+                "wade vehicle check DIR says more; put a sound version back with wade vehicle rollback";
+            Check::fail("vehicles", format!("{error:#}"), way_out)
+        };
+        let library = match self.vehicles.library() {
+            Ok(library) => library,
+            Err(error) => return fail(&error),
+        };
+        let mut found = Vec::new();
+        for name in library.names().unwrap_or_default() {
+            match library.served(&name, Isa::available()[0]) {
+                Ok(served) => found.push(format!("{name} ({})", served.origin())),
+                Err(error) => return fail(&error.into()),
+            }
         }
+        Check::ok("vehicles", found.join(", "))
     }
 }
 

@@ -7,7 +7,6 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
-use wade::bundle;
 use wade::dataset::split;
 use wade::evaluate::contest::{Contest, Contestants, enter};
 use wade::evaluate::report::{About, Report, VehicleReport};
@@ -77,12 +76,12 @@ impl Eval {
             );
         }
         let record = Record::read(&self.trained).context("which states were held out is not known")?;
-        let loaded = self.data.load(&record.config)?;
+        let loaded = self.data.load(&record.config, &self.data.vehicles.library()?)?;
         let source = loaded.source(&record.config)?;
         let split = held_out::of(&record, &loaded.file, &source)?;
-        let mut models = BTreeMap::new();
+        let (mut models, library) = (BTreeMap::new(), self.data.vehicles.library()?);
         for name in loaded.bundles.keys() {
-            let bundle = bundle::read(&self.data.vehicles.bundle(name))?;
+            let bundle = library.read(name)?;
             let Some((weights, domain)) = bundle.trained else { bail!("{name}: the bundle has no weights") };
             held_out::check_weights(&record, name, &weights)?;
             let model = Model::new(bundle.vehicle, bundle.version, domain, weights, Isa::available()[0]);
@@ -119,7 +118,7 @@ impl Eval {
         let config = self.data.settings(first)?;
         let of_paper = self.data.settings(Served::Paper)?;
         let mut settings = self.ablation_settings(&of_paper);
-        let loaded = self.data.load(&config)?;
+        let loaded = self.data.load(&config, &self.data.vehicles.library()?)?;
         let source = loaded.source(&config)?;
         let by = rule.by(config.held_out_share, config.parts);
         let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;

@@ -6,12 +6,13 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use serde_json::json;
-use wade::bundle;
+use wade::bundle::{self, Library};
 use wade::effects::{Body, EffectsFile};
-use wade::files::{sha256_of, write_whole};
+use wade::files::write_whole;
 use wade::forces::Forces;
 use wade::frame::Vec3;
 use wade::gap::{self, Config, GapError, NotApplicable, Predicted, Report, effects_file};
+use wade::model::kernel::Isa;
 use wade::model::{Model, Workspace};
 use wade::trials::{SimIs, Trials};
 
@@ -207,7 +208,7 @@ impl Source {
         Ok(config)
     }
 
-    fn run(&self) -> Result<(Report, Trials)> {
+    fn run(&self, library: &Library) -> Result<(Report, Trials)> {
         let (Some(vehicle), Some(folder)) = (&self.vehicle, &self.trials) else {
             usage_error("give --vehicle and --trials")
         };
@@ -217,14 +218,14 @@ impl Source {
             let (trials, asked) = (trials.manifest.vehicle.clone(), vehicle.clone());
             return Err(GapError::Vehicle { trials, asked }.into());
         }
-        let bundle = self.vehicles.bundle(vehicle);
-        let report = if bundle.is_dir() {
-            let model = self.vehicles.model(vehicle)?;
+        let has_bundle = library.has(vehicle);
+        let report = if has_bundle {
+            let model = library.model(vehicle, Isa::available()[0])?;
             let body = Body::of_vehicle(model.vehicle());
             gap::run(&trials, &body, &mut predictor(&model), &config)
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
-            let nothing = || format!("there is no bundle {}", bundle.display());
+            let nothing = || format!("there is no vehicle `{vehicle}` ({})", library.origin());
             if let Some(trial) = alone {
                 let (trial, vehicle) = (trial.name.clone(), vehicle.clone());
                 return Err(GapError::NoPrediction { trial, vehicle }).with_context(nothing);
@@ -237,17 +238,17 @@ impl Source {
             Err(_) => trials.remarks().iter().for_each(|remark| eprintln!("{remark}")),
         }
         let mut report = report.with_context(|| folder.display().to_string())?;
-        report.sources.model = if is_anothers(&trials) || !bundle.is_dir() {
+        report.sources.model = if is_anothers(&trials) || !has_bundle {
             "the sim_ columns of the trials".into()
         } else {
-            bundle_hash(&bundle)?
+            library.digest(vehicle)?
         };
         report.sources.tool = format!("wade {} ({})", env!("CARGO_PKG_VERSION"), env!("WADE_COMMIT"));
         Ok((report, trials))
     }
 
     fn locate(&self) -> Result<ExitCode> {
-        let (report, _) = self.run()?;
+        let (report, _) = self.run(&self.vehicles.library()?)?;
         let text = match self.json {
             true => pretty(&json!({ "regions": report.regions, "regions_tried": report.regions_tried }))?,
             false => regions(&report),
@@ -257,7 +258,7 @@ impl Source {
     }
 
     fn name(&self) -> Result<ExitCode> {
-        let (report, _) = self.run()?;
+        let (report, _) = self.run(&self.vehicles.library()?)?;
         let names: Vec<&str> = report.effects.iter().map(|effect| effect.name).collect();
         let text = match self.json {
             true => pretty(&json!({
@@ -275,7 +276,7 @@ impl Source {
     }
 
     fn fit(&self) -> Result<ExitCode> {
-        let (report, _) = self.run()?;
+        let (report, _) = self.run(&self.vehicles.library()?)?;
         let text = match self.json {
             true => pretty(&json!({ "verdict": report.verdict, "effects": report.effects }))?,
             false => parameters(&report),
@@ -286,14 +287,18 @@ impl Source {
 
     fn report(&self, out: &Path, apply: Option<&Adding>) -> Result<ExitCode> {
         check_report_folder(out)?;
-        let (report, trials) = self.run()?;
+        let library = match apply {
+            Some(_) => self.vehicles.library_to_write()?,
+            None => self.vehicles.library()?,
+        };
+        let (report, trials) = self.run(&library)?;
         let json = serde_json::to_string_pretty(&report)? + "\n";
         let page = report.page()?;
         let effects = apply.map(|apply| effects_file(&report, &trials, apply.provisional));
-        let bundle = self.vehicles.bundle(&report.vehicle);
-        let bundle = Some(bundle).filter(|bundle| bundle.is_dir() && !is_anothers(&trials));
-        if let (Some(Ok(effects)), Some(bundle), Some(apply)) = (&effects, &bundle, apply) {
-            check_loss(effects, bundle, apply.replace, has_control(&trials))?;
+        let to_bundle = library.has(&report.vehicle) && !is_anothers(&trials);
+        if let (Some(Ok(effects)), true, Some(apply)) = (&effects, to_bundle, apply) {
+            let before = library.read(&report.vehicle)?.effects.filter(|_| !apply.replace);
+            check_loss(effects, before, &library.source(&report.vehicle)?, has_control(&trials))?;
         }
         std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
         write(&out.join("report.json"), Some(&json))?;
@@ -309,9 +314,9 @@ impl Source {
             out.join("index.html").display()
         );
         emit(if self.json { &json } else { &text })?;
-        match (effects, bundle, apply) {
-            (Some(Ok(effects)), Some(bundle), Some(apply)) => {
-                let version = bundle::apply(&bundle, effects)?;
+        match (effects, to_bundle, apply) {
+            (Some(Ok(effects)), true, Some(apply)) => {
+                let (bundle, version) = library.apply(&report.vehicle, effects)?;
                 eprintln!(
                     "{}: version {version}; `wade vehicle rollback {}` restores the previous version",
                     bundle.display(),
@@ -320,7 +325,7 @@ impl Source {
                 apply.running.reload(&report.vehicle, &bundle);
                 Ok(ExitCode::SUCCESS)
             }
-            (Some(Ok(_)), None, _) => {
+            (Some(Ok(_)), false, _) => {
                 let why = if is_anothers(&trials) {
                     "the gap is another simulator's"
                 } else {
@@ -349,8 +354,13 @@ fn has_control(trials: &Trials) -> bool {
 }
 
 /// Effects that other trials gave must not go unnoticed because these trials do not show them.
-fn check_loss(effects: &EffectsFile, directory: &Path, replace: bool, has_control: bool) -> Result<()> {
-    let Some(before) = bundle::read(directory)?.effects.filter(|_| !replace) else { return Ok(()) };
+fn check_loss(
+    effects: &EffectsFile,
+    before: Option<EffectsFile>,
+    source: &bundle::Source,
+    has_control: bool,
+) -> Result<()> {
+    let Some(before) = before else { return Ok(()) };
     let stays = |name| effects.effects.iter().any(|effect| effect.name == name);
     let lost: Vec<&str> =
         before.effects.iter().filter(|effect| !stays(effect.name)).map(|effect| effect.name.name()).collect();
@@ -361,7 +371,7 @@ fn check_loss(effects: &EffectsFile, directory: &Path, replace: bool, has_contro
     let way_out = if has_control { "" } else { "put all trials into one folder, or " };
     bail!(
         "{}: {} came from other trials ({}), and these do not name it: {way_out}take it out with --replace",
-        directory.join("effects.toml").display(),
+        source.path().join("effects.toml").display(),
         lost.join(" and "),
         before.evidence.trials.join(", ")
     )
@@ -387,12 +397,6 @@ fn predictor(model: &Model) -> impl FnMut(&wade::condition::Condition) -> Predic
             outside: !forces.outside.is_inside(),
         }
     }
-}
-
-/// The hash of a bundle's own list of hashes.
-fn bundle_hash(bundle: &Path) -> Result<String> {
-    let path = bundle.join("SHA256SUMS");
-    sha256_of(&path).with_context(|| path.display().to_string())
 }
 
 /// Puts a file in its place as a whole, or takes it away.

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use tracing_subscriber::EnvFilter;
+use wade::bundle::Library;
 use wade::config::{Config, Log};
 use wade::server::Running;
 use wade::service::health::{Part, State};
@@ -34,7 +35,10 @@ pub fn starting(config: &Config, file: Option<&Path>) {
         Some(file) => tracing::info!(file = %absolute(file), "settings"),
         None => tracing::info!("settings: the defaults, no --config"),
     }
-    tracing::info!(folder = %absolute(&config.vehicles_directory()), "vehicles");
+    // what cannot be opened is an error in a moment
+    if let Ok(library) = Library::open(config.named_vehicles()) {
+        tracing::info!(from = library.origin(), "vehicles");
+    }
 }
 
 /// Says where the server can be reached, and after how long.

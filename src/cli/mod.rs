@@ -28,7 +28,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
-use wade::config::Config;
+use wade::bundle::{Bundle, Library};
 use wade::files::StagedFile;
 use wade::model::Model;
 use wade::model::kernel::Isa;
@@ -114,42 +114,45 @@ fn usage_error(message: &str) -> ! {
 /// Where the bundles are, for commands that read them themselves.
 #[derive(Debug, Args)]
 struct Vehicles {
-    /// Folder of the vehicle bundles [default: ./vehicles, or those that were installed with wade]
-    #[arg(long, value_name = "DIR", env = "WADE_VEHICLES")]
+    /// Folder of the vehicle bundles [default: the first that exists of $XDG_DATA_HOME/wade/vehicles (~/.local/share),
+    /// vehicles beside the program and ../share/wade/vehicles; vehicles that it lacks are those that wade carries]
+    #[arg(long, value_name = "DIR", env = "WADE_VEHICLES", value_parser = path_or_nothing)]
     vehicles: Option<PathBuf>,
 }
 
 impl Vehicles {
-    fn directory(&self) -> PathBuf {
-        let vehicles = self.vehicles.clone().unwrap_or_else(|| Config::default().vehicles);
-        Config { vehicles, ..Config::default() }.vehicles_directory()
+    fn named(&self) -> Option<&Path> {
+        self.vehicles.as_deref().filter(|folder| !folder.as_os_str().is_empty())
     }
 
-    fn bundle(&self, name: &str) -> PathBuf {
-        self.directory().join(name)
+    fn library(&self) -> Result<Library> {
+        Ok(Library::open(self.named())?)
     }
 
-    /// The folder of a bundle that must be there.
-    fn existing(&self, name: &str) -> Result<PathBuf> {
-        let (directory, bundle) = (self.directory(), self.bundle(name));
-        if !bundle.is_dir() {
-            let names = bundle_names(&directory).with_context(|| format!("there is no vehicle `{name}`"))?;
-            let names = names.join(", ");
-            let there = if names.is_empty() { "holds none".to_owned() } else { format!("has {names}") };
-            bail!("there is no vehicle `{name}`: {} {there} (--vehicles)", directory.display());
-        }
-        Ok(bundle)
+    /// For commands that write bundles: the folder that was named need not be there yet.
+    fn library_to_write(&self) -> Result<Library> {
+        Ok(Library::open_to_write(self.named())?)
     }
 
     /// The model without the effects that were added to it.
     fn model(&self, name: &str) -> Result<Model> {
-        Ok(wade::bundle::load(&self.existing(name)?, Isa::available()[0])?)
+        Ok(self.library()?.model(name, Isa::available()[0])?)
     }
 
     /// What a server would serve.
     fn served(&self, name: &str) -> Result<ServedVehicle> {
-        Ok(wade::bundle::load_served(&self.existing(name)?, Isa::available()[0])?)
+        Ok(self.library()?.served(name, Isa::available()[0])?)
     }
+
+    /// Everything in a bundle but its weights.
+    fn without_weights(&self, name: &str) -> Result<Bundle> {
+        Ok(self.library()?.read_without_weights(name)?)
+    }
+}
+
+/// The parser of paths refuses the empty string, which here means none.
+fn path_or_nothing(text: &str) -> Result<PathBuf, std::convert::Infallible> {
+    Ok(PathBuf::from(text))
 }
 
 /// Refuses a folder for reports that holds a bundle: a file of either would pass for one of the other.
@@ -196,11 +199,6 @@ impl Page {
         let written = file.write_all(text.as_bytes()).and_then(|()| file.finish());
         written.with_context(|| place.display().to_string())
     }
-}
-
-/// Names of the bundles in a folder, sorted.
-fn bundle_names(directory: &Path) -> Result<Vec<String>> {
-    wade::bundle::names_in(directory).with_context(|| format!("cannot read {}", directory.display()))
 }
 
 #[cfg(test)]

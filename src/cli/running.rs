@@ -33,7 +33,7 @@ impl Running {
     /// Has the server read the bundle in this folder again, if it serves from there. Whatever becomes of that is no failure
     /// of the command: its own work is done.
     pub fn reload(&self, vehicle: &str, bundle: &Path) {
-        let folder = std::fs::canonicalize(bundle).unwrap_or_else(|_| bundle.to_owned());
+        let folder = wade::bundle::canonical(bundle);
         let request = ReloadRequest { vehicle: vehicle.to_owned(), bundle: folder.display().to_string() };
         let server = &self.server;
         match reload(&server.url().unwrap_or_default(), request, TIMEOUT) {

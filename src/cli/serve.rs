@@ -29,14 +29,15 @@ pub struct Serve {
     /// Settings, as in deploy/wade.toml
     #[arg(long, value_name = "FILE", env = "WADE_CONFIG")]
     config: Option<PathBuf>,
-    /// Folder of the vehicle bundles
-    #[arg(long, value_name = "DIR", env = "WADE_VEHICLES")]
+    /// Folder of the vehicle bundles [default: the first that exists of $XDG_DATA_HOME/wade/vehicles (~/.local/share),
+    /// vehicles beside the program and ../share/wade/vehicles; vehicles that it lacks are those that wade carries]
+    #[arg(long, value_name = "DIR", env = "WADE_VEHICLES", value_parser = super::path_or_nothing)]
     vehicles: Option<PathBuf>,
     /// Address of gRPC; empty for none
     #[arg(long, value_name = "ADDR")]
     listen: Option<String>,
     /// Unix socket of gRPC; empty for none
-    #[arg(long, value_name = "PATH", value_parser = path_or_nothing)]
+    #[arg(long, value_name = "PATH", value_parser = super::path_or_nothing)]
     unix_socket: Option<PathBuf>,
     /// Address of metrics and probes; empty for none
     #[arg(long, value_name = "ADDR")]
@@ -136,11 +137,6 @@ fn raise_descriptors() {
 
 /// More descriptors than any server here needs; where the system allows a billion, nobody wants to walk through them.
 const MAX_DESCRIPTORS: u64 = 1 << 20;
-
-/// The parser of paths refuses the empty string, which here means none.
-fn path_or_nothing(text: &str) -> Result<PathBuf, std::convert::Infallible> {
-    Ok(PathBuf::from(text))
-}
 
 fn set<T>(place: &mut T, value: Option<T>) {
     if let Some(value) = value {

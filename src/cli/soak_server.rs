@@ -1,7 +1,7 @@
 //! The server that a soak starts for itself.
 
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 
 use anyhow::{Context, Result, bail};
@@ -40,7 +40,10 @@ impl Server {
         let folder = TempDir::new()?;
         let socket = folder.path().join("wade.sock");
         let namespace = format!("soak-{}", std::process::id());
-        let mut config = wade::config::Config { vehicles: wanted.vehicles.directory(), ..Default::default() };
+        let mut config = wade::config::Config {
+            vehicles: wanted.vehicles.named().map(Path::to_owned).unwrap_or_default(),
+            ..Default::default()
+        };
         config.cpus.extend(wanted.cpu);
         config.http.listen = String::new();
         config.log.filter = "warn,iceoryx2_bb_loggers=error".into();

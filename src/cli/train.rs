@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade::bundle::{self, Bundle};
+use wade::bundle::{self, Bundle, Library};
 use wade::dataset::split::{self, By};
 use wade::dataset::{self, Dataset};
 use wade::domain::Domain;
@@ -22,7 +22,7 @@ use wade::train::report::{DataFile, Record, VehicleRecord};
 use wade::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant, anchored};
 
 use super::running::Running;
-use super::{PROGRAM, Vehicles, bundle_names, check_report_folder, usage_error};
+use super::{PROGRAM, Vehicles, check_report_folder, usage_error};
 
 /// Train one network for the vehicles of a data set and write it into their bundles
 ///
@@ -232,20 +232,19 @@ impl Data {
     }
 
     /// Reads or generates the data set, and reads the bundles of its vehicles but for their weights.
-    pub fn load(&self, config: &Config) -> Result<Loaded> {
+    pub fn load(&self, config: &Config, library: &Library) -> Result<Loaded> {
         config.validate()?;
-        if self.is_analytic() { self.generate(config) } else { self.read() }
+        if self.is_analytic() { self.generate(config, library) } else { self.read(library) }
     }
 
-    fn generate(&self, config: &Config) -> Result<Loaded> {
-        let directory = self.vehicles.directory();
+    fn generate(&self, config: &Config, library: &Library) -> Result<Loaded> {
         let tables = &config.analytic.tables;
         let (known, unknown): (Vec<_>, Vec<_>) =
-            bundle_names(&directory)?.into_iter().partition(|name| tables.contains_key(name));
+            library.names()?.into_iter().partition(|name| tables.contains_key(name));
         unknown
             .iter()
             .for_each(|name| eprintln!("{name}: left as it is, there is no parameter table for it"));
-        let bundles = self.bundles(known.iter())?;
+        let bundles = bundles(library, known.iter())?;
         let vehicles = bundles.iter().map(|(name, bundle)| (name.clone(), bundle.vehicle.clone())).collect();
         let data = train::analytic::dataset(&vehicles, &config.analytic, config.seed)?;
         let provenance = data.meta.provenance.clone();
@@ -254,22 +253,23 @@ impl Data {
         Ok(Loaded { file, bundles, data, domains })
     }
 
-    fn read(&self) -> Result<Loaded> {
+    fn read(&self, library: &Library) -> Result<Loaded> {
         let data = dataset::read(&self.data)?;
         let sha256 = Some(sha256_of(&self.data).with_context(|| self.data.display().to_string())?);
         // its folder is of this machine alone
         let name = self.data.file_name().unwrap_or(self.data.as_os_str());
         let (name, provenance) = (name.to_string_lossy().into_owned(), data.meta.provenance.clone());
-        let bundles = self.bundles(data.meta.vehicles.keys())?;
+        let bundles = bundles(library, data.meta.vehicles.keys())?;
         let file = DataFile { name, sha256, provenance };
         Ok(Loaded { file, bundles, data, domains: BTreeMap::new() })
     }
+}
 
-    fn bundles<'a>(&self, names: impl Iterator<Item = &'a String>) -> Result<BTreeMap<String, Bundle>> {
-        names
-            .map(|name| Ok((name.clone(), bundle::read_without_weights(&self.vehicles.bundle(name))?)))
-            .collect()
-    }
+fn bundles<'a>(
+    library: &Library,
+    names: impl Iterator<Item = &'a String>,
+) -> Result<BTreeMap<String, Bundle>> {
+    names.map(|name| Ok((name.clone(), library.read_without_weights(name)?))).collect()
 }
 
 /// Lays what a table states over another, key by key.
@@ -319,7 +319,8 @@ impl Train {
         let mut config = self.data.settings(self.variant)?;
         config.epochs = self.epochs.unwrap_or(config.epochs);
         config.seed = self.seed.unwrap_or(config.seed);
-        let loaded = self.data.load(&config)?;
+        let library = self.data.vehicles.library_to_write()?;
+        let loaded = self.data.load(&config, &library)?;
         let source = loaded.source(&config)?;
         let by = self.split.by(config.held_out_share, config.parts);
         let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;
@@ -329,8 +330,9 @@ impl Train {
         // a long training is not to end in a folder that cannot be written
         check_report_folder(&self.out)?;
         std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
-        for name in loaded.bundles.keys() {
-            bundle::check_place(&self.data.vehicles.bundle(name), name)?;
+        let names: Vec<&str> = loaded.bundles.keys().map(String::as_str).collect();
+        for (place, name) in library.targets(&names)?.iter().zip(names) {
+            bundle::check_place(place, name)?;
         }
         if let Some(path) = &self.checkpoint {
             StagedFile::new(path).with_context(|| path.display().to_string())?;
@@ -353,12 +355,13 @@ impl Train {
                 eprintln!("{name}: its effects are taken out with its former weights; run wade gap again");
             }
             let bundle = Bundle { trained: Some(weights.clone()), effects: None, ..bundle.clone() };
-            next.push((self.data.vehicles.bundle(name), bundle));
+            next.push(bundle);
         }
-        let versions = bundle::succeed_together(next)?;
-        for (of_vehicle, version) in record.vehicles.iter().zip(versions) {
+        let placed = library.succeed_together(next)?;
+        for (of_vehicle, (place, version)) in record.vehicles.iter().zip(placed) {
             report(of_vehicle, record.judged(), version);
-            self.running.reload(&of_vehicle.name, &self.data.vehicles.bundle(&of_vehicle.name));
+            println!("  written to {}", place.display());
+            self.running.reload(&of_vehicle.name, &place);
         }
         // the last of all: who finds it finds the weights that it is about
         record.write(&self.out)?;

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -23,7 +23,7 @@ use wade::vehicle::shipped;
 use wade::vehicle::spec::VehicleSpec;
 
 use super::running::Running;
-use super::{Vehicles, bundle_names, emit};
+use super::{Vehicles, emit};
 
 /// Build, check and show vehicle bundles
 #[derive(Debug, Args)]
@@ -78,7 +78,7 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Names of the bundles
+    /// The vehicles that a server would serve, and where each is from
     #[command(after_help = "Example: wade vehicle list --json")]
     List {
         #[command(flatten)]
@@ -87,18 +87,33 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Versions of a vehicle: number, date, weights, effects, and where each is
+    #[command(after_help = "Example: wade vehicle versions husky")]
+    Versions {
+        /// Name of the vehicle
+        name: String,
+        #[command(flatten)]
+        vehicles: Vehicles,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Restore the version before the last wade train or wade gap --apply, or any version that is still stored
     ///
-    /// Versions lie in <VEHICLES>/<NAME>.versions. What leaves its place is kept too, so that --to puts it back.
+    /// Versions lie in <VEHICLES>/<NAME>.versions; wade vehicle versions lists them. What leaves its place is kept too, so that --to
+    /// puts it back. Without --to, versions that were taken back before are passed over.
     #[command(after_help = "Examples:
   wade vehicle rollback husky
-  wade vehicle rollback husky --to 4")]
+  wade vehicle rollback husky --to 4 --yes")]
     Rollback {
         /// Name of the vehicle
         name: String,
         /// Version to go to [default: the one before]
         #[arg(long, value_name = "VERSION")]
         to: Option<u32>,
+        /// Also where that changes the network, and not the effects alone
+        #[arg(long)]
+        yes: bool,
         #[command(flatten)]
         vehicles: Vehicles,
         #[command(flatten)]
@@ -168,29 +183,59 @@ impl Vehicle {
             }
             Command::Check { bundle, json } => return Ok(check(&bundle, json)),
             Command::List { vehicles, json } => {
-                let names = bundle_names(&vehicles.directory())?;
+                let library = vehicles.library()?;
+                let mut rows = Vec::new();
+                for name in library.names()? {
+                    let origin = library.source(&name)?.origin();
+                    rows.push((name, origin));
+                }
                 if json {
-                    emit(&format!("{}\n", json!(names)))?;
+                    let rows = rows.iter().map(|(name, origin)| json!({"name": name, "origin": origin}));
+                    emit(&format!("{}\n", json!(rows.collect::<Vec<_>>())))?;
                 } else {
-                    emit(&names.iter().map(|name| format!("{name}\n")).collect::<String>())?;
+                    let line = |(name, origin): &(String, String)| format!("{name:<16} {origin}\n");
+                    emit(&rows.iter().map(line).collect::<String>())?;
                 }
             }
-            Command::Rollback { name, to, vehicles, running } => {
-                let version = bundle::roll_back(&vehicles.existing(&name)?, to)?;
-                println!("{name}: version {version} is in its place again");
-                running.reload(&name, &vehicles.bundle(&name));
+            Command::Versions { name, vehicles, json } => {
+                let (current, others) = vehicles.library()?.versions(&name)?;
+                versions(&name, &current, &others, json)?;
+            }
+            Command::Rollback { name, to, yes, vehicles, running } => {
+                let library = vehicles.library()?;
+                let (current, target) = library.roll_back_plan(&name, to)?;
+                if current.network_sha256 != target.network_sha256 && !yes {
+                    bail!(
+                        "{name}: version {} has another network ({}) than version {} ({}): going back changes the model and not its effects alone; say --yes to do it",
+                        target.version,
+                        weights_text(&target),
+                        current.version,
+                        weights_text(&current)
+                    );
+                }
+                library.roll_back(&name, to)?;
+                println!(
+                    "{name}: version {} is in its place again ({})",
+                    target.version,
+                    target.source.origin()
+                );
+                println!("  weights: {}", weights_text(&target));
+                let gone = current.effects.iter().filter(|name| !target.effects.contains(name));
+                let gone: Vec<&str> = gone.copied().collect();
+                println!("  effects: {}; taken back: {}", list(&target.effects), list(&gone));
+                running.reload(&name, &library.place(&name).unwrap_or_default());
             }
             Command::Sdf { name, out, vehicles } => {
                 let out = out.unwrap_or_else(|| format!("{name}-sdf.safetensors").into());
-                sdf(&bundle::read_without_weights(&vehicles.existing(&name)?)?.vehicle.hull.mesh, &out)?;
+                sdf(&vehicles.without_weights(&name)?.vehicle.hull.mesh, &out)?;
             }
             Command::Reload { name, running } => {
                 let served = running.ask(name.as_deref().unwrap_or_default())?;
                 return Ok(if served { ExitCode::SUCCESS } else { ExitCode::FAILURE });
             }
             Command::Show { name, vehicles, json } => {
-                let directory = vehicles.existing(&name)?;
-                show(&bundle::read(&directory)?, &bundle::kept(&directory)?, json)?;
+                let library = vehicles.library()?;
+                show(&library.read(&name)?, &library.versions(&name)?.1, json)?;
             }
         }
         Ok(ExitCode::SUCCESS)
@@ -202,6 +247,56 @@ impl Vehicle {
 struct Made {
     seal: bool,
     sdf: bool,
+}
+
+fn list(names: &[&str]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+fn weights_text(version: &Kept) -> String {
+    let weights = version.weights.as_ref();
+    weights.map_or_else(|| "none yet".to_owned(), |(variant, provenance)| format!("{variant}, {provenance}"))
+}
+
+/// What stands in the column of a version's date.
+fn date_of(version: &Kept) -> String {
+    version.written.map_or_else(|| "released".to_owned(), wade::files::utc_date)
+}
+
+fn versions(name: &str, current: &Kept, others: &[Kept], as_json: bool) -> Result<()> {
+    let mut all: Vec<&Kept> = others.iter().chain([current]).collect();
+    all.sort_by_key(|version| version.version);
+    let state = |version: &Kept| match version {
+        version if version.version == current.version => "in place",
+        version if version.taken_back => "taken back",
+        _ => "kept",
+    };
+    if as_json {
+        let versions = all.iter().map(|version| {
+            json!({"version": version.version, "state": state(version), "date": date_of(version),
+                "variant": version.weights.as_ref().map(|(variant, _)| variant),
+                "provenance": version.weights.as_ref().map(|(_, provenance)| provenance),
+                "network_sha256": version.network_sha256, "effects": version.effects,
+                "origin": version.source.origin()})
+        });
+        let document = json!({"name": name, "versions": versions.collect::<Vec<_>>()});
+        return emit(&format!("{document:#}\n"));
+    }
+    let mut text = String::new();
+    for version in all {
+        // writing to a String cannot fail
+        let _ = writeln!(
+            text,
+            "{:>7}  {:<10} {:<16} effects: {}",
+            version.version,
+            state(version),
+            date_of(version),
+            list(&version.effects)
+        );
+        let _ = writeln!(text, "         weights: {}", weights_text(version));
+        let _ = writeln!(text, "         {}", version.source.origin());
+    }
+    emit(&text)
 }
 
 fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {

@@ -1,6 +1,7 @@
 //! The process that serves shared memory for a server; see `shm_host`.
 
 use std::io::{BufRead, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -74,8 +75,12 @@ impl Worker {
         let Start { config, vehicles, server, crashed, former } = self.0;
         let (engine, metrics) = (Arc::new(Engine::default()), Arc::new(Metrics::new()));
         let isa = Isa::available()[0];
-        let reloader =
-            Reloader::new(config.vehicles_directory(), isa, Arc::clone(&engine), Arc::clone(&metrics));
+        let reloader = Reloader::new(
+            config.named_vehicles().map(Path::to_owned),
+            isa,
+            Arc::clone(&engine),
+            Arc::clone(&metrics),
+        );
         for vehicle in &vehicles {
             load(&reloader, vehicle);
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::bundle::{self, BundleError, Fault};
+use crate::bundle::{self, BundleError, Fault, Library, LibraryError};
 use crate::engine::{Engine, UnknownVehicle};
 use crate::metrics::Metrics;
 use crate::model::kernel::Isa;
@@ -12,23 +12,15 @@ use crate::served::ServedVehicle;
 /// No bundle to serve.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// The folder of bundles cannot be read.
-    #[error("cannot read the vehicles in {}: {source}", .directory.display())]
-    Directory {
-        /// The folder.
-        directory: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The folder holds none.
-    #[error("no trained vehicle bundle (a folder with a vehicle.toml) in {}", .directory.display())]
-    Empty {
-        /// The folder.
-        directory: PathBuf,
-    },
-    /// One of them is not sound.
+    /// The vehicles are not to be had, or one of them is not sound.
     #[error(transparent)]
-    Bundle(#[from] BundleError),
+    Library(#[from] LibraryError),
+    /// No vehicle can be served.
+    #[error("no vehicle has weights ({origin}): train one first, or name another folder with --vehicles")]
+    Empty {
+        /// Where they are from.
+        origin: String,
+    },
 }
 
 /// What became of one vehicle when its bundle was read again.
@@ -39,14 +31,15 @@ pub struct Reload {
     /// The version served from now on; 0 where a new vehicle was refused.
     pub served_version: u32,
     /// Why the bundle on disk is not the one served.
-    pub refusal: Option<BundleError>,
+    pub refusal: Option<LibraryError>,
     /// True where it was left alone, because it is read from another folder.
     pub elsewhere: bool,
 }
 
 /// Knows where the bundles are.
 pub struct Reloader {
-    directory: PathBuf,
+    /// The folder that was named.
+    named: Option<PathBuf>,
     isa: Isa,
     engine: Arc<Engine>,
     metrics: Arc<Metrics>,
@@ -61,37 +54,32 @@ type Follower = Box<dyn Fn(&str) + Send + Sync>;
 
 impl std::fmt::Debug for Reloader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Reloader").field("directory", &self.directory).finish_non_exhaustive()
+        f.debug_struct("Reloader").field("named", &self.named).finish_non_exhaustive()
     }
 }
 
 impl Reloader {
-    /// Reads bundles of this folder into this engine.
-    pub fn new(directory: PathBuf, isa: Isa, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Self {
+    /// Reads bundles into this engine: of the folder that is named, or of the first that exists of the usual ones.
+    pub fn new(named: Option<PathBuf>, isa: Isa, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Self {
         let (one_at_a_time, follower) = (Mutex::new(()), OnceLock::new());
-        Self { directory, isa, engine, metrics, one_at_a_time, follower }
+        Self { named, isa, engine, metrics, one_at_a_time, follower }
     }
 
     /// Reads every bundle of the folder; one that is not sound stops the start, one without weights is left out.
     pub fn load_all(&self) -> Result<(), LoadError> {
-        let directory = self.directory.clone();
-        let names = bundle::names_in(&directory)
-            .map_err(|source| LoadError::Directory { directory: directory.clone(), source })?;
-        if names.is_empty() {
-            return Err(LoadError::Empty { directory });
-        }
+        let library = Library::open(self.named.as_deref())?;
         let mut vehicles = Vec::new();
-        for name in names {
-            match bundle::load_served(&directory.join(&name), self.isa) {
+        for name in library.names()? {
+            match library.served(&name, self.isa) {
                 Ok(vehicle) => vehicles.push(vehicle),
-                Err(BundleError { fault: Fault::NoWeights, .. }) => {
+                Err(LibraryError::Bundle(BundleError { fault: Fault::NoWeights, .. })) => {
                     tracing::warn!(vehicle = name, "not served: it has no weights yet");
                 }
                 Err(error) => return Err(error.into()),
             }
         }
         if vehicles.is_empty() {
-            return Err(LoadError::Empty { directory });
+            return Err(LoadError::Empty { origin: library.origin() });
         }
         for vehicle in vehicles {
             announce(&vehicle, &self.metrics);
@@ -117,10 +105,9 @@ impl Reloader {
 
     /// Reads one vehicle's bundle again where this is the folder that it is read from, and leaves it alone otherwise.
     pub fn reload_from(&self, vehicle: &str, bundle: &Path) -> Result<Vec<Reload>, UnknownVehicle> {
+        let ours = Library::open(self.named.as_deref()).ok().and_then(|library| library.place(vehicle));
         // both may be reached through links
-        let place = |path: &Path| std::fs::canonicalize(path).ok();
-        let ours = place(&self.directory.join(vehicle));
-        if !vehicle.is_empty() && ours.is_some() && ours == place(bundle) {
+        if ours.is_some_and(|ours| bundle::canonical(&ours) == bundle::canonical(bundle)) {
             return self.reload(vehicle);
         }
         let served_version = self.engine.vehicle(vehicle).map_or(0, |served| served.model().version());
@@ -152,14 +139,18 @@ impl Reloader {
     /// The vehicles that are served and those in the folder.
     pub fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = self.engine.vehicles().keys().cloned().collect();
-        names.extend(bundle::names_in(&self.directory).unwrap_or_default());
+        names.extend(
+            Library::open(self.named.as_deref()).and_then(|library| library.names()).unwrap_or_default(),
+        );
         names.sort();
         names.dedup();
         names
     }
 
     fn reload_one(&self, vehicle: String) -> Reload {
-        let loaded = bundle::load_served(&self.directory.join(&vehicle), self.isa);
+        // a folder may have been made since
+        let library = Library::open(self.named.as_deref());
+        let loaded = library.and_then(|library| library.served(&vehicle, self.isa));
         self.metrics.count_reload(loaded.is_ok());
         match loaded {
             Ok(served) => {
@@ -184,7 +175,7 @@ fn announce(served: &ServedVehicle, metrics: &Metrics) {
     let effects = served.effects().map_or(0, |file| file.effects.len());
     let vehicle = &model.vehicle().name;
     metrics.set_bundle_version(vehicle, model.version());
-    let (version, kernel) = (model.version(), model.isa().name());
-    tracing::info!(vehicle, version, effects, kernel, "bundle loaded");
+    let (version, kernel, origin) = (model.version(), model.isa().name(), served.origin());
+    tracing::info!(vehicle, version, origin, effects, kernel, "bundle loaded");
     tracing::debug!(vehicle, version, provenance = model.provenance(), "weights");
 }

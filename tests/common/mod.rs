@@ -129,6 +129,15 @@ pub fn copy_of_vehicles() -> TempDir {
     copy
 }
 
+/// Makes a vehicle of another name than those that the program carries.
+pub fn rover(folder: &Path) {
+    std::fs::create_dir_all(folder).expect("a folder");
+    let mut bundle = bundle::read(&vehicles().join("husky")).expect("sound");
+    bundle.vehicle.name = "rover".to_owned();
+    bundle.effects = None;
+    bundle::write(&folder.join("rover"), &bundle).expect("written");
+}
+
 pub fn copy_folder(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).expect("a folder");
     for entry in std::fs::read_dir(from).expect("readable") {

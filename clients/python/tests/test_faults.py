@@ -20,7 +20,7 @@ import iceoryx2 as iox
 import numpy as np
 import pytest
 from conftest import connect
-from servers import VEHICLES, Server
+from servers import VEHICLES, Server, rover
 
 import wade
 from wade import shm_layout
@@ -141,17 +141,15 @@ def test_a_server_that_hangs_for_a_while(kind: str, mortal_server: Server, loop:
 def test_a_server_that_comes_back_with_other_vehicles(
     kind: str, mortal_server: Server, loop: asyncio.AbstractEventLoop, tmp_path: Path
 ) -> None:
-    others = tmp_path / "vehicles"
-    others.mkdir()
-    (others / "warthog").symlink_to(VEHICLES / "warthog")
-    mortal_server.start()
+    rover(tmp_path)
+    mortal_server.start(tmp_path)
     with connect(kind, mortal_server, loop, timeout_s=20.0) as client:
-        client.evaluate("husky", STATE)
+        client.evaluate("rover", STATE)
         mortal_server.kill()
-        mortal_server.start(others)
+        mortal_server.start()
         with pytest.raises(wade.UnknownVehicle, match="warthog"):
-            until_answered(lambda: client.evaluate("husky", STATE))
-        assert client.vehicles() == ["warthog"]
+            until_answered(lambda: client.evaluate("rover", STATE))
+        assert client.vehicles() == ["husky", "warthog"]
         assert client.evaluate("warthog", STATE).force_n[2] > 0
 
 
@@ -164,13 +162,13 @@ def test_a_new_bundle_is_served_to_a_client_that_is_connected(
     mortal_server.start(vehicles)
     with connect(kind, mortal_server, loop, timeout_s=20.0) as client:
         with pytest.raises(wade.UnknownVehicle):
-            client.evaluate("warthog", STATE)
-        (vehicles / "warthog").symlink_to(VEHICLES / "warthog")
+            client.evaluate("rover", STATE)
+        (vehicles / "rover").symlink_to(rover(tmp_path))
         with grpc.insecure_channel(mortal_server.address) as channel:
             reloaded = admin_pb2_grpc.AdminStub(channel).Reload(admin_pb2.ReloadRequest(), timeout=20)
-        assert [vehicle.refusal for vehicle in reloaded.vehicles] == ["", ""]
+        assert [vehicle.refusal for vehicle in reloaded.vehicles] == ["", "", ""]
         time.sleep(0.2)  # shared memory looks for new vehicles every 50 ms
-        assert client.evaluate("warthog", STATE).force_n[2] > 0
+        assert client.evaluate("rover", STATE).force_n[2] > 0
 
 
 def test_overload_is_told_with_a_time_to_retry(mortal_server: Server) -> None:
@@ -272,7 +270,7 @@ def test_a_batch_never_mixes_two_bundles(kind: str, mortal_server: Server, loop:
                     return
                 next_link.symlink_to(target)
                 next_link.replace(vehicles / "husky")
-                assert admin.Reload(admin_pb2.ReloadRequest(), timeout=20).vehicles[0].refusal == ""
+                assert admin.Reload(admin_pb2.ReloadRequest(vehicle="husky"), timeout=20).vehicles[0].refusal == ""
 
     seen: dict[int, tuple[float, ...]] = {}
     with connect(kind, mortal_server, loop, timeout_s=20.0) as client, ThreadPoolExecutor(1) as pool:

@@ -300,6 +300,7 @@ pub fn summary(vehicle: &ServedVehicle) -> proto::VehicleSummary {
         bundle_version: model.version(),
         surface_count: model.vehicle().surfaces.len() as u32,
         provenance: model.provenance().to_owned(),
+        origin: vehicle.origin().to_owned(),
     }
 }
 
