@@ -333,16 +333,18 @@ class ListVehiclesResponse(_message.Message):
     def __init__(self, vehicles: _Optional[_Iterable[_Union[VehicleSummary, _Mapping]]] = ...) -> None: ...
 
 class VehicleSummary(_message.Message):
-    __slots__ = ("name", "bundle_version", "surface_count", "provenance")
+    __slots__ = ("name", "bundle_version", "surface_count", "provenance", "origin")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BUNDLE_VERSION_FIELD_NUMBER: _ClassVar[int]
     SURFACE_COUNT_FIELD_NUMBER: _ClassVar[int]
     PROVENANCE_FIELD_NUMBER: _ClassVar[int]
+    ORIGIN_FIELD_NUMBER: _ClassVar[int]
     name: str
     bundle_version: int
     surface_count: int
     provenance: str
-    def __init__(self, name: _Optional[str] = ..., bundle_version: _Optional[int] = ..., surface_count: _Optional[int] = ..., provenance: _Optional[str] = ...) -> None: ...
+    origin: str
+    def __init__(self, name: _Optional[str] = ..., bundle_version: _Optional[int] = ..., surface_count: _Optional[int] = ..., provenance: _Optional[str] = ..., origin: _Optional[str] = ...) -> None: ...
 
 class GetVehicleRequest(_message.Message):
     __slots__ = ("vehicle", "include_mesh")
