@@ -18,9 +18,10 @@ test:
 ci:
     .ci/run
 
-# the long fault and load tests: an hour
+# the long fault and load tests: an hour and a half
 long:
-    cargo test --release -- --ignored
+    WADE_HOSTILE_SECONDS=3600 cargo test --test hostile -- --nocapture
+    WADE_STORMS_S=60 cargo test --release --test storms -- --nocapture --test-threads 1
 
 # write the tables of README.md and docs/src/results from the raw results
 results:

@@ -8,6 +8,8 @@ use super::{documents, files, root, text};
 const README_LINES: usize = 120;
 /// Columns at which a line of prose ends.
 pub const COLUMNS: usize = 100;
+/// Bytes of the picture in README.
+const LARGEST_PICTURE: u64 = 150_000;
 /// Words of a sentence in README and the guide: nine of ten sentences, and all of them.
 const MOST_SENTENCES: usize = 30;
 const LONGEST_SENTENCE: usize = 45;
@@ -89,9 +91,15 @@ fn the_readme_is_short() {
 }
 
 #[test]
+fn the_picture_of_the_readme_is_small() {
+    let length = root().join("docs/page.png").metadata().expect("the picture of README").len();
+    assert!(length <= LARGEST_PICTURE, "docs/page.png has {length} bytes");
+}
+
+#[test]
 fn lines_of_prose_end_in_time() {
     let mut long = Vec::new();
-    for path in documents().into_iter().filter(|path| !path.starts_with("clients")) {
+    for path in documents() {
         let text = text(&path);
         for (number, line) in prose(&text) {
             if without_targets(line).chars().count() > COLUMNS {
