@@ -9,7 +9,7 @@ use common::{Numbers, Served, VEHICLES};
 use tonic::transport::Channel;
 use tonic::{Code, Status};
 use tonic_types::StatusExt;
-use wade::client::{Client, Method, Reply};
+use wade::client::{Client, ClientError, Method, Reply};
 use wade::service::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
 use wade::service::proto::inference::infer_parameter::ParameterChoice;
 use wade::service::proto::inference::model_infer_request::{InferInputTensor, InferRequestedOutputTensor};
@@ -335,7 +335,16 @@ fn an_administrator_loads_and_unloads() {
         };
         let ready = VEHICLES.map(|vehicle| format!("{vehicle} {} READY", version(vehicle)));
         assert_eq!(index(&mut inference, false).await, ready);
+        let state = State { depth: 0.1, ..State::default() };
+        let mut shm = served.shm("husky", wade::service::shm::Wait::Block);
+        shm.evaluate(&state).expect("answered");
         inference.repository_model_unload(unload("husky")).await.expect("unloaded");
+        // a client whose ports are open hears of it, alone and in a batch
+        for error in [shm.evaluate(&state).map(drop), shm.evaluate_batch(&[state; 2]).map(drop)] {
+            let unknown = error.expect_err("not served any more");
+            assert!(matches!(unknown, ClientError::UnknownVehicle { .. }), "{unknown}");
+            assert!(unknown.to_string().ends_with("warthog"), "{unknown}");
+        }
         assert_eq!(index(&mut inference, false).await, ["husky  UNAVAILABLE", &ready[1]]);
         assert_eq!(index(&mut inference, true).await, [ready[1].as_str()]);
         assert!(!answers(&served, "husky") && answers(&served, "warthog"));
@@ -344,8 +353,7 @@ fn an_administrator_loads_and_unloads() {
         inference.repository_model_load(load("husky")).await.expect("loaded");
         assert_eq!(index(&mut inference, false).await, ready);
         // every vehicle is served again over shared memory too
-        let mut shm = served.shm("husky", wade::service::shm::Wait::Block);
-        shm.evaluate(&State { depth: 0.1, ..State::default() }).expect("answered");
+        shm.evaluate(&state).expect("answered");
         std::fs::write(bundles.path().join("husky/network.safetensors"), b"damaged").expect("written");
         let damaged = inference.repository_model_load(load("husky")).await.expect_err("refused");
         assert_eq!(damaged.code(), Code::FailedPrecondition);

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use tonic::Code;
 
-use super::shm_link::{Lost, ShmLink};
+use super::shm_link::{Lost, ShmLink, not_served};
 use super::{ClientError, EffectReply, Reply, SurfaceReply};
 use crate::effects::{Effect, LeftOut};
 use crate::service::shm::{self, Wait};
@@ -51,7 +51,7 @@ impl ShmClient {
         match answer.refusal() {
             Some(invalid) => Err(invalid.into()),
             None if answer.status == Status::Ok as u32 => Ok(answer),
-            None => Err(unknown_status(answer.status)),
+            None => Err(self.refused(answer.status)),
         }
     }
 
@@ -89,7 +89,19 @@ impl ShmClient {
                 code: Code::InvalidArgument,
                 message: "the batch is empty or too long, or has a flag that the server does not know".into(),
             }),
-            None => Err(unknown_status(status)),
+            None => Err(self.refused(status)),
+        }
+    }
+
+    /// The error of a status that names no field.
+    fn refused(&self, status: u32) -> ClientError {
+        if status == Status::NotServed as u32 {
+            return not_served(&self.names, &self.vehicle);
+        }
+        // a code that a newer server of the same layout may send
+        ClientError::Refused {
+            code: Code::Unknown,
+            message: format!("status {status}; is the client up to date?"),
         }
     }
 
@@ -110,14 +122,6 @@ impl ShmClient {
         };
         self.link = None;
         result
-    }
-}
-
-/// A code that a newer server of the same layout may send.
-fn unknown_status(status: u32) -> ClientError {
-    ClientError::Refused {
-        code: Code::Unknown,
-        message: format!("status {status}; is the client up to date?"),
     }
 }
 

@@ -229,6 +229,15 @@ fn why_not(names: &Names, vehicle: &str) -> ClientError {
     }
 }
 
+/// The error of a vehicle that was unloaded while its ports stayed open.
+pub(super) fn not_served(names: &Names, vehicle: &str) -> ClientError {
+    let told = shm_served::served::<Ipc>(names);
+    let mut served = told.map(|served| served.vehicles).unwrap_or_default();
+    // what is told may be a moment old
+    served.retain(|served| served != vehicle);
+    ClientError::UnknownVehicle { vehicle: vehicle.to_owned(), served }
+}
+
 /// True where nobody has created a service, as far as one look at its file tells.
 fn is_absent(service: &str) -> bool {
     let name = service.try_into();

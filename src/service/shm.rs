@@ -455,9 +455,12 @@ impl ShmServer {
                     self.desk.answer_batch(at, arrived, &request, &door.batch_recorder);
                 }
             } else {
-                // it was unloaded: a client whose request is dropped hears nothing, as from a server that is gone
-                door.singles.clear();
-                door.batches.clear();
+                for (_, request) in door.singles.drain(..) {
+                    self.desk.decline(&request);
+                }
+                for (_, request) in door.batches.drain(..) {
+                    self.desk.decline_batch(&request);
+                }
             }
         }
         any
@@ -523,6 +526,32 @@ impl Desk {
     /// Whether the server's own client asks.
     fn is_own(&self, client: UniqueClientId) -> bool {
         *self.own.lock().unwrap_or_else(PoisonError::into_inner) == Some(client)
+    }
+
+    /// Says that the vehicle is not served any more.
+    fn decline(&mut self, request: &Request<Query, Answer>) {
+        let query = copy(request.payload());
+        let Some(slot) = loaned(request.loan_uninit()) else { return };
+        let (sequence, status) = (query.sequence, Status::NotServed as u32);
+        let answer = Answer { sequence, status, flags: self.flags, ..Answer::UNSET };
+        if sent(slot.write_payload(answer).send()) {
+            wake(&self.done, &mut self.sleepers, query.wake_key);
+        }
+        self.metrics.refuse(Transport::shm, "not_found");
+    }
+
+    /// Says that the vehicle is not served any more.
+    fn decline_batch(&mut self, request: &Request<BatchQuery, BatchAnswer>) {
+        let header = copy(&request.payload().header);
+        let Some(mut slot) = loaned(request.loan_uninit()) else { return };
+        let answer = in_place(slot.payload_mut());
+        (answer.sequence, answer.flags) = (header.sequence, self.flags);
+        (answer.status, answer.index, answer.count) = (Status::NotServed as u32, 0, 0);
+        // SAFETY: it has been written, but for answers that do not count, which are numbers too.
+        if sent(unsafe { slot.assume_init() }.send()) {
+            wake(&self.done, &mut self.sleepers, header.wake_key);
+        }
+        self.metrics.refuse(Transport::shm_batch, "not_found");
     }
 
     fn answer_batch(

@@ -124,8 +124,8 @@ typedef struct {
   uint32_t max_batch;
   // 0
   uint32_t reserved;
-  // "shm:NAMESPACE" for shared memory ("shm:wade" unless the server's shm.namespace says otherwise), "HOST:PORT" for gRPC
-  // over TCP, "unix:PATH" for gRPC over a Unix socket. Copied.
+  // "shm:NAMESPACE" for shared memory ("shm:wade" unless the server's shm.namespace says otherwise), "HOST:PORT" or
+  // "http://HOST:PORT" for gRPC over TCP, "unix:PATH" for gRPC over a Unix socket. Copied.
   const char *address;
   // Name of the vehicle. Copied.
   const char *vehicle;
@@ -309,7 +309,8 @@ wade_status wade_client_open(const wade_options *options, wade_client **client);
 // Waits until the client is connected to its server, or the time is over: then says why it is not.
 wade_status wade_client_wait(const wade_client *client, uint64_t timeout_ns);
 
-// Closes a client; null is none. No call may be under way in it. May take as long as opening a connection takes.
+// Closes a client; null is none. No call may be under way in it. Takes two seconds at most: what is not
+// given up by then, since the system is slow to open a connection, is given up later by the client's own thread.
 void wade_client_close(wade_client *client);
 
 // Why the client is not connected, in a sentence with its end: returns its length, and writes what fits. Empty where it is

@@ -111,8 +111,8 @@ pub struct WadeOptions {
     pub max_batch: u32,
     /// 0
     pub reserved: u32,
-    /// "shm:NAMESPACE" for shared memory ("shm:wade" unless the server's shm.namespace says otherwise), "HOST:PORT" for gRPC
-    /// over TCP, "unix:PATH" for gRPC over a Unix socket. Copied.
+    /// "shm:NAMESPACE" for shared memory ("shm:wade" unless the server's shm.namespace says otherwise), "HOST:PORT" or
+    /// "http://HOST:PORT" for gRPC over TCP, "unix:PATH" for gRPC over a Unix socket. Copied.
     pub address: *const c_char,
     /// Name of the vehicle. Copied.
     pub vehicle: *const c_char,

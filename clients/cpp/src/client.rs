@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use wade::client::Address;
 use wade::service::shm::Wait;
 use wade::service::wire::InvalidState;
 
@@ -31,30 +32,6 @@ enum Transport {
     Grpc(Grpc),
 }
 
-/// Where a server is, from what `wade_options.address` says.
-pub enum Address {
-    /// Shared memory of a namespace.
-    Shm(String),
-    /// gRPC at a URL.
-    Grpc(String),
-}
-
-impl Address {
-    /// Reads "shm:NAMESPACE", "unix:PATH" or "HOST:PORT".
-    pub fn parse(address: &str) -> Option<Self> {
-        match address.split_once(':')? {
-            ("shm", namespace) if !namespace.is_empty() => Some(Self::Shm(namespace.to_owned())),
-            ("unix", path) if !path.is_empty() => Some(Self::Grpc(address.to_owned())),
-            ("shm" | "unix", _) => None,
-            _ => {
-                let (host, port) = address.rsplit_once(':')?;
-                let valid = !host.is_empty() && !host.contains('/') && port.parse::<u16>().is_ok();
-                valid.then(|| Self::Grpc(format!("http://{address}")))
-            }
-        }
-    }
-}
-
 impl WadeClient {
     /// Starts to look for the server. None where an option is wrong or the system gives no thread.
     pub fn open(address: &Address, vehicle: &str, wait: Wait, max_batch: u32) -> Option<Self> {
@@ -68,8 +45,8 @@ impl WadeClient {
             Address::Shm(namespace) => {
                 Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch, of_transport).ok()?)
             }
-            Address::Grpc(url) => {
-                Transport::Grpc(Grpc::open(url.clone(), vehicle, max_batch, of_transport).ok()?)
+            Address::Tcp(_) | Address::Unix(_) => {
+                Transport::Grpc(Grpc::open(address.url()?, vehicle, max_batch, of_transport).ok()?)
             }
         };
         Some(Self { transport, known, max_batch, batch_asked: Mutex::default() })
@@ -148,34 +125,5 @@ impl WadeBatch {
         self.invalid_index = index as u32;
         (self.invalid_field, self.invalid_problem) = (invalid.field as u32, invalid.problem as u32);
         WadeStatus::InvalidState
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_address_names_its_transport() {
-        let shown = |address| match Address::parse(address) {
-            Some(Address::Shm(namespace)) => format!("shm {namespace}"),
-            Some(Address::Grpc(url)) => format!("grpc {url}"),
-            None => "none".into(),
-        };
-        for (address, expected) in [
-            ("shm:wade", "shm wade"),
-            ("unix:/tmp/wade.sock", "grpc unix:/tmp/wade.sock"),
-            ("127.0.0.1:50051", "grpc http://127.0.0.1:50051"),
-            ("[::1]:50051", "grpc http://[::1]:50051"),
-            ("shm:", "none"),
-            ("unix:", "none"),
-            ("localhost", "none"),
-            ("localhost:", "none"),
-            (":50051", "none"),
-            ("http://localhost:50051", "none"),
-            ("localhost:99999", "none"),
-        ] {
-            assert_eq!(shown(address), expected, "{address}");
-        }
     }
 }

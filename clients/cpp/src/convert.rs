@@ -94,8 +94,19 @@ pub fn answered(answer: &Answer) -> Result<WadeForces, WadeStatus> {
     if answer.status == Status::Ok as u32 {
         return Ok(answer.into());
     }
-    // a state was checked before it was sent: a server that refuses it has other limits
-    Err(if answer.refusal().is_some() { WadeStatus::InvalidState } else { WadeStatus::Refused })
+    Err(refused(answer.status, answer.refusal().is_some()))
+}
+
+/// Why there are no forces, for the status of an answer. A state was checked before it was sent: a server that refuses it has
+/// other limits.
+pub fn refused(status: u32, names_a_field: bool) -> WadeStatus {
+    if status == Status::NotServed as u32 {
+        WadeStatus::UnknownVehicle
+    } else if names_a_field {
+        WadeStatus::InvalidState
+    } else {
+        WadeStatus::Refused
+    }
 }
 
 impl From<&Answer> for WadeForces {

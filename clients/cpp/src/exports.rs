@@ -11,6 +11,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion};
+use wade::client::Address;
 use wade::effects::Effect;
 use wade::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
 use wade::service::shm::Wait;
@@ -19,7 +20,7 @@ use wade::service::wire::Field;
 use crate::abi::{
     WADE_ABI_VERSION, WadeBatch, WadeForces, WadeOptions, WadeState, WadeStatus, WadeVehicle, WadeWait,
 };
-use crate::client::{Address, WadeClient};
+use crate::client::WadeClient;
 use crate::connection::status_of;
 use crate::pool::InCall;
 use crate::vehicle;
@@ -36,6 +37,11 @@ fn guarded(run: impl FnOnce() -> WadeStatus) -> WadeStatus {
 unsafe fn text<'t>(pointer: *const c_char) -> Option<&'t str> {
     // SAFETY: as above.
     (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })?.to_str().ok()
+}
+
+/// An address, if the text is one.
+fn parsed(text: &str) -> Option<Address> {
+    text.parse().ok()
 }
 
 /// Opens a client and begins to look for the server; does not wait for it. On WADE_STATUS_OK `*client` must be closed.
@@ -70,7 +76,7 @@ pub unsafe extern "C" fn wade_client_open(
         };
         // SAFETY: the texts are null or have their ends.
         let (address, vehicle) = unsafe { (text(options.address), text(options.vehicle)) };
-        let (Some(address), Some(vehicle)) = (address.and_then(Address::parse), vehicle) else {
+        let (Some(address), Some(vehicle)) = (address.and_then(parsed), vehicle) else {
             return WadeStatus::InvalidArgument;
         };
         let Some(opened) = WadeClient::open(&address, vehicle, wait, options.max_batch) else {
@@ -92,7 +98,8 @@ pub unsafe extern "C" fn wade_client_wait(client: *const WadeClient, timeout_ns:
     })
 }
 
-/// Closes a client; null is none. No call may be under way in it. May take as long as opening a connection takes.
+/// Closes a client; null is none. No call may be under way in it. Takes two seconds at most: what is not
+/// given up by then, since the system is slow to open a connection, is given up later by the client's own thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_client_close(client: *mut WadeClient) {
     guarded(|| {
@@ -196,14 +203,15 @@ pub unsafe extern "C" fn wade_get_vehicle(
 ) -> WadeStatus {
     guarded(|| {
         // SAFETY: the texts are null or have their ends; `out` is null or valid.
-        let given = unsafe { (text(address).and_then(Address::parse), text(vehicle), out.as_mut()) };
-        let (Some(Address::Grpc(url)), Some(vehicle), Some(out)) = given else {
+        let given = unsafe { (text(address).and_then(parsed), text(vehicle), out.as_mut()) };
+        let (Some(url), Some(vehicle), Some(out)) = (given.0.and_then(|at| at.url()), given.1, given.2)
+        else {
             return WadeStatus::InvalidArgument;
         };
         // connecting and asking have half of it each
-        match vehicle::get(&url, vehicle, Duration::from_nanos(timeout_ns / 2)) {
+        match vehicle::get(url, vehicle.to_owned(), Duration::from_nanos(timeout_ns / 2)) {
             Ok(vehicle) => {
-                *out = vehicle;
+                *out = *vehicle;
                 WadeStatus::Ok
             }
             Err(error) => status_of(&error),
@@ -288,6 +296,8 @@ pub extern "C" fn wade_problem_message(problem: u32) -> *const c_char {
         3 => c"must not be negative",
         4 => c"must be greater than zero",
         5 => c"must have length 1",
+        8 => c"is set, which the server does not support yet",
+        9 => c"has a value, but its flag is not set",
         _ => c"is wrong",
     };
     message.as_ptr()

@@ -1,7 +1,6 @@
 //! Over gRPC a thread of the client's own has the connection: the caller hands it the question and waits for the answer.
 
 use std::sync::{Arc, Mutex};
-use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
@@ -14,6 +13,7 @@ use crate::connection::{RETRY, status_of};
 use crate::event::Event;
 use crate::known::Known;
 use crate::skipped::Skipped;
+use crate::worker::Worker;
 
 /// A question that is open for longer than this has no server any more; also how long connecting may take.
 const LOST_AFTER: Duration = Duration::from_secs(1);
@@ -21,7 +21,7 @@ const LOST_AFTER: Duration = Duration::from_secs(1);
 /// A client over gRPC.
 pub struct Grpc {
     shared: Arc<Shared>,
-    worker: JoinHandle<()>,
+    worker: Worker,
 }
 
 struct Shared {
@@ -96,13 +96,17 @@ impl Grpc {
         let work = move || {
             let work = || runtime.block_on(worked.work());
             let reason = match std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)) {
-                Ok(Ok(())) => return,
-                Ok(Err(error)) => error.to_string(),
-                Err(_) => "the thread that has the connection broke down".into(),
+                Ok(Ok(())) => None,
+                Ok(Err(error)) => Some(error.to_string()),
+                Err(_) => Some("the thread that has the connection broke down".into()),
             };
-            worked.known.connection.tell(WadeStatus::Internal, reason);
+            if let Some(reason) = reason {
+                worked.known.connection.tell(WadeStatus::Internal, reason);
+            }
+            // a name that is being looked up is not waited for
+            runtime.shutdown_background();
         };
-        let worker = thread::Builder::new().name("wade-grpc".into()).spawn(work)?;
+        let worker = Worker::spawn("wade-grpc", work)?;
         Ok(Self { shared, worker })
     }
 
@@ -162,8 +166,7 @@ impl Grpc {
     pub fn close(self) {
         self.shared.known.connection.stop();
         self.shared.asked.set();
-        // a panic of it has been told to the connection
-        let _ = self.worker.join();
+        self.worker.end();
     }
 }
 
@@ -236,7 +239,11 @@ impl Shared {
     async fn work(&self) -> std::io::Result<()> {
         let asked = self.asked.register()?;
         while !self.known.connection.is_stopped() {
-            match self.connect().await {
+            let connected = tokio::select! {
+                connected = self.connect() => connected,
+                stopped = self.stopped(&asked) => return stopped,
+            };
+            match connected {
                 Ok(link) => {
                     self.known.connection.opened();
                     self.serve(link, &asked).await?;
@@ -248,6 +255,19 @@ impl Shared {
             }
         }
         Ok(())
+    }
+
+    /// Waits until the client is to end, while nobody can be asked.
+    async fn stopped(&self, asked: &AsyncFd<Arc<Event>>) -> std::io::Result<()> {
+        loop {
+            let mut ready = asked.readable().await?;
+            if self.known.connection.is_stopped() {
+                return Ok(());
+            }
+            // a question of before the connection was lost, which is taken when there is one again
+            self.asked.clear();
+            ready.clear_ready();
+        }
     }
 
     /// Connects, and sees that the server has the vehicle.

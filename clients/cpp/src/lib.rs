@@ -19,3 +19,4 @@ mod pool;
 mod shm;
 mod skipped;
 mod vehicle;
+mod worker;

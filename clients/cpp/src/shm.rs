@@ -2,7 +2,7 @@
 //! answer. The ports are opened, and given up, by a thread of the client's own.
 
 use std::sync::{Arc, Mutex};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use wade::client::{Asked, ShmLink};
@@ -13,9 +13,10 @@ use wade::service::wire::State;
 use crate::abi::{WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};
 use crate::connection::RETRY;
-use crate::convert::answered;
+use crate::convert::{answered, refused};
 use crate::known::Known;
 use crate::skipped::Skipped;
+use crate::worker::Worker;
 
 /// A question that is open for longer than this has no server any more. iceoryx2 says nothing of one that was killed.
 const LOST_AFTER: Duration = Duration::from_millis(200);
@@ -23,7 +24,7 @@ const LOST_AFTER: Duration = Duration::from_millis(200);
 /// A client over shared memory.
 pub struct Shm {
     shared: Arc<Shared>,
-    keeper: JoinHandle<()>,
+    keeper: Worker,
 }
 
 struct Shared {
@@ -77,7 +78,7 @@ impl Shm {
             turn: Mutex::new(turn),
         });
         let kept = Arc::clone(&shared);
-        let keeper = thread::Builder::new().name("wade-shm".into()).spawn(move || kept.keep_watched())?;
+        let keeper = Worker::spawn("wade-shm", move || kept.keep_watched())?;
         Ok(Self { shared, keeper })
     }
 
@@ -132,8 +133,7 @@ impl Shm {
     pub fn close(self) {
         self.shared.known.connection.stop();
         self.keeper.thread().unpark();
-        // a panic of it has been told to the connection
-        let _ = self.keeper.join();
+        self.keeper.end();
     }
 }
 
@@ -211,7 +211,7 @@ impl Turn {
 /// one answer: then it is begun again.
 fn take(answer: &BatchAnswer, count: usize, batch: &mut Vec<WadeForces>) -> WadeStatus {
     if answer.status != Status::Ok as u32 {
-        return if answer.refusal().is_some() { WadeStatus::InvalidState } else { WadeStatus::Refused };
+        return refused(answer.status, answer.refusal().is_some());
     }
     let answers = &answer.answers[..count];
     let version = answers.first().map(|answer| answer.bundle_version);

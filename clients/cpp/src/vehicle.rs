@@ -1,5 +1,6 @@
 //! What a server says of a vehicle.
 
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use wade::client::{ClientError, GrpcClient, Method};
@@ -8,11 +9,23 @@ use wade::service::proto;
 
 use crate::abi::{WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE, WadeRange, WadeSurface, WadeVehicle};
 use crate::convert::write_text;
+use crate::worker::Worker;
 
-/// Asks the server at a URL.
-pub fn get(url: &str, vehicle: &str, timeout: Duration) -> Result<WadeVehicle, ClientError> {
-    let response = GrpcClient::tcp(url, vehicle, Method::Unary, timeout)?.vehicle()?;
-    Ok(WadeVehicle::from(&response))
+/// Asks the server at a URL, on a thread of its own: whoever calls is not to get a signal.
+pub fn get(url: String, vehicle: String, timeout: Duration) -> Result<Box<WadeVehicle>, ClientError> {
+    let (answer, answered) = channel();
+    let failed = |reason: &str| ClientError::NoServer { at: url.clone(), reason: reason.to_owned() };
+    let at = url.clone();
+    let ask = move || {
+        let client = GrpcClient::tcp(&at, &vehicle, Method::Unary, timeout);
+        let response = client.and_then(|mut client| client.vehicle());
+        // nobody waits any more where it took too long
+        let _ = answer.send(response.map(|response| Box::new(WadeVehicle::from(&response))));
+    };
+    let worker = Worker::spawn("wade-vehicle", ask).map_err(|error| failed(&error.to_string()))?;
+    let asked = answered.recv().unwrap_or_else(|_| Err(failed("the thread that asked broke down")));
+    worker.end();
+    asked
 }
 
 fn vector(vector: &Option<proto::Vector3>) -> [f32; 3] {

@@ -109,6 +109,13 @@ class Server {
     process_ = 0;
   }
 
+  // Ends it as an administrator would; returns when it has ended.
+  void terminate() {
+    ::kill(process_, SIGTERM);
+    waitpid(process_, nullptr, 0);
+    process_ = 0;
+  }
+
   // Stops it as a debugger would; returns when every thread stands still.
   void freeze() {
     // the server first, so that it does not start the process of shared memory again

@@ -1,12 +1,14 @@
 """What the water does to a ground vehicle that drives into it, asked of a `wade` server.
 
-`GrpcClient` and `ShmClient` have the same methods and types; `wade.aio.GrpcClient` is for asyncio. A `State` goes in,
+`connect(address)` gives a client: `GrpcClient` or `ShmClient`, which have the same methods and types;
+`wade.aio.GrpcClient` is for asyncio. A `State` goes in,
 `Forces` come out, each for one vehicle or as arrays for N. Body frame: x forward, y left, z up; SI units, radians; the
 fields are named as on the wire, with their unit. Errors are `WadeError`s.
 """
 
 from typing import TYPE_CHECKING, Any
 
+from .address import connect
 from .attitude import gravity_from_quaternion, gravity_from_roll_pitch
 from .channel import Tls
 from .client import Client, Stream
@@ -59,6 +61,7 @@ __all__ = [
     "Vehicle",
     "Violation",
     "WadeError",
+    "connect",
     "gravity_from_quaternion",
     "gravity_from_roll_pitch",
 ]

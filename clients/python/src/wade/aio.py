@@ -8,7 +8,7 @@ from typing import Any
 import grpc
 
 from . import messages
-from .channel import DEFAULT_ADDRESS, Tls, open_channel
+from .channel import DEFAULT_ADDRESS, Tls, open_channel, target
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
@@ -24,7 +24,7 @@ class GrpcClient:
     """As `wade.GrpcClient`, with every call a coroutine and `async with` for `with`."""
 
     def __init__(self, address: str = DEFAULT_ADDRESS, *, tls: Tls | None = None, timeout_s: float = DEFAULT_TIMEOUT_S):
-        self.address = address
+        self.address = target(address)
         self._tls = tls
         self._timeout_s = checked_timeout(timeout_s)
         self._channel: Any = None

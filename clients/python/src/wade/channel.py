@@ -27,8 +27,33 @@ class Tls:
     server_name: str | None = None
 
 
+def target(address: str) -> str:
+    """What grpcio connects to, for `host:port`, `http://host:port` or `unix:PATH`; else raises `ValueError`."""
+
+    def refused(fault: str) -> ValueError:
+        forms = "write host:port, http://host:port, unix:PATH or, for wade.connect, shm:NAMESPACE"
+        return ValueError(f"{address!r} is no address: {fault}; {forms}")
+
+    if address.startswith("unix:"):
+        path = address.removeprefix("unix:").removeprefix("//")
+        if not path:
+            raise refused("the path of the socket is missing")
+        return f"unix:{path}"
+    if address.startswith("shm:"):
+        raise refused("shared memory is asked by wade.ShmClient or wade.connect")
+    if address.startswith("https://"):
+        raise refused("an encrypted connection is host:port with tls=wade.Tls()")
+    place = address.removeprefix("http://").removesuffix("/")
+    host, _, port = place.rpartition(":")
+    if not host or "/" in place or (":" in host and not (host.startswith("[") and host.endswith("]"))):
+        raise refused("the host or the port is missing, or an address of IPv6 lacks its brackets")
+    if not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
+        raise refused("the port is no number from 1 to 65535")
+    return place
+
+
 def open_channel(module: Any, address: str, tls: Tls | None) -> Any:
-    """A channel of `grpc` or of `grpc.aio` (`module`) to `HOST:PORT` or `unix:PATH`."""
+    """A channel of `grpc` or of `grpc.aio` (`module`) to what `target` gives."""
     options: list[tuple[str, Any]] = [
         # a new channel connects at once instead of sharing the back-off of one that failed
         ("grpc.use_local_subchannel_pool", 1),

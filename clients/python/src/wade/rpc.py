@@ -10,7 +10,7 @@ from typing import Any
 import grpc
 
 from . import messages
-from .channel import DEFAULT_ADDRESS, Tls, open_channel
+from .channel import DEFAULT_ADDRESS, Tls, open_channel, target
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
@@ -20,14 +20,16 @@ from .vehicle import Reloaded, Vehicle
 
 
 class GrpcClient:
-    """Asks a server at `HOST:PORT` or `unix:PATH`; connects with the first call. Several threads may share it.
+    """Asks a server at `host:port`, `http://host:port` or `unix:PATH`; connects with the first call.
+
+    Several threads may share it.
 
     A call that finds no server fails at once, or as soon as the connection breaks, with `ServerUnavailable`; the next
     one connects anew.
     """
 
     def __init__(self, address: str = DEFAULT_ADDRESS, *, tls: Tls | None = None, timeout_s: float = DEFAULT_TIMEOUT_S):
-        self.address = address
+        self.address = target(address)
         self._tls = tls
         self._timeout_s = checked_timeout(timeout_s)
         self._lock = threading.Lock()

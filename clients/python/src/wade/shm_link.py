@@ -25,7 +25,11 @@ _FAILURES = (
     iox.RequestResponseOpenError,
 )
 
-# where the flags of an answer lie, by whether it is a batch's
+# where status and flags of an answer lie, by whether it is a batch's
+_STATUS_AT = {
+    False: layout.fields(layout.ANSWER)["status"][1],
+    True: layout.fields(layout.BATCH_ANSWER)["status"][1],
+}
 _FLAGS_AT = {False: layout.fields(layout.ANSWER)["flags"][1], True: layout.fields(layout.BATCH_ANSWER)["flags"][1]}
 
 # its log would go to standard output, and says of every server that is not there that it is not there
@@ -108,6 +112,9 @@ class Link:
             response = self._await(pending, end, timeout_s)
             flags = ctypes.c_uint64.from_address(response.payload_ptr + _FLAGS_AT[batch]).value
             self._server_polls = bool(flags & layout.SERVER_POLLS)
+            status = ctypes.c_uint32.from_address(response.payload_ptr + _STATUS_AT[batch]).value
+            if status == layout.STATUS_NOT_SERVED:
+                raise self._not_served(vehicle)
             return response
         except _FAILURES as failure:
             raise ServerUnavailable(self._at(), str(failure)) from None
@@ -121,6 +128,15 @@ class Link:
         if vehicle not in served:
             return UnknownVehicle(vehicle, f"vehicle {vehicle!r} is not served; there are: {', '.join(served)}")
         return ServerUnavailable(self._at(), f"the server has not opened {vehicle}")
+
+    def _not_served(self, vehicle: str) -> UnknownVehicle:
+        """The error of a vehicle that was unloaded while its ports stayed open."""
+        try:
+            served = [name for name in vehicles(self._namespace) if name != vehicle]
+        except (LayoutMismatch, ServerUnavailable):
+            served = []
+        message = f"vehicle {vehicle!r} is not served any more; there are: {', '.join(served) or 'none'}"
+        return UnknownVehicle(vehicle, message)
 
     def _at(self) -> str:
         return _at(self._namespace)
