@@ -21,6 +21,7 @@ use crate::service::shm::{self, OpenError, ShmError, Wait};
 use crate::service::shm_layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, Names, Query, SERVER_POLLS, VERSION, wake_name,
 };
+use crate::service::shm_room;
 use crate::service::shm_served::{self, Served};
 
 /// A link may be opened by one thread and used by another.
@@ -74,6 +75,11 @@ impl ShmLink {
         if is_absent(&at()) {
             return Err(why_not(names, vehicle));
         }
+        // a page without memory behind it would end the program by SIGBUS when it is first written
+        shm_room::check_client().map_err(|error| ClientError::Refused {
+            code: Code::ResourceExhausted,
+            message: error.to_string(),
+        })?;
         let node = shm::node::<Ipc>().map_err(failed)?;
         let not_open = |error: OpenError| match error {
             OpenError::Absent => why_not(names, vehicle),

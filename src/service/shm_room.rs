@@ -12,6 +12,11 @@ use super::shm_owner::SHARED_MEMORY;
 const ROOM: u64 = 1 << 20;
 const ROOM_OF_VEHICLE: u64 = 1 << 20;
 
+/// Room that the ports of one client take with the first batch of 256 states [bytes]: 1.4 MB were measured.
+const ROOM_OF_CLIENT: u64 = 2 << 20;
+/// Descriptors that they take: 28 were measured.
+const DESCRIPTORS_OF_CLIENT: u64 = 32;
+
 /// Descriptors of a process that serves nothing yet, and of each vehicle with the clients of one simulator.
 const DESCRIPTORS: u64 = 48;
 const DESCRIPTORS_OF_VEHICLE: u64 = 32;
@@ -31,6 +36,18 @@ pub(crate) enum RoomError {
          LimitNOFILE=)"
     )]
     Descriptors { limit: u64, needed: u64, vehicles: u64 },
+    /// The file system is full for a client.
+    #[error(
+        "{SHARED_MEMORY} has {available} kB free, and a client needs {} kB: free some or enlarge it (docker --shm-size, \
+         mount -o remount,size=)", ROOM_OF_CLIENT >> 10
+    )]
+    ClientMemory { available: u64 },
+    /// The limit of the client's process is too low.
+    #[error(
+        "{open} of {limit} file descriptors are open, and a client needs {DESCRIPTORS_OF_CLIENT}: raise the limit \
+         (ulimit -n, LimitNOFILE=)"
+    )]
+    ClientDescriptors { open: u64, limit: u64 },
     /// The system did not say.
     #[error("{what}: {reason}")]
     Unknown { what: String, reason: String },
@@ -39,22 +56,47 @@ pub(crate) enum RoomError {
 /// Checks that there are memory and descriptors for this many vehicles.
 pub(crate) fn check(vehicles: usize) -> Result<(), RoomError> {
     let vehicles = vehicles as u64;
-    let unknown = |what: &str, error: nix::Error| {
-        let reason = error.desc().to_owned();
-        RoomError::Unknown { what: what.to_owned(), reason }
-    };
-    let system = statvfs(Path::new(SHARED_MEMORY)).map_err(|error| unknown(SHARED_MEMORY, error))?;
-    let available = u64::from(system.blocks_available()) * u64::from(system.fragment_size());
+    let available = available()?;
     let needed = ROOM + vehicles * ROOM_OF_VEHICLE;
     if available < needed {
         let (available, needed) = (available >> 10, needed >> 10);
         return Err(RoomError::Memory { available, needed, vehicles });
     }
-    let (limit, _) =
-        getrlimit(Resource::RLIMIT_NOFILE).map_err(|error| unknown("the limit of descriptors", error))?;
+    let limit = limit()?;
     let needed = DESCRIPTORS + vehicles * DESCRIPTORS_OF_VEHICLE;
     if limit < needed {
         return Err(RoomError::Descriptors { limit, needed, vehicles });
     }
     Ok(())
+}
+
+/// Checks that there are memory and descriptors for one more client, in the client's process.
+pub(crate) fn check_client() -> Result<(), RoomError> {
+    let available = available()?;
+    if available < ROOM_OF_CLIENT {
+        return Err(RoomError::ClientMemory { available: available >> 10 });
+    }
+    let limit = limit()?;
+    // where the table cannot be read, opening says what is missing
+    let open = std::fs::read_dir("/proc/self/fd").map_or(0, |table| table.count() as u64);
+    if limit < open + DESCRIPTORS_OF_CLIENT {
+        return Err(RoomError::ClientDescriptors { open, limit });
+    }
+    Ok(())
+}
+
+/// Free room for segments [bytes].
+fn available() -> Result<u64, RoomError> {
+    let system = statvfs(Path::new(SHARED_MEMORY)).map_err(|error| unknown(SHARED_MEMORY, error))?;
+    Ok(u64::from(system.blocks_available()) * u64::from(system.fragment_size()))
+}
+
+/// Limit of open descriptors of this process.
+fn limit() -> Result<u64, RoomError> {
+    let limits = getrlimit(Resource::RLIMIT_NOFILE);
+    limits.map(|(limit, _)| limit).map_err(|error| unknown("the limit of descriptors", error))
+}
+
+fn unknown(what: &str, error: nix::Error) -> RoomError {
+    RoomError::Unknown { what: what.to_owned(), reason: error.desc().to_owned() }
 }

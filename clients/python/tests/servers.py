@@ -86,8 +86,8 @@ class Server:
         with grpc.insecure_channel(self.address) as channel:
             check = channel.unary_unary("/grpc.health.v1.Health/Check")
             try:
-                # an empty request means the server as a whole, the other names shared memory; the answer's one field is 1
-                # where it serves
+                # an empty request means the server as a whole, the other names shared memory; the answer's one field
+                # is 1 where it serves
                 return all(check(name, timeout=1) == b"\x08\x01" for name in (b"", b"\x0a\x11wade.SharedMemory"))
             except grpc.RpcError:
                 return False

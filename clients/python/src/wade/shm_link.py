@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import os
+import resource
 import secrets
 import time
 from collections.abc import Callable
@@ -67,6 +69,32 @@ def _at(namespace: str) -> str:
     return f"shared memory, namespace {namespace!r}"
 
 
+#: Room in /dev/shm that a client's ports take with the first batch of 256 states [bytes]: 1.4 MB were measured.
+_ROOM = 2 << 20
+#: Descriptors that they take: 28 were measured.
+_DESCRIPTORS = 32
+
+
+def _check_room() -> None:
+    """Raises `ResourceExhausted` where there is no room: a write to a page without memory would end the program."""
+    shared = os.statvfs("/dev/shm")
+    free = shared.f_bavail * shared.f_frsize
+    if free < _ROOM:
+        raise ResourceExhausted(
+            f"/dev/shm has {free >> 10} kB free, and a client needs {_ROOM >> 10} kB: free some or enlarge it "
+            "(docker --shm-size, mount -o remount,size=)",
+            None,
+        )
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    used = len(os.listdir("/proc/self/fd"))
+    if limit != resource.RLIM_INFINITY and limit < used + _DESCRIPTORS:
+        raise ResourceExhausted(
+            f"{used} of {limit} file descriptors are open, and a client needs {_DESCRIPTORS}: raise the limit "
+            "(ulimit -n, LimitNOFILE=)",
+            None,
+        )
+
+
 def _config() -> Any:
     """The settings of a client's node: what others left that were killed is for servers to clear away."""
     config = iox.config.global_config()
@@ -85,6 +113,7 @@ class Link:
         # names this client's listener among all others'; 0 where the client polls
         self._wake_key = secrets.randbits(63) + 1 if blocks else 0
         self._ports: dict[tuple[str, bool], Any] = {}
+        _check_room()
         try:
             # the signals belong to the program
             builder = iox.NodeBuilder.new().config(_config()).signal_handling_mode(iox.SignalHandlingMode.Disabled)
