@@ -191,7 +191,7 @@ fn two_reports_are_compared_with_what_differs_in_their_settings() {
     let folders = [tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder")];
     let mut second = soak(&[], None);
     second.transport = "uds".into();
-    second.response_time_us.p99 = 2.0 * second.response_time_us.p99;
+    second.response_time_us.p99 *= 2.0;
     let first = soak(&[], None);
     for (folder, report) in folders.iter().zip([&first, &second]) {
         report::write(folder.path(), report).expect("written");
