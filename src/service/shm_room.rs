@@ -1,10 +1,13 @@
 //! What shared memory takes of the machine, asked for before it is opened: a page without memory behind it ends a process by
 //! SIGBUS, and a descriptor that is not there shows as an error that says something else.
 
-use std::path::Path;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 
+use iceoryx2::config::Config;
 use nix::sys::resource::{Resource, getrlimit};
 use nix::sys::statvfs::statvfs;
+use nix::unistd::{AccessFlags, access};
 
 use super::shm_owner::SHARED_MEMORY;
 
@@ -48,13 +51,26 @@ pub(crate) enum RoomError {
          (ulimit -n, LimitNOFILE=)"
     )]
     ClientDescriptors { open: u64, limit: u64 },
+    /// Another user made the folder of iceoryx2 first.
+    #[error(
+        "{} belongs to the user with the number {owner}, who used iceoryx2 first: run all that uses it as one user, or delete \
+         it where none does",
+        .folder.display()
+    )]
+    Foreign { folder: PathBuf, owner: u32 },
     /// The system did not say.
     #[error("{what}: {reason}")]
     Unknown { what: String, reason: String },
 }
 
-/// Checks that there are memory and descriptors for this many vehicles.
+/// Checks that there are a folder, memory and descriptors for this many vehicles.
 pub(crate) fn check(vehicles: usize) -> Result<(), RoomError> {
+    let folder = PathBuf::from(Config::global_config().global.root_path().to_string());
+    if let Ok(metadata) = std::fs::metadata(&folder)
+        && access(&folder, AccessFlags::W_OK | AccessFlags::X_OK).is_err()
+    {
+        return Err(RoomError::Foreign { folder, owner: metadata.uid() });
+    }
     let vehicles = vehicles as u64;
     let available = available()?;
     let needed = ROOM + vehicles * ROOM_OF_VEHICLE;

@@ -39,6 +39,7 @@ fn a_server_starts_and_goes_on_whatever_is_done_to_it() {
     let machine = Machine::new();
     let baseline = at_rest(&machine);
     signalled(&machine);
+    watched(&machine);
     lost(&machine);
     limited(&machine);
     full(&machine);
@@ -115,6 +116,41 @@ fn signalled(machine: &Machine) {
         assert!(start.elapsed() < PATIENCE, "{:?}", server.readyz());
     }
     assert!(server.end().success());
+}
+
+/// What a service manager hears, and a process of shared memory that hangs.
+fn watched(machine: &Machine) {
+    let path = machine.path().join("notify");
+    let socket = std::os::unix::net::UnixDatagram::bind(&path).expect("a socket");
+    socket.set_read_timeout(Some(PATIENCE)).expect("set");
+    let hears = |says: &str| {
+        let mut heard = [0; 256];
+        let start = Instant::now();
+        loop {
+            let length = socket.recv(&mut heard).expect("something is said");
+            if String::from_utf8_lossy(&heard[..length]).contains(says) {
+                return;
+            }
+            assert!(start.elapsed() < PATIENCE, "never heard {says}");
+        }
+    };
+    let notify = format!("NOTIFY_SOCKET={}", path.display());
+    let mut server = machine.start_by(&["env", &notify, "WATCHDOG_USEC=20000000"]);
+    hears("READY=1");
+    hears("WATCHDOG=1");
+    server.until_shm();
+    let hanging = server.worker().expect("a process of shared memory");
+    kill(hanging, Signal::SIGSTOP).expect("sent");
+    let start = Instant::now();
+    while server.worker().is_none_or(|worker| worker == hanging) {
+        assert!(start.elapsed() < PATIENCE, "it is replaced\n{}", server.log());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    server.until_shm();
+    hears("WATCHDOG=1");
+    println!("a process of shared memory that hangs was replaced after {:?}", start.elapsed());
+    assert!(server.end().success());
+    hears("STOPPING=1");
 }
 
 /// A client in a process of its own: a damaged segment may end it, but not the test.
@@ -260,7 +296,7 @@ fn foreign(machine: &Machine) {
         println!("skipped: another user cannot run this program here: {}", server.log().trim());
     } else {
         let ready = server.until_ready();
-        server.until("\"shared_memory\":\"unavailable");
+        server.until("belongs to the user with the number 0");
         println!("/tmp/iceoryx2 of another user: ready after {ready:?}, {:?}", server.readyz());
         assert!(server.end().success());
     }
