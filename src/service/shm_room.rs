@@ -104,7 +104,7 @@ pub(crate) fn check_client() -> Result<(), RoomError> {
 /// Free room for segments [bytes].
 fn available() -> Result<u64, RoomError> {
     let system = statvfs(Path::new(SHARED_MEMORY)).map_err(|error| unknown(SHARED_MEMORY, error))?;
-    Ok(u64::from(system.blocks_available()) * u64::from(system.fragment_size()))
+    Ok(system.blocks_available() * system.fragment_size())
 }
 
 /// Limit of open descriptors of this process.

@@ -88,7 +88,10 @@ pub fn kill_at(server: &Server, number: u64) -> u64 {
             Err(error) => panic!("waiting: {error}"),
         }
     }
-    let _ = kill(root, Signal::SIGKILL);
+    // a child that has not become the process of shared memory yet does not end with its server, and holds its sockets
+    for process in processes.into_values().flatten().chain([root.as_raw()]) {
+        let _ = kill(Pid::from_raw(process), Signal::SIGKILL);
+    }
     // everything that was followed is killed with its tracer or its server, and is reaped here
     let end = Instant::now() + Duration::from_secs(5);
     while Instant::now() < end {
