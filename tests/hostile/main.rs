@@ -13,6 +13,7 @@ use std::collections::BTreeSet;
 use std::io::{BufRead, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use common::{Numbers, PATIENCE};
@@ -122,21 +123,24 @@ fn signalled(machine: &Machine) {
 fn watched(machine: &Machine) {
     let path = machine.path().join("notify");
     let socket = std::os::unix::net::UnixDatagram::bind(&path).expect("a socket");
-    socket.set_read_timeout(Some(PATIENCE)).expect("set");
+    // read all the time, as a service manager does: a full socket would hold the server up
+    let heard = Arc::new(Mutex::new(String::new()));
+    let hearing = Arc::clone(&heard);
+    std::thread::spawn(move || {
+        let mut message = [0; 256];
+        while let Ok(length) = socket.recv(&mut message) {
+            *hearing.lock().expect("no panic") += &String::from_utf8_lossy(&message[..length]);
+        }
+    });
     let hears = |says: &str| {
-        let mut heard = [0; 256];
         let start = Instant::now();
-        loop {
-            let length = socket.recv(&mut heard).expect("something is said");
-            if String::from_utf8_lossy(&heard[..length]).contains(says) {
-                return;
-            }
+        while !std::mem::take(&mut *heard.lock().expect("no panic")).contains(says) {
             assert!(start.elapsed() < PATIENCE, "never heard {says}");
+            std::thread::sleep(Duration::from_millis(20));
         }
     };
     let notify = format!("NOTIFY_SOCKET={}", path.display());
     let mut server = machine.start_by(&["env", &notify, "WATCHDOG_USEC=20000000"]);
-    hears("READY=1");
     hears("WATCHDOG=1");
     server.until_shm();
     let hanging = server.worker().expect("a process of shared memory");
