@@ -6,11 +6,14 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::prelude::*;
 use wade::bundle::Library;
 use wade::config::{Config, Log};
 use wade::server::Running;
 use wade::service::health::{Part, State};
 use wade::service::shm::Wait;
+
+use super::log_limit::Limit;
 
 /// Logs to standard error, with colors only on a terminal and only where NO_COLOR is unset or empty (no-color.org).
 pub fn start(log: &Log) -> Result<()> {
@@ -18,14 +21,16 @@ pub fn start(log: &Log) -> Result<()> {
         EnvFilter::try_new(&log.filter).with_context(|| format!("log.filter = \"{}\"", log.filter))?;
     let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     let colors = std::io::stderr().is_terminal() && !no_color;
-    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let limit = Limit::default();
+    let logs = tracing_subscriber::registry().with(filter).with(limit.clone());
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
     if log.json {
-        lines.json().init()
+        logs.with(lines.json()).init()
     } else {
         // the module would make lines long, and only who writes a filter needs it: JSON has it
-        lines.with_ansi(colors).with_target(false).init()
+        logs.with(lines.with_ansi(colors).with_target(false)).init()
     }
-    Ok(())
+    limit.report().context("the thread of the logs")
 }
 
 /// Says which program starts, and with which settings.

@@ -7,6 +7,7 @@ mod eval;
 mod gap;
 mod gap_bench;
 mod log;
+mod log_limit;
 mod outside;
 mod predict;
 mod progress;
