@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::service::accounts::Limits;
 use crate::service::{grpc, health, http, shm};
 
 /// Settings of `wade serve`: the file deploy/wade.toml shows every key with its default.
@@ -124,6 +125,30 @@ impl Config {
         let streams = grpc.max_streams_per_connection;
         range(streams >= 1, "grpc.max_streams_per_connection", &streams, "1 or more")?;
         range(grpc.keepalive_s >= 1, "grpc.keepalive_s", &grpc.keepalive_s, "1 or more")?;
+        let http = &self.http;
+        for (key, value) in [
+            ("grpc.max_connections", grpc.max_connections),
+            ("grpc.max_held_bytes", grpc.max_held_bytes),
+            ("http.max_connections", http.max_connections),
+        ] {
+            range(value >= 1, key, &value, "1 or more")?;
+        }
+        for (key, value) in [
+            ("grpc.handshake_s", grpc.handshake_s),
+            ("grpc.first_request_s", grpc.first_request_s),
+            ("grpc.request_s", grpc.request_s),
+            ("grpc.answer_s", grpc.answer_s),
+            ("grpc.stream_idle_s", grpc.stream_idle_s),
+            ("grpc.idle_s", grpc.idle_s),
+            ("http.request_s", http.request_s),
+            ("http.answer_s", http.answer_s),
+        ] {
+            range((0.1..=day).contains(&value), key, &value, "0.1 to 86400")?;
+        }
+        let share = grpc.peer_share;
+        range(share > 0.0 && share <= 1.0, "grpc.peer_share", &share, "above 0, at most 1")?;
+        let frames = grpc.control_frames_per_s;
+        range((1.0..=1e6).contains(&frames), "grpc.control_frames_per_s", &frames, "1 to 1000000")?;
         let clients = self.shm.max_clients;
         range((1..=shm::MAX_CLIENTS).contains(&clients), "shm.max_clients", &clients, "1 to 64")?;
         let namespace = &self.shm.namespace;
@@ -134,6 +159,18 @@ impl Config {
         range(can_be_ready, "shm.enabled", &false, "true where ready.require names \"shm\"")?;
         let silent = grpc.listen.is_empty() && grpc.unix_socket.as_os_str().is_empty() && !self.shm.enabled;
         range(!silent, "shm.enabled", &false, "true where grpc.listen and grpc.unix_socket are both empty")
+    }
+
+    /// The most that connections may make the server hold.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            connections: self.grpc.max_connections,
+            http_connections: self.http.max_connections,
+            requests: self.grpc.max_requests,
+            streams: self.grpc.max_streams,
+            bytes: self.grpc.max_held_bytes,
+            peer_share: self.grpc.peer_share,
+        }
     }
 
     /// The folder of bundles, where one is named.

@@ -1,8 +1,7 @@
-//! The vehicles that are being served: atomic swap and admission. No async, no IO, no clock.
+//! The vehicles that are being served, and their atomic swap. No async, no IO, no clock.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use arc_swap::ArcSwap;
 
@@ -65,58 +64,5 @@ impl Engine {
             vehicles
         });
         Ok(())
-    }
-}
-
-/// Counts what is in flight and refuses what is over the limit.
-#[derive(Debug)]
-pub struct Admission {
-    in_flight: AtomicUsize,
-    limit: usize,
-}
-
-/// Too much is in flight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{limit} are already in flight, the limit")]
-pub struct Overloaded {
-    /// The limit.
-    pub limit: usize,
-}
-
-impl Admission {
-    /// Admits at most `limit` at a time.
-    pub fn new(limit: usize) -> Arc<Self> {
-        Arc::new(Self { in_flight: AtomicUsize::new(0), limit })
-    }
-
-    /// A place, given back when the permit is dropped.
-    pub fn admit(self: &Arc<Self>) -> Result<Permit, Overloaded> {
-        let before = self.in_flight.fetch_add(1, Ordering::Relaxed);
-        let permit = Permit(Arc::clone(self));
-        if before < self.limit { Ok(permit) } else { Err(Overloaded { limit: self.limit }) }
-    }
-}
-
-/// A place among those in flight.
-#[derive(Debug)]
-pub struct Permit(Arc<Admission>);
-
-impl Drop for Permit {
-    fn drop(&mut self) {
-        self.0.in_flight.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_refusal_takes_no_place_and_a_dropped_permit_gives_its_place_back() {
-        let admission = Admission::new(1);
-        let first = admission.admit().expect("the first fits");
-        assert_eq!(admission.admit().err(), Some(Overloaded { limit: 1 }));
-        drop(first);
-        assert!(admission.admit().is_ok());
     }
 }

@@ -1,5 +1,9 @@
 //! Every metric's name, unit and buckets, and the one function that records a request.
 
+mod held;
+
+pub use held::{Closed, Resource};
+
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
@@ -21,7 +25,8 @@ const BUCKETS_S: [f64; 22] = [
     500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3,
 ];
 
-/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, shared memory, or JSON over HTTP.
+/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, shared memory, or JSON over HTTP. `other` are the
+/// calls that ask for no forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EncodeLabelValue)]
 #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
 pub enum Transport {
@@ -36,10 +41,12 @@ pub enum Transport {
     http,
     grpc_infer,
     uds_infer,
+    grpc_other,
+    uds_other,
 }
 
 impl Transport {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 13] = [
         Self::grpc_unary,
         Self::grpc_batch,
         Self::grpc_stream,
@@ -51,6 +58,8 @@ impl Transport {
         Self::http,
         Self::grpc_infer,
         Self::uds_infer,
+        Self::grpc_other,
+        Self::uds_other,
     ];
 
     /// The value of the label.
@@ -67,6 +76,8 @@ impl Transport {
             Self::http => "http",
             Self::grpc_infer => "grpc_infer",
             Self::uds_infer => "uds_infer",
+            Self::grpc_other => "grpc_other",
+            Self::uds_other => "uds_other",
         }
     }
 }
@@ -247,6 +258,7 @@ pub struct Metrics {
     reloads: Family<ReloadLabels, Counter>,
     transport_up: Family<UpLabels, Gauge>,
     shm_restarts: Counter,
+    holding: held::HeldMetrics,
 }
 
 impl Default for Metrics {
@@ -296,8 +308,10 @@ impl Metrics {
             "1 where the transport answers the server's own question, else 0",
             Family::clone(&transport_up),
         );
+        let holding = held::HeldMetrics::register(&mut registry);
         Self {
             registry,
+            holding,
             recorders: Default::default(),
             latency,
             out_of_domain,
@@ -393,6 +407,26 @@ impl Metrics {
         rows.collect()
     }
 
+    /// How many requests for a vehicle were answered over these transports since the start, and the sum of their times [ns].
+    pub fn totals(&self, transports: &[Transport], vehicle: &str) -> (u64, u64) {
+        let mut totals = (0, 0);
+        for &transport in transports {
+            let recorders = self.recorders[transport as usize].read().unwrap_or_else(PoisonError::into_inner);
+            let Some(recorder) = recorders.get(vehicle).cloned() else { continue };
+            drop(recorders);
+            let accounts = recorder.collect();
+            let count = accounts.since_start.len();
+            totals.0 += count;
+            totals.1 += (accounts.since_start.mean() * count as f64) as u64;
+        }
+        totals
+    }
+
+    /// The text that everything scrapes (Prometheus text format 0.0.4).
+    pub fn render_plain(&self) -> String {
+        plain(&self.render())
+    }
+
     /// The text that Prometheus scrapes (OpenMetrics 1.0).
     pub fn render(&self) -> String {
         let mut text = String::new();
@@ -400,6 +434,31 @@ impl Metrics {
         let _ = text::encode(&mut text, &self.registry);
         text
     }
+}
+
+/// OpenMetrics in the text format that was before it (0.0.4): counters have their suffix in the descriptions too, and there
+/// are neither units nor an end.
+fn plain(open: &str) -> String {
+    let mut plain = String::with_capacity(open.len());
+    let mut counters = std::collections::BTreeSet::new();
+    for line in open.lines() {
+        if let Some(name) = line.strip_prefix("# TYPE ").and_then(|rest| rest.strip_suffix(" counter")) {
+            counters.insert(name);
+        }
+    }
+    for line in open.lines().filter(|line| *line != "# EOF" && !line.starts_with("# UNIT ")) {
+        let mut words = line.splitn(4, ' ');
+        let described = match (words.next(), words.next(), words.next()) {
+            (Some("#"), Some(_), Some(name)) if counters.contains(name) => Some(name),
+            _ => None,
+        };
+        match described {
+            Some(name) => plain.push_str(&line.replacen(name, &format!("{name}_total"), 1)),
+            None => plain.push_str(line),
+        }
+        plain.push('\n');
+    }
+    plain
 }
 
 /// A histogram is sound even if a thread panicked while it held the lock: the worst is one lost value.

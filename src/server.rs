@@ -24,10 +24,14 @@ use crate::config::Config;
 use crate::engine::Engine;
 use crate::metrics::Metrics;
 use crate::model::kernel::Isa;
+use crate::service::accounts::Accounts;
 use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
 use crate::service::health::{Health, Part, State};
 use crate::service::http::{self, HttpError};
+
+/// Longest time for answers over HTTP that are under way when everything else has ended.
+const HTTP_DRAIN: Duration = Duration::from_secs(1);
 
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -65,7 +69,7 @@ pub struct Running {
     shm: Option<Host>,
     runtime: Runtime,
     threads: Vec<JoinHandle<()>>,
-    housekeeping: Option<JoinHandle<()>>,
+    housekeeping: Vec<JoinHandle<()>>,
     drain: Duration,
     /// A thread ended that should not have.
     failed: Arc<AtomicBool>,
@@ -91,17 +95,22 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         window_s: config.latency_window_s,
     };
     let health = Arc::new(Health::new(&config.ready, Arc::clone(&metrics)));
+    let accounts = Accounts::new(&config.limits(), Arc::clone(&metrics));
     let runtime = runtime()?;
     let (stop, stopped) = watch::channel(false);
     let (stop_http, http_stopped) = watch::channel(false);
     let mut running = Running {
-        grpc: Arc::new(runtime.block_on(grpc::Server::new(config.grpc.clone(), shared.clone()))),
+        grpc: Arc::new(runtime.block_on(grpc::Server::new(
+            config.grpc.clone(),
+            shared.clone(),
+            Arc::clone(&accounts),
+        ))),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         health: Arc::clone(&health),
         shm: None,
         drain: Duration::from_secs_f64(config.drain_s),
         threads: Vec::new(),
-        housekeeping: None,
+        housekeeping: Vec::new(),
         reloader,
         metrics,
         listeners,
@@ -120,12 +129,8 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         health.set(Part::Http, State::Ok);
     }
     let window = Duration::from_secs_f64(config.latency_window_s);
-    let shared = http::Shared {
-        hosts: config.http.hosts.clone(),
-        grpc: shared,
-        requests: Arc::clone(running.grpc.requests()),
-        health: Arc::clone(&health),
-    };
+    let shared =
+        http::Shared { config: config.http.clone(), grpc: shared, accounts, health: Arc::clone(&health) };
     running.spawn_housekeeping(http_listener, shared, window, http_stopped)?;
     running.reloader.load_all()?;
     if config.shm.enabled {
@@ -192,8 +197,10 @@ impl Running {
             }
         }
         self.stop_http.send_replace(true);
-        if self.housekeeping.take().is_some_and(|thread| thread.join().is_err()) {
-            tracing::error!("the HTTP thread panicked");
+        for thread in self.housekeeping.drain(..) {
+            if thread.join().is_err() {
+                tracing::error!("an HTTP thread panicked");
+            }
         }
         tracing::info!(elapsed = ?start.elapsed(), "drained");
     }
@@ -226,7 +233,10 @@ impl Running {
         stop: watch::Receiver<bool>,
     ) -> Result<(), StartError> {
         let metrics = Arc::clone(&self.metrics);
-        let runtime = runtime()?;
+        let (work, probes) = (runtime()?, runtime()?);
+        let handle = work.handle().clone();
+        // queries are answered until the last connection has its answer
+        let (ended, end) = watch::channel(false);
         let thread = self.spawn("wade-http", move || {
             let rotating = async {
                 let mut ticks = tokio::time::interval(window);
@@ -236,22 +246,31 @@ impl Running {
                     metrics.rotate();
                 }
             };
-            let serving = async {
-                let Some(listener) = listener else { return };
-                if let Err(error) = http::run(listener, shared, stop.clone()).await {
-                    tracing::error!(%error, "HTTP ended");
-                }
-            };
-            runtime.block_on(async {
-                let work = std::pin::pin!(async { tokio::join!(rotating, serving) });
+            work.block_on(async {
                 tokio::select! {
-                    _ = work => {}
-                    () = grpc::stopped(stop.clone()) => {}
+                    () = rotating => {}
+                    () = grpc::stopped(end) => {}
                 }
             });
-            runtime.shutdown_background();
+            work.shutdown_background();
         })?;
-        self.housekeeping = Some(thread);
+        self.housekeeping.push(thread);
+        let thread = self.spawn("wade-probes", move || {
+            probes.block_on(async {
+                match listener {
+                    Some(listener) => {
+                        let serving = std::pin::pin!(http::run(listener, shared, handle, stop.clone()));
+                        if let Some(Err(error)) = bounded(serving, stop, HTTP_DRAIN).await {
+                            tracing::error!(%error, "HTTP ended");
+                        }
+                    }
+                    None => grpc::stopped(stop).await,
+                }
+            });
+            ended.send_replace(true);
+            probes.shutdown_background();
+        })?;
+        self.housekeeping.push(thread);
         Ok(())
     }
 

@@ -19,6 +19,13 @@ fn a_value_out_of_range_is_named() {
     assert!(refusal(|c| c.latency_window_s = 0.0).contains("latency_window_s"));
     assert!(refusal(|c| c.grpc.threads = 0).contains("grpc.threads"));
     assert!(refusal(|c| c.grpc.max_batch = 0).contains("grpc.max_batch"));
+    assert!(refusal(|c| c.grpc.max_connections = 0).contains("grpc.max_connections"));
+    assert!(refusal(|c| c.grpc.peer_share = 0.0).contains("grpc.peer_share"));
+    assert!(refusal(|c| c.grpc.peer_share = f64::NAN).contains("grpc.peer_share"));
+    assert!(refusal(|c| c.grpc.stream_idle_s = f64::INFINITY).contains("grpc.stream_idle_s"));
+    assert!(refusal(|c| c.grpc.control_frames_per_s = 0.0).contains("grpc.control_frames_per_s"));
+    assert!(refusal(|c| c.http.max_connections = 0).contains("http.max_connections"));
+    assert!(refusal(|c| c.http.request_s = 0.0).contains("http.request_s"));
     assert!(refusal(|c| c.shm.namespace = "a/b".into()).contains("shm.namespace"));
     assert!(refusal(|c| c.shm.max_clients = 0).contains("shm.max_clients"));
     let nowhere = refusal(|c| {

@@ -46,13 +46,14 @@ fn violated_field(status: &Status) -> String {
 
 #[test]
 fn accepted_connections_have_tcp_nodelay() {
-    // the very function that the server accepts with: the builder's own setting does not reach a listener it is given
+    // the very function that the server accepts with
     runtime().block_on(async {
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("bound");
-        let mut incoming = wade::service::grpc::incoming(listener);
+        let listener = wade::service::intake::Listener::Tcp(listener);
         let _client = tokio::net::TcpStream::connect(address).await.expect("connected");
-        let accepted = tokio_stream::StreamExt::next(&mut incoming).await.expect("one").expect("accepted");
+        let (accepted, _) = listener.accept().await.expect("accepted");
+        let wade::service::intake::Socket::Tcp(accepted) = accepted else { panic!("it is TCP") };
         assert!(accepted.nodelay().expect("a socket option"));
     });
 }
@@ -201,7 +202,15 @@ fn requests_over_the_limit_are_refused_while_a_batch_is_computed() {
     });
     runtime().block_on(async {
         let (mut first, mut second) = (client(&served).await, client(&served).await);
-        let long = tokio::spawn(async move { first.evaluate_batch(batch(1 << 16)).await });
+        // now and then it is the batch that finds the place taken
+        let long = tokio::spawn(async move {
+            loop {
+                match first.evaluate_batch(batch(1 << 16)).await {
+                    Err(status) if status.code() == Code::ResourceExhausted => {}
+                    answer => break answer,
+                }
+            }
+        });
         let start = Instant::now();
         let refused = loop {
             match second.evaluate(request("husky", 0.1)).await {
@@ -349,7 +358,6 @@ fn a_server_that_cannot_read_its_bundles_never_says_serving() {
 fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
     let served = Served::with(|config| {
         config.grpc.max_batch = 1 << 16;
-        config.grpc.max_requests = 1;
         // this is about what is answered, on a machine of any speed
         config.drain_s = PATIENCE.as_secs_f64();
     });
@@ -358,7 +366,6 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
     let (mut health, mut long, mut watched) = runtime.block_on(async {
         (HealthClient::new(channel(&served).await), client(&served).await, client(&served).await)
     });
-    let mut probe = runtime.block_on(client(&served));
     let check = HealthCheckRequest { service: String::new() };
     let mut states = runtime.block_on(health.watch(check)).expect("watched").into_inner();
     let (sender, outgoing) = tokio::sync::mpsc::channel(1);
@@ -370,10 +377,12 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
     // long to compute, short to send
     let request = proto::EvaluateBatchRequest { omit_surfaces: true, ..batch(1 << 14) };
     let in_flight = runtime.spawn(async move { long.evaluate_batch(request).await });
-    // the batch is in flight once it has taken the one place that there is
+    // the batch is in flight once it has taken a place
+    let requests = served.running.metrics().held(wade::metrics::Resource::requests);
     runtime.block_on(async {
         let start = Instant::now();
-        while probe.evaluate(crate::request("husky", 0.1)).await.is_ok() {
+        while requests.get() == 0 {
+            tokio::task::yield_now().await;
             assert!(start.elapsed() < PATIENCE && !in_flight.is_finished(), "the batch never arrived");
         }
     });
@@ -396,7 +405,7 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
         }
         assert_eq!(last, ServingStatus::NotServing);
     });
-    drop((states, health, watched, probe, sender));
+    drop((states, health, watched, sender));
     let elapsed = stopping.join().expect("stopped");
     assert!(elapsed < Duration::from_secs_f64(config.drain_s) + PATIENCE, "{elapsed:?}");
 }
@@ -457,4 +466,86 @@ fn a_watch_of_our_health_hears_the_end_and_does_not_hold_up_a_drain() {
     // a client that stands still cannot say goodbye, and would be waited for
     drop((states, runtime));
     stopping.join().expect("stopped long before its bound of an hour");
+}
+
+#[test]
+fn an_administrators_call_over_tcp_is_refused_with_the_way_out_and_answered_on_the_unix_socket() {
+    let served = Served::start();
+    let socket = format!("unix:{}", served.config.grpc.unix_socket.display());
+    let husky = || proto::ReloadRequest { vehicle: "husky".into(), ..Default::default() };
+    let refused = wade::client::reload(&served.url(), husky(), PATIENCE).expect_err("refused").to_string();
+    assert!(refused.contains(&socket) && refused.contains("grpc.admin_over_tcp"), "{refused}");
+    let reloaded = wade::client::reload(&socket, husky(), PATIENCE).expect("answered");
+    assert_eq!((reloaded.len(), reloaded[0].refusal.as_str()), (1, ""));
+    let unload = wade::service::proto::inference::RepositoryModelUnloadRequest {
+        model_name: "husky".into(),
+        ..Default::default()
+    };
+    runtime().block_on(async {
+        use wade::service::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
+        let mut inference = GrpcInferenceServiceClient::new(channel(&served).await);
+        let status = inference.repository_model_unload(unload).await.expect_err("refused");
+        assert_eq!(status.code(), Code::PermissionDenied);
+        client(&served).await.evaluate(request("husky", 0.1)).await.expect("it is served still");
+    });
+}
+
+#[test]
+fn compressed_requests_are_answered_and_what_is_unpacked_has_the_same_limit() {
+    let served = Served::with(|config| config.grpc.max_message_bytes = 4096);
+    runtime().block_on(async {
+        let mut client = client(&served).await.send_compressed(tonic::codec::CompressionEncoding::Gzip);
+        client.evaluate(request("husky", 0.1)).await.expect("answered");
+        let answer = client.evaluate_batch(batch(500)).await.expect("answered").into_inner();
+        assert_eq!(answer.force_n.len(), 1500);
+        // 40 kB that are 100 bytes on the wire
+        let status = client.evaluate_batch(batch(10_000)).await.expect_err("too long");
+        assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
+    });
+}
+
+/// The C core of gRPC names the path of a Unix socket as the authority, percent-encoded.
+#[test]
+fn a_stock_client_on_the_unix_socket_is_answered() {
+    use std::io::{Read, Write};
+    let served = Served::start();
+    let mut socket =
+        std::os::unix::net::UnixStream::connect(&served.config.grpc.unix_socket).expect("connected");
+    socket.set_read_timeout(Some(PATIENCE)).expect("set");
+    let frame = |kind: u8, flags: u8, stream: u8, payload: &[u8]| {
+        [&[0, 0, payload.len() as u8, kind, flags, 0, 0, 0, stream][..], payload].concat()
+    };
+    let field = |first: &[u8], text: &str| [first, &[text.len() as u8], text.as_bytes()].concat();
+    // the first call brings the authority into the table of the connection, the second takes it from there, where two
+    // newer entries follow it
+    let with = |authority: &[u8]| {
+        let path = field(&[0x04], "/grpc.health.v1.Health/Check");
+        [&[0x83, 0x86], &path[..], authority, &field(&[0x5f], "application/grpc"), b"\x40\x02te\x08trailers"]
+            .concat()
+    };
+    let path = "%2Ftmp%2Fsome%2Fwade.sock";
+    let sent = [
+        b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n".to_vec(),
+        frame(4, 0, 0, &[]),
+        frame(1, 4, 1, &with(&field(&[0x41], path))),
+        frame(0, 1, 1, &[0; 5]),
+        frame(1, 4, 3, &with(&[0x80 | 64])),
+        frame(0, 1, 3, &[0; 5]),
+    ];
+    socket.write_all(&sent.concat()).expect("sent");
+    let mut answered = Vec::new();
+    while answered.len() < 2 {
+        let mut head = [0; 9];
+        socket.read_exact(&mut head).expect("answered");
+        let mut payload = vec![0; u32::from_be_bytes([0, head[0], head[1], head[2]]) as usize];
+        socket.read_exact(&mut payload).expect("the payload");
+        assert!(head[3] != 3 && head[3] != 7, "stream {} was reset: {payload:?}", head[8]);
+        if head[3] == 0 {
+            // a response says SERVING: field 1 is 1
+            assert_eq!(payload, [0, 0, 0, 0, 2, 8, 1]);
+            answered.push(head[8]);
+        }
+    }
+    answered.sort_unstable();
+    assert_eq!(answered, [1, 3]);
 }

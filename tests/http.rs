@@ -40,9 +40,26 @@ fn a_served_query_shows_in_the_metrics() {
         r#"wade_refusals_total{transport="grpc_unary",reason="invalid_argument"} 1"#,
         r#"wade_refusals_total{transport="http",reason="invalid_argument"} 1"#,
         r#"wade_bundle_version{vehicle="warthog"}"#,
-        "# EOF",
     ] {
         assert!(text.contains(expected), "{expected} is not in\n{text}");
+    }
+}
+
+#[test]
+fn metrics_come_in_the_format_that_is_accepted() {
+    let served = Served::start();
+    let ask = |accept: &[(&str, &str)]| send(address(&served), "GET /metrics", accept, "");
+    let prometheus = "application/openmetrics-text;version=1.0.0;q=0.5,text/plain;version=0.0.4;q=0.4";
+    let open = ask(&[("Accept", prometheus)]);
+    assert!(open.header("content-type").is_some_and(|kind| kind.starts_with("application/openmetrics-text")));
+    assert!(open.body.ends_with("# EOF\n") && open.body.contains("# TYPE wade_reloads counter\n"));
+    for accept in ["*/*", "text/plain", "application/openmetrics-text;q=0, */*"] {
+        let plain = ask(&[("Accept", accept)]);
+        let kind = plain.header("content-type").map(str::to_owned);
+        assert_eq!(kind.as_deref(), Some("text/plain; version=0.0.4; charset=utf-8"), "{accept}");
+        assert!(!plain.body.contains("# EOF") && !plain.body.contains("# UNIT"), "{}", plain.body);
+        assert!(plain.body.contains("# TYPE wade_reloads_total counter\n"), "{}", plain.body);
+        assert!(plain.body.contains("wade_limit{resource=\"streams\"} 64\n"), "{}", plain.body);
     }
 }
 

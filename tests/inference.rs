@@ -318,9 +318,73 @@ fn answers(served: &Served, vehicle: &str) -> bool {
 }
 
 #[test]
+fn load_tools_find_the_configuration_the_statistics_and_a_stream() {
+    let served = Served::start();
+    runtime().block_on(async {
+        let mut inference = connect(&served).await;
+        let named = |name: &str| (name.to_owned(), String::new());
+        let (name, version) = named("husky");
+        let metadata = ModelMetadataRequest { name: name.clone(), version: version.clone() };
+        let metadata = inference.model_metadata(metadata).await.expect("answered").into_inner();
+        let config = ModelConfigRequest { name, version };
+        let config = inference.model_config(config).await.expect("answered").into_inner();
+        let config = config.config.expect("a configuration");
+        assert_eq!((config.name.as_str(), config.max_batch_size), ("husky", 0));
+        let stated: Vec<_> = metadata.inputs.iter().map(|tensor| (&tensor.name, &tensor.shape)).collect();
+        let configured: Vec<_> = config.input.iter().map(|input| (&input.name, &input.dims)).collect();
+        assert_eq!(stated, configured);
+        assert!(config.input.iter().all(|input| input.optional == (input.name != "depth_m")));
+        assert_eq!(config.output.len(), metadata.outputs.len());
+        let (name, version) = named("tank");
+        let unknown =
+            inference.model_config(ModelConfigRequest { name, version }).await.expect_err("unknown");
+        assert_eq!(unknown.code(), Code::NotFound);
+
+        let good = ModelInferRequest {
+            model_name: "husky".into(),
+            inputs: vec![tensor("depth_m", 1, vec![0.1, 0.2])],
+            ..Default::default()
+        };
+        let mut with = good.clone();
+        let parameter = |choice| InferParameter { parameter_choice: Some(choice) };
+        with.parameters.insert("priority".into(), parameter(ParameterChoice::Uint64Param(2)));
+        with.parameters.insert("timeout".into(), parameter(ParameterChoice::Int64Param(20_000_000)));
+        let answer = inference.model_infer(with.clone()).await.expect("answered").into_inner();
+        with.parameters.insert("timeout".into(), parameter(ParameterChoice::Int64Param(1)));
+        let late = inference.model_infer(with).await.expect_err("a microsecond is too short");
+        assert_eq!(late.code(), Code::DeadlineExceeded);
+
+        let bad = ModelInferRequest { model_name: "tank".into(), ..good.clone() };
+        let requests = tokio_stream::iter([good.clone(), bad, good]);
+        let mut answers = inference.model_stream_infer(requests).await.expect("opened").into_inner();
+        for refused in [false, true, false] {
+            let next = answers.message().await.expect("answered").expect("one a request");
+            assert_eq!(next.error_message.contains("tank"), refused, "{next:?}");
+            let response = next.infer_response;
+            assert_eq!(response.is_none(), refused);
+            if let Some(response) = response {
+                assert_eq!(outputs(&response), outputs(&answer));
+            }
+        }
+        assert!(answers.message().await.expect("ended").is_none());
+
+        let asked = ModelStatisticsRequest { name: "husky".into(), version: String::new() };
+        let found = inference.model_statistics(asked).await.expect("answered").into_inner().model_stats;
+        assert_eq!((found.len(), found[0].inference_count), (1, 3));
+        let success = found[0].inference_stats.and_then(|stats| stats.success).expect("counted");
+        assert!(success.count == 3 && success.ns > 0, "{success:?}");
+        let every = inference.model_statistics(ModelStatisticsRequest::default()).await.expect("answered");
+        assert_eq!(every.into_inner().model_stats.len(), VEHICLES.len());
+    });
+}
+
+#[test]
 fn an_administrator_loads_and_unloads() {
     let bundles = common::copy_of_vehicles();
-    let served = Served::with(|config| config.vehicles = bundles.path().to_owned());
+    let served = Served::with(|config| {
+        config.vehicles = bundles.path().to_owned();
+        config.grpc.admin_over_tcp = true;
+    });
     let load = |name: &str| RepositoryModelLoadRequest { model_name: name.into(), ..Default::default() };
     let unload = |name: &str| RepositoryModelUnloadRequest { model_name: name.into(), ..Default::default() };
     runtime().block_on(async {

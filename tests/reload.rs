@@ -53,7 +53,10 @@ fn a_new_version_is_served_after_a_reload_over_every_transport() {
 #[test]
 fn a_bad_bundle_is_refused_over_grpc_and_the_old_version_stays() {
     let folder = copy_of_vehicles();
-    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let served = Served::with(|config| {
+        config.vehicles = folder.path().to_owned();
+        config.grpc.admin_over_tcp = true;
+    });
     let before = served.tcp("husky", Method::Unary).evaluate(&state()).expect("answered");
     std::fs::write(folder.path().join("husky/hull.stl"), b"not a hull").expect("written");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
@@ -77,9 +80,10 @@ fn a_bad_bundle_is_refused_over_grpc_and_the_old_version_stays() {
 fn the_command_line_has_a_server_read_its_bundles_again_and_says_what_it_refused() {
     let folder = copy_of_vehicles();
     let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let socket = format!("unix:{}", served.config.grpc.unix_socket.display());
     let reload = |arguments: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
-        let output = command.args(["vehicle", "reload", "--server", &served.url()]).args(arguments).output();
+        let output = command.args(["vehicle", "reload", "--server", &socket]).args(arguments).output();
         let output = output.expect("the program runs");
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };

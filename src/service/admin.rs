@@ -1,5 +1,9 @@
 //! Reading bundles from disk: at the start, and again when an administrator asks.
 
+mod jobs;
+
+pub use jobs::{Job, Jobs};
+
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 

@@ -1,8 +1,13 @@
 //! gRPC: the listeners, the limits, and handlers that only convert.
 
+mod authority;
+mod calls;
 mod convert;
+mod frames;
 mod handlers;
 mod inference;
+mod link;
+mod serving;
 mod stream;
 
 pub use convert::{added_mass, single};
@@ -18,25 +23,25 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use tokio::sync::watch;
-use tokio_stream::wrappers::UnixListenerStream;
+use tokio::sync::{Semaphore, mpsc, watch};
+use tonic::codec::CompressionEncoding;
 use tonic::codegen::http;
-use tonic::transport::server::{Router, TcpIncoming};
+use tonic::service::Routes;
 use tonic::{Code, Status};
 use tonic_health::pb::health_server::HealthServer;
 use tonic_health::server::{HealthReporter, HealthService};
-use tower::layer::util::{Identity, Stack};
-use tower::util::MapResponseLayer;
 
-use super::admin::Reloader;
+use super::accounts::{Accounts, Connection};
+use super::admin::{Jobs, Reloader};
 use super::health::{Health, Part, State};
+use super::intake::{self, Listener};
 use super::proto::admin_server::AdminServer;
 use super::proto::hydrodynamics_server::HydrodynamicsServer;
 use super::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
 use super::wire::Refusal;
 use super::{occupant, proto};
-use crate::engine::{Admission, Engine};
-use crate::metrics::Metrics;
+use crate::engine::Engine;
+use crate::metrics::{Metrics, Resource};
 
 /// Settings of the gRPC server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,14 +57,37 @@ pub struct Config {
     pub max_message_bytes: usize,
     /// Most states in a batch.
     pub max_batch: usize,
-    /// Most requests being answered at a time.
+    /// Most connections at a time.
+    pub max_connections: usize,
+    /// Most requests at a time, from their first byte until the last byte of their answers has left.
     pub max_requests: usize,
-    /// Most `Stream` calls open at a time.
+    /// Most streams open at a time.
     pub max_streams: usize,
+    /// Most bytes held of requests that are not complete and of answers that are not sent.
+    pub max_held_bytes: usize,
     /// Most HTTP/2 streams on one connection.
     pub max_streams_per_connection: u32,
+    /// Share of these limits that one peer may have, 0 to 1.
+    pub peer_share: f64,
+    /// Frames without a request (PING, SETTINGS, WINDOW_UPDATE, empty DATA) that a connection may send, beside those that its
+    /// requests and answers explain [1/s].
+    pub control_frames_per_s: f64,
+    /// Longest time until a new connection has sent what HTTP/2 begins with [s].
+    pub handshake_s: f64,
+    /// Longest time until the first call of a connection [s].
+    pub first_request_s: f64,
+    /// Longest time for a request to arrive [s].
+    pub request_s: f64,
+    /// Longest time for a client to take any of an answer [s].
+    pub answer_s: f64,
+    /// Longest pause between two requests of a stream [s].
+    pub stream_idle_s: f64,
+    /// Longest time that a connection without a call is kept [s].
+    pub idle_s: f64,
     /// A connection that does not answer a ping sent after this much silence is closed [s].
     pub keepalive_s: u64,
+    /// Whether an administrator's calls are answered over TCP too.
+    pub admin_over_tcp: bool,
 }
 
 impl Default for Config {
@@ -70,10 +98,21 @@ impl Default for Config {
             threads: 1,
             max_message_bytes: 4 << 20,
             max_batch: 4096,
+            max_connections: 256,
             max_requests: 64,
             max_streams: 64,
+            max_held_bytes: 64 << 20,
             max_streams_per_connection: 256,
+            peer_share: 0.75,
+            control_frames_per_s: 200.0,
+            handshake_s: 5.0,
+            first_request_s: 30.0,
+            request_s: 10.0,
+            answer_s: 10.0,
+            stream_idle_s: 600.0,
+            idle_s: 600.0,
             keepalive_s: 30,
+            admin_over_tcp: false,
         }
     }
 }
@@ -106,9 +145,6 @@ pub enum GrpcError {
         /// Who listens.
         occupant: String,
     },
-    /// The transport broke down.
-    #[error("gRPC transport: {0}")]
-    Transport(#[from] tonic::transport::Error),
     /// A reflection descriptor is broken.
     #[error("gRPC reflection: {0}")]
     Reflection(#[from] tonic_reflection::server::Error),
@@ -208,31 +244,23 @@ pub struct Shared {
 pub struct Server {
     config: Config,
     shared: Shared,
-    requests: Arc<Admission>,
-    streams: Arc<Admission>,
+    accounts: Arc<Accounts>,
+    jobs: Arc<Jobs>,
+    gate: Arc<Semaphore>,
     health: HealthReporter,
 }
 
 impl Server {
     /// A server that is not ready yet.
-    pub async fn new(config: Config, shared: Shared) -> Self {
-        let server = Self {
-            requests: Admission::new(config.max_requests),
-            streams: Admission::new(config.max_streams),
-            config,
-            shared,
-            health: HealthReporter::new(),
-        };
+    pub async fn new(config: Config, shared: Shared, accounts: Arc<Accounts>) -> Self {
+        let jobs = Jobs::new(Arc::clone(&shared.reloader));
+        let gate = Arc::new(Semaphore::new(config.threads));
+        let server = Self { config, shared, accounts, jobs, gate, health: HealthReporter::new() };
         // the crate registers the empty name as SERVING, and nothing is served yet
         for service in HEALTH_NAMES {
             server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
         }
         server
-    }
-
-    /// Counts the requests that are being answered, for doors beside gRPC.
-    pub fn requests(&self) -> &Arc<Admission> {
-        &self.requests
     }
 
     /// Says SERVING of what answers, and of the server as a whole where it is ready.
@@ -254,76 +282,114 @@ impl Server {
         }
     }
 
-    fn router(
-        &self,
-        names: handlers::Names,
-        stop: &watch::Receiver<bool>,
-    ) -> Result<Router<Layers>, GrpcError> {
+    fn routes(&self, names: handlers::Names, stop: &watch::Receiver<bool>) -> Result<Routes, GrpcError> {
+        let limit = self.config.max_message_bytes;
         let handlers = handlers::Handlers {
             shared: self.shared.clone(),
             names,
             max_batch: self.config.max_batch,
-            requests: Arc::clone(&self.requests),
-            streams: Arc::clone(&self.streams),
             stop: stop.clone(),
         };
-        let admin = AdminServer::new(handlers::AdminHandlers { reloader: Arc::clone(&self.shared.reloader) });
-        let inference = inference::InferenceHandlers { handlers: handlers.clone() };
-        let inference = GrpcInferenceServiceServer::new(inference)
-            .max_decoding_message_size(self.config.max_message_bytes);
+        let admin = AdminServer::new(handlers::AdminHandlers { jobs: Arc::clone(&self.jobs) });
+        let inference =
+            inference::InferenceHandlers { handlers: handlers.clone(), jobs: Arc::clone(&self.jobs) };
+        let health = HealthServer::new(HealthService::from_health_reporter(self.health.clone()));
         let reflection = || {
             tonic_reflection::server::Builder::configure()
                 .register_encoded_file_descriptor_set(proto::DESCRIPTORS)
                 .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
         };
-        Ok(tonic::transport::Server::builder()
-            .layer(MapResponseLayer::new(name_the_size_limit as fn(_) -> _))
-            .max_concurrent_streams(self.config.max_streams_per_connection)
-            .http2_keepalive_interval(Some(Duration::from_secs(self.config.keepalive_s)))
-            .add_service(
-                HydrodynamicsServer::new(handlers).max_decoding_message_size(self.config.max_message_bytes),
-            )
-            .add_service(inference)
-            .add_service(admin)
-            .add_service(HealthServer::new(HealthService::from_health_reporter(self.health.clone())))
-            .add_service(reflection().build_v1()?)
-            .add_service(reflection().build_v1alpha()?))
+        // answers are not compressed: that takes longer than the query
+        macro_rules! limited {
+            ($service:expr) => {
+                $service.max_decoding_message_size(limit).accept_compressed(CompressionEncoding::Gzip)
+            };
+        }
+        let routes = Routes::new(limited!(HydrodynamicsServer::new(handlers)))
+            .add_service(limited!(GrpcInferenceServiceServer::new(inference)))
+            .add_service(limited!(admin))
+            .add_service(limited!(health))
+            .add_service(limited!(reflection().build_v1()?))
+            .add_service(limited!(reflection().build_v1alpha()?));
+        Ok(routes.prepare())
     }
 
     /// Serves the listeners on the current runtime until `stop` turns true and what is in flight is answered.
     pub async fn run(&self, listeners: &Listeners, stop: watch::Receiver<bool>) -> Result<(), GrpcError> {
+        // the channel ends when every connection has dropped its sender
+        let (open, mut ended) = mpsc::channel(1);
         let at =
             |at: String| move |source: std::io::Error| GrpcError::Bind { at, reason: source.to_string() };
         let tcp = async {
-            let Some(listener) = &listeners.tcp else {
-                stopped(stop.clone()).await;
-                return Ok(());
-            };
+            let Some(listener) = &listeners.tcp else { return Ok(()) };
             let listener = listener.try_clone().and_then(tokio::net::TcpListener::from_std);
-            let listener = listener.map_err(at(self.config.listen.clone()))?;
-            let serving = self
-                .router(handlers::TCP, &stop)?
-                .serve_with_incoming_shutdown(incoming(listener), stopped(stop.clone()));
-            serving.await.map_err(GrpcError::from)
+            let listener = Listener::Tcp(listener.map_err(at(self.config.listen.clone()))?);
+            self.listen(listener, handlers::TCP, &stop, &open).await
         };
         let unix = async {
-            let Some((listener, path)) = &listeners.unix else {
-                stopped(stop.clone()).await;
-                return Ok(());
-            };
+            let Some((listener, path)) = &listeners.unix else { return Ok(()) };
             let listener = listener.try_clone().and_then(tokio::net::UnixListener::from_std);
-            let listener = UnixListenerStream::new(listener.map_err(at(path.display().to_string()))?);
-            let serving = self
-                .router(handlers::UNIX, &stop)?
-                .serve_with_incoming_shutdown(listener, stopped(stop.clone()));
-            serving.await.map_err(GrpcError::from)
+            let listener = Listener::Unix(listener.map_err(at(path.display().to_string()))?);
+            self.listen(listener, handlers::UNIX, &stop, &open).await
         };
-        tokio::try_join!(tcp, unix).map(|_| ())
+        tokio::try_join!(tcp, unix)?;
+        stopped(stop).await;
+        drop(open);
+        let _: Option<()> = ended.recv().await;
+        Ok(())
+    }
+
+    /// Accepts on one listener until `stop` turns true.
+    async fn listen(
+        &self,
+        listener: Listener,
+        names: handlers::Names,
+        stop: &watch::Receiver<bool>,
+        open: &mpsc::Sender<()>,
+    ) -> Result<(), GrpcError> {
+        let rules = Arc::new(calls::Rules {
+            no_administration: self.no_administration(&listener),
+            request: Duration::from_secs_f64(self.config.request_s),
+            stream_idle: Duration::from_secs_f64(self.config.stream_idle_s),
+            gate: Arc::clone(&self.gate),
+            metrics: Arc::clone(&self.shared.metrics),
+            stop: stop.clone(),
+            names,
+        });
+        let (routes, http) = (self.routes(names, stop)?, serving::builder(&self.config));
+        let (deadlines, frames) = (serving::Deadlines::of(&self.config), self.config.control_frames_per_s);
+        let accounts = Arc::clone(&self.accounts);
+        let serve = |socket, connection: Arc<Connection>, place| {
+            let link = link::Link::new(socket, Arc::clone(&connection), frames);
+            let calls = calls::Calls { routes: routes.clone(), connection, rules: Arc::clone(&rules) };
+            let serving = serving::serve(http.clone(), link, calls, deadlines, stop.clone());
+            let open = open.clone();
+            tokio::spawn(async move {
+                serving.await;
+                drop((place, open));
+            });
+        };
+        tokio::select! {
+            () = intake::accept_all(listener, accounts, Resource::connections, serve) => {}
+            () = stopped(stop.clone()) => {}
+        }
+        Ok(())
+    }
+
+    /// Whoever can open the Unix socket is the user that runs the server; over TCP anybody on this machine could ask.
+    fn no_administration(&self, listener: &Listener) -> Option<String> {
+        let refused = matches!(listener, Listener::Tcp(_)) && !self.config.admin_over_tcp;
+        let path = &self.config.unix_socket;
+        let way = if path.as_os_str().is_empty() {
+            "set grpc.unix_socket".to_owned()
+        } else {
+            format!("ask unix:{}", path.display())
+        };
+        refused.then(|| format!("{way}, or set grpc.admin_over_tcp = true where everybody may ask"))
     }
 }
 
 type Body = tonic::body::Body;
-type Layers = Stack<MapResponseLayer<fn(http::Response<Body>) -> http::Response<Body>>, Identity>;
 
 /// tonic says OUT_OF_RANGE of a message over the size limit, other implementations RESOURCE_EXHAUSTED, which is also
 /// what the API guides reserve for limits. No handler of ours says OUT_OF_RANGE.
@@ -339,12 +405,6 @@ fn name_the_size_limit(mut response: http::Response<Body>) -> http::Response<Bod
 /// The status of a message over the size limit.
 pub(super) fn size_limit(status: &Status) -> Status {
     Refusal::MessageTooLong { reason: status.message().to_owned() }.into()
-}
-
-/// Accepted connections with TCP_NODELAY, which the builder's own setting does not reach when it is handed a listener:
-/// without it, answers wait up to 41 ms for a delayed acknowledgement.
-pub fn incoming(listener: tokio::net::TcpListener) -> TcpIncoming {
-    TcpIncoming::from(listener).with_nodelay(Some(true))
 }
 
 /// Resolves when `stop` turns true.

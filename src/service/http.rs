@@ -1,5 +1,5 @@
-//! HTTP: a page to look at, queries as JSON, metrics and probes. It has one thread of its own, so that whatever is asked
-//! here takes no time of the threads that answer gRPC and shared memory.
+//! HTTP: a page to look at, queries as JSON, metrics and probes. It has two threads of its own, one for probes and one for
+//! all else, so that whatever is asked here takes no time of the threads that answer gRPC and shared memory.
 
 mod connections;
 mod guard;
@@ -14,30 +14,45 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
 use serde::{Deserialize, Serialize};
+use tokio::runtime::Handle;
 use tokio::sync::watch;
 
+use super::accounts::Accounts;
 use super::health::Health;
+use super::intake::Listener;
 use super::{grpc, occupant};
-use crate::engine::Admission;
+use connections::Routes;
 use rejection::Rejection;
 
 /// Settings of the HTTP server.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// TCP address; an empty string turns HTTP off.
     pub listen: String,
     /// Names of this machine under which the page and queries are served, beside localhost and plain addresses.
     pub hosts: Vec<String>,
+    /// Most connections at a time.
+    pub max_connections: usize,
+    /// Longest time for the head of a request to arrive, and for its body [s].
+    pub request_s: f64,
+    /// Longest time for a client to take any of an answer [s].
+    pub answer_s: f64,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { listen: "127.0.0.1:9464".into(), hosts: Vec::new() }
+        Self {
+            listen: "127.0.0.1:9464".into(),
+            hosts: Vec::new(),
+            max_connections: 256,
+            request_s: 5.0,
+            answer_s: 10.0,
+        }
     }
 }
 
@@ -83,40 +98,65 @@ pub fn bind(config: &Config) -> Result<Option<TcpListener>, HttpError> {
 /// What the handlers share.
 #[derive(Debug)]
 pub struct Shared {
-    /// Names by which the page may be called.
-    pub hosts: Vec<String>,
+    /// The settings.
+    pub config: Config,
     /// What gRPC's handlers share: the models, the metrics.
     pub grpc: grpc::Shared,
-    /// The places that gRPC's requests take.
-    pub requests: Arc<Admission>,
+    /// The account of everything that is held.
+    pub accounts: Arc<Accounts>,
     /// Which transports answer.
     pub health: Arc<Health>,
 }
 
-/// Serves until `stop` turns true.
-pub async fn run(listener: TcpListener, shared: Shared, stop: watch::Receiver<bool>) -> std::io::Result<()> {
-    let listener = tokio::net::TcpListener::from_std(listener)?;
-    connections::serve(listener, router(Arc::new(shared)), stop).await;
+/// Serves until `stop` turns true: probes on this thread, everything else on that of `work`, so that no query and no hull
+/// stands before a probe.
+pub async fn run(
+    listener: TcpListener,
+    shared: Shared,
+    work: Handle,
+    stop: watch::Receiver<bool>,
+) -> std::io::Result<()> {
+    let listener = Listener::Tcp(tokio::net::TcpListener::from_std(listener)?);
+    let shared = Arc::new(shared);
+    let probes = probes().with_state(Arc::clone(&shared));
+    let routes = Routes { probes, browsed: browsed(Arc::clone(&shared)), work };
+    connections::serve(listener, routes, &shared, stop).await;
     Ok(())
 }
 
-fn router(shared: Arc<Shared>) -> Router {
-    let guarded = |routes: Router<Arc<Shared>>| {
-        routes.layer(axum::middleware::from_fn_with_state(Arc::clone(&shared), guard::check))
-    };
-    let browsed = guarded(page::routes().merge(query::routes()).merge(hull::routes()));
+fn probes() -> Router<Arc<Shared>> {
     Router::new()
         .route("/metrics", get(metrics))
         .route("/livez", get(|| std::future::ready("live\n")))
         .route("/readyz", get(readyz))
-        .merge(browsed)
-        .fallback(|| std::future::ready(Rejection::NoSuchPath))
-        .with_state(shared)
 }
 
-async fn metrics(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
-    let content_type = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-    ([(header::CONTENT_TYPE, content_type)], shared.grpc.metrics.render())
+fn browsed(shared: Arc<Shared>) -> Router {
+    let guard = axum::middleware::from_fn_with_state(Arc::clone(&shared), guard::check);
+    let routes = page::routes().merge(query::routes()).merge(hull::routes()).layer(guard);
+    routes.fallback(|| std::future::ready(Rejection::NoSuchPath)).with_state(shared)
+}
+
+/// Prometheus asks for OpenMetrics and takes it; what asks for nothing, such as curl or an older agent, gets the text format
+/// that everything reads.
+async fn metrics(State(shared): State<Arc<Shared>>, headers: HeaderMap) -> impl IntoResponse {
+    let accepts = headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
+    let open = accepts.flat_map(|value| value.split(',')).any(is_open_metrics);
+    let metrics = &shared.grpc.metrics;
+    let (content_type, text) = if open {
+        ("application/openmetrics-text; version=1.0.0; charset=utf-8", metrics.render())
+    } else {
+        ("text/plain; version=0.0.4; charset=utf-8", metrics.render_plain())
+    };
+    ([(header::CONTENT_TYPE, content_type)], text)
+}
+
+/// Whether one of the types that a client accepts is OpenMetrics, and not by a weight of zero.
+fn is_open_metrics(accepted: &str) -> bool {
+    let mut parts = accepted.split(';').map(str::trim);
+    let named = parts.next().is_some_and(|name| name.eq_ignore_ascii_case("application/openmetrics-text"));
+    let refused = |weight: &str| weight.parse() == Ok(0.0_f32);
+    named && !parts.any(|part| part.strip_prefix("q=").is_some_and(refused))
 }
 
 async fn readyz(State(shared): State<Arc<Shared>>) -> impl IntoResponse {

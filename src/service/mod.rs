@@ -1,10 +1,12 @@
 //! The doors through which queries come: checks, gRPC, shared memory, administration.
 
+pub mod accounts;
 pub mod admin;
 pub mod answer;
 pub mod grpc;
 pub mod health;
 pub mod http;
+pub mod intake;
 pub mod occupant;
 mod sessions;
 pub mod shm;

@@ -4,9 +4,10 @@ use nalgebra::UnitVector3;
 use tonic::Code;
 use tonic_types::{ErrorDetails, StatusExt};
 
+use super::accounts::Overloaded;
 use crate::condition::{Condition, FRESH_WATER, GroundContact};
 use crate::effects::Circumstances;
-use crate::engine::{Overloaded, UnknownVehicle};
+use crate::engine::UnknownVehicle;
 use crate::frame::Vec3;
 use crate::service::grpc::TensorFault;
 
@@ -401,6 +402,15 @@ pub enum Refusal {
         /// The limit.
         overloaded: Overloaded,
     },
+    /// An administrator's call where none is answered.
+    #[error("an administrator's call is answered on the Unix socket alone: {reason}")]
+    NoAdministration {
+        /// The way out.
+        reason: String,
+    },
+    /// Other jobs of an administrator are not done yet.
+    #[error("another administrator's job runs and one more waits: ask again when they are done")]
+    TooManyJobs,
     /// A message over the size limit.
     #[error("{reason}; send smaller batches, or raise grpc.max_message_bytes")]
     MessageTooLong {
@@ -438,7 +448,10 @@ impl Refusal {
                 Code::NotFound
             }
             Self::NotReady => Code::Unavailable,
-            Self::Overloaded { .. } | Self::MessageTooLong { .. } => Code::ResourceExhausted,
+            Self::Overloaded { .. } | Self::TooManyJobs | Self::MessageTooLong { .. } => {
+                Code::ResourceExhausted
+            }
+            Self::NoAdministration { .. } => Code::PermissionDenied,
             Self::DeadlineExceeded { .. } => Code::DeadlineExceeded,
             Self::Invalid { .. }
             | Self::Tensor(_)
@@ -456,6 +469,7 @@ impl Refusal {
             Code::Unavailable => "unavailable",
             Code::ResourceExhausted => "resource_exhausted",
             Code::DeadlineExceeded => "deadline_exceeded",
+            Code::PermissionDenied => "permission_denied",
             _ => "invalid_argument",
         }
     }
@@ -474,9 +488,13 @@ impl Refusal {
                 ErrorDetails::with_resource_info("repository", name.as_str(), "", message)
             }
             Self::Tensor(fault) => ErrorDetails::with_bad_request_violation(fault.field(), message),
-            Self::Overloaded { .. } | Self::NotReady => ErrorDetails::with_retry_info(Some(RETRY_AFTER)),
+            Self::Overloaded { .. } | Self::TooManyJobs | Self::NotReady => {
+                ErrorDetails::with_retry_info(Some(RETRY_AFTER))
+            }
             // the same message would be refused again, so there is no time to retry after
-            Self::DeadlineExceeded { .. } | Self::MessageTooLong { .. } => ErrorDetails::new(),
+            Self::DeadlineExceeded { .. } | Self::MessageTooLong { .. } | Self::NoAdministration { .. } => {
+                ErrorDetails::new()
+            }
             Self::Invalid { invalid, index } => {
                 let name = invalid.field.name();
                 let field = index.map_or_else(|| format!("state.{name}"), |i| format!("{name}[{i}]"));

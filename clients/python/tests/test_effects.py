@@ -248,7 +248,7 @@ def test_effects_come_with_a_reload(
     mortal_server.start(vehicles)
     with (
         connect(kind, mortal_server, loop, timeout_s=20.0) as client,
-        wade.GrpcClient(mortal_server.address, timeout_s=20.0) as admin,
+        wade.GrpcClient(f"unix:{mortal_server.socket}", timeout_s=20.0) as admin,
     ):
         bare = client.evaluate("husky", STATE)
         assert bare.effects == () and bare.added_mass is None and bare.effect_force_n.shape == (0, 3)

@@ -1,9 +1,8 @@
 //! The calls.
 
 use std::cell::RefCell;
-use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 use tonic::{Request, Response, Status, Streaming};
@@ -12,10 +11,9 @@ use super::Shared;
 use super::convert;
 use super::stream::Answers;
 use crate::effects::Session;
-use crate::engine::Admission;
 use crate::metrics::Transport;
 use crate::served::ServedVehicle;
-use crate::service::admin::Reloader;
+use crate::service::admin::{Job, Jobs};
 use crate::service::proto::admin_server::Admin;
 use crate::service::proto::hydrodynamics_server::Hydrodynamics;
 use crate::service::wire::Refusal;
@@ -31,10 +29,11 @@ thread_local! {
 /// What the metrics call the calls of one listener.
 #[derive(Debug, Clone, Copy)]
 pub struct Names {
-    unary: Transport,
-    batch: Transport,
-    stream: Transport,
+    pub(super) unary: Transport,
+    pub(super) batch: Transport,
+    pub(super) stream: Transport,
     pub(super) infer: Transport,
+    pub(super) other: Transport,
 }
 
 /// The TCP listener's.
@@ -43,6 +42,7 @@ pub(super) const TCP: Names = Names {
     batch: Transport::grpc_batch,
     stream: Transport::grpc_stream,
     infer: Transport::grpc_infer,
+    other: Transport::grpc_other,
 };
 /// The Unix socket's.
 pub(super) const UNIX: Names = Names {
@@ -50,6 +50,7 @@ pub(super) const UNIX: Names = Names {
     batch: Transport::uds_batch,
     stream: Transport::uds_stream,
     infer: Transport::uds_infer,
+    other: Transport::uds_other,
 };
 
 /// The handlers of `wade.v1.Hydrodynamics`.
@@ -58,8 +59,6 @@ pub struct Handlers {
     pub(super) shared: Shared,
     pub(super) names: Names,
     pub(super) max_batch: usize,
-    pub(super) requests: Arc<Admission>,
-    pub(super) streams: Arc<Admission>,
     pub(super) stop: watch::Receiver<bool>,
 }
 
@@ -72,9 +71,9 @@ impl Hydrodynamics for Handlers {
         request: Request<proto::EvaluateRequest>,
     ) -> Result<Response<proto::EvaluateResponse>, Status> {
         let call = Call::begin(&self.shared, self.names.unary, &request);
-        let answer = call.admit(&self.requests).and_then(|_permit| {
-            let request = request.get_ref();
-            let vehicle = self.shared.engine.vehicle(&request.vehicle)?;
+        let request = request.get_ref();
+        let vehicle = self.shared.engine.vehicle(&request.vehicle).map_err(Refusal::from);
+        let answer = vehicle.and_then(|vehicle| {
             call.check_deadline(None)?;
             answer_state(&vehicle, request.state.as_ref(), None)
         });
@@ -86,10 +85,7 @@ impl Hydrodynamics for Handlers {
         request: Request<proto::EvaluateBatchRequest>,
     ) -> Result<Response<proto::EvaluateBatchResponse>, Status> {
         let call = Call::begin(&self.shared, self.names.batch, &request);
-        let answer = match call.admit(&self.requests) {
-            Ok(_permit) => self.batch(&call, request.get_ref()).await,
-            Err(refusal) => Err(refusal),
-        };
+        let answer = self.batch(&call, request.get_ref()).await;
         call.end(answer)
     }
 
@@ -98,21 +94,9 @@ impl Hydrodynamics for Handlers {
         request: Request<Streaming<proto::EvaluateRequest>>,
     ) -> Result<Response<Self::StreamStream>, Status> {
         let call = Call::begin(&self.shared, self.names.stream, &request);
-        let admitted = self.streams.admit();
-        match admitted.map_err(|overloaded| Refusal::Overloaded { what: "streams", overloaded }) {
-            Ok(permit) => {
-                let answers = Answers::new(
-                    request.into_inner(),
-                    self.shared.clone(),
-                    self.names.stream,
-                    call.deadline,
-                    permit,
-                    self.stop.clone(),
-                );
-                Ok(Response::new(answers))
-            }
-            Err(refusal) => Err(call.refuse(refusal).into()),
-        }
+        let (shared, names) = (self.shared.clone(), self.names);
+        let deadline = call.deadline;
+        Ok(Response::new(Answers::new(request.into_inner(), shared, names.stream, deadline)))
     }
 
     async fn list_vehicles(
@@ -231,12 +215,10 @@ impl<'s> Call<'s> {
         Self { shared, transport, arrived: Instant::now(), deadline }
     }
 
-    /// A place among the requests that are being answered, over whichever transport they came.
-    pub(in crate::service) fn admit(
-        &self,
-        requests: &Arc<Admission>,
-    ) -> Result<crate::engine::Permit, Refusal> {
-        requests.admit().map_err(|overloaded| Refusal::Overloaded { what: "requests", overloaded })
+    /// Brings the deadline forward to this long after the arrival.
+    pub(super) fn limit(&mut self, timeout: Duration) {
+        let limit = self.arrived.checked_add(timeout);
+        self.deadline = [self.deadline, limit].into_iter().flatten().min();
     }
 
     pub(super) fn check_deadline(&self, answered: Option<usize>) -> Result<(), Refusal> {
@@ -272,19 +254,10 @@ impl<'s> Call<'s> {
     }
 }
 
-/// Work with bundles on disk, which takes milliseconds and must not stand before a query.
-pub(super) async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Status> {
-    tokio::task::spawn_blocking(work)
-        .await
-        .map_err(|_| Status::internal("the work on the bundles was interrupted"))
-}
-
 /// The handlers of `wade.v1.Admin`.
 #[derive(Debug)]
 pub struct AdminHandlers {
-    pub(super) reloader: Arc<Reloader>,
+    pub(super) jobs: Arc<Jobs>,
 }
 
 #[tonic::async_trait]
@@ -294,18 +267,7 @@ impl Admin for AdminHandlers {
         request: Request<proto::ReloadRequest>,
     ) -> Result<Response<proto::ReloadResponse>, Status> {
         let proto::ReloadRequest { vehicle, bundle } = request.into_inner();
-        let reloader = Arc::clone(&self.reloader);
-        let reloaded = blocking(move || match bundle.as_str() {
-            "" => reloader.reload(&vehicle),
-            bundle => reloader.reload_from(&vehicle, Path::new(bundle)),
-        });
-        let reloaded = reloaded.await?;
-        let vehicles = reloaded.map_err(Refusal::from)?.into_iter().map(|reload| proto::Reloaded {
-            vehicle: reload.vehicle,
-            bundle_version: reload.served_version,
-            refusal: reload.refusal.map(|refusal| refusal.to_string()).unwrap_or_default(),
-            elsewhere: reload.elsewhere,
-        });
-        Ok(Response::new(proto::ReloadResponse { vehicles: vehicles.collect() }))
+        let vehicles = self.jobs.run(Job::Reload { vehicle, bundle: bundle.into() }).await?;
+        Ok(Response::new(proto::ReloadResponse { vehicles }))
     }
 }

@@ -7,29 +7,33 @@ mod outputs;
 
 pub use fault::TensorFault;
 
+use std::pin::Pin;
 use std::sync::Arc;
 
-use tonic::{Request, Response, Status};
+use tokio_stream::{Stream, StreamExt};
+use tonic::{Request, Response, Status, Streaming};
 
-use super::handlers::{Answered, Call, Handlers, blocking};
-use crate::engine::UnknownVehicle;
+use super::handlers::{Answered, Call, Handlers};
+use crate::metrics::Transport;
 use crate::served::ServedVehicle;
-use crate::service::admin::Reloader;
+use crate::service::admin::{Job, Jobs};
+use crate::service::proto::Reloaded;
 use crate::service::proto::inference::grpc_inference_service_server::GrpcInferenceService;
 use crate::service::proto::inference::infer_parameter::ParameterChoice;
 use crate::service::proto::inference::model_metadata_response::TensorMetadata;
 use crate::service::proto::inference::repository_index_response::ModelIndex;
 use crate::service::proto::inference::*;
-use crate::service::wire::Refusal;
+use crate::service::wire::{Field, Refusal};
 use inputs::{INPUTS, shape, short};
 
 /// The state of a model that can be asked.
 const READY: &str = "READY";
 
 /// The handlers of `inference.GRPCInferenceService`.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct InferenceHandlers {
     pub(super) handlers: Handlers,
+    pub(super) jobs: Arc<Jobs>,
 }
 
 #[tonic::async_trait]
@@ -64,7 +68,7 @@ impl GrpcInferenceService for InferenceHandlers {
         Ok(Response::new(ServerMetadataResponse {
             name: env!("CARGO_PKG_NAME").into(),
             version: env!("CARGO_PKG_VERSION").into(),
-            extensions: vec!["model_repository".into()],
+            extensions: ["model_repository", "model_configuration", "statistics"].map(Into::into).into(),
         }))
     }
 
@@ -81,13 +85,62 @@ impl GrpcInferenceService for InferenceHandlers {
         &self,
         request: Request<ModelInferRequest>,
     ) -> Result<Response<ModelInferResponse>, Status> {
-        let Handlers { shared, names, requests, .. } = &self.handlers;
+        let Handlers { shared, names, .. } = &self.handlers;
         let call = Call::begin(shared, names.infer, &request);
-        let answer = match call.admit(requests) {
-            Ok(_permit) => self.infer(&call, request.into_inner()).await,
-            Err(refusal) => Err(refusal),
+        self.infer(call, request.into_inner()).await
+    }
+
+    type ModelStreamInferStream =
+        Pin<Box<dyn Stream<Item = Result<ModelStreamInferResponse, Status>> + Send>>;
+
+    async fn model_stream_infer(
+        &self,
+        request: Request<Streaming<ModelInferRequest>>,
+    ) -> Result<Response<Self::ModelStreamInferStream>, Status> {
+        let this = self.clone();
+        let answers = request.into_inner().then(move |request| {
+            let this = this.clone();
+            async move {
+                let request = request?;
+                let Handlers { shared, names, .. } = &this.handlers;
+                let call = Call::arriving(shared, names.infer, None);
+                let answer = this.infer(call, request).await;
+                Ok(match answer {
+                    Ok(response) => ModelStreamInferResponse {
+                        infer_response: Some(response.into_inner()),
+                        ..Default::default()
+                    },
+                    Err(status) => ModelStreamInferResponse {
+                        error_message: status.message().to_owned(),
+                        ..Default::default()
+                    },
+                })
+            }
+        });
+        Ok(Response::new(Box::pin(answers)))
+    }
+
+    async fn model_config(
+        &self,
+        request: Request<ModelConfigRequest>,
+    ) -> Result<Response<ModelConfigResponse>, Status> {
+        let ModelConfigRequest { name, version } = request.get_ref();
+        let vehicle = self.model(name, version)?;
+        Ok(Response::new(ModelConfigResponse { config: Some(config(&vehicle)) }))
+    }
+
+    async fn model_statistics(
+        &self,
+        request: Request<ModelStatisticsRequest>,
+    ) -> Result<Response<ModelStatisticsResponse>, Status> {
+        let ModelStatisticsRequest { name, version } = request.get_ref();
+        let vehicles = if name.is_empty() {
+            self.handlers.shared.engine.vehicles().values().cloned().collect()
+        } else {
+            vec![self.model(name, version)?]
         };
-        call.end(answer)
+        let model_stats = vehicles.iter().map(|vehicle| self.statistics(vehicle)).collect();
+        Ok(Response::new(ModelStatisticsResponse { model_stats }))
     }
 
     async fn repository_index(
@@ -96,8 +149,8 @@ impl GrpcInferenceService for InferenceHandlers {
     ) -> Result<Response<RepositoryIndexResponse>, Status> {
         let RepositoryIndexRequest { repository_name, ready } = request.into_inner();
         one_repository(&repository_name)?;
-        let reloader = Arc::clone(&self.handlers.shared.reloader);
-        let names = blocking(move || reloader.names()).await?;
+        // the names of a folder, which no query notices
+        let names = self.handlers.shared.reloader.names();
         let vehicles = self.handlers.shared.engine.vehicles();
         let models = names.into_iter().map(|name| index(vehicles.get(&name).map(Arc::as_ref), name));
         let models = models.filter(|model| !ready || model.state == READY).collect();
@@ -111,11 +164,10 @@ impl GrpcInferenceService for InferenceHandlers {
         let RepositoryModelLoadRequest { repository_name, model_name, parameters } = request.into_inner();
         one_repository(&repository_name)?;
         only(parameters.keys(), "")?;
-        let name = model_name.clone();
-        let reloaded = self.administer(&model_name, move |reloader| reloader.reload(&name)).await?;
-        let refusal = reloaded.into_iter().find_map(|reload| reload.refusal);
+        let reloaded = self.administer(Job::reload, model_name).await?;
+        let refusal = reloaded.into_iter().map(|one| one.refusal).find(|refusal| !refusal.is_empty());
         refusal.map_or(Ok(Response::new(RepositoryModelLoadResponse {})), |refusal| {
-            Err(Status::failed_precondition(refusal.to_string()))
+            Err(Status::failed_precondition(refusal))
         })
     }
 
@@ -126,8 +178,7 @@ impl GrpcInferenceService for InferenceHandlers {
         let RepositoryModelUnloadRequest { repository_name, model_name, parameters } = request.into_inner();
         one_repository(&repository_name)?;
         only(parameters.keys(), "unload_dependents")?;
-        let name = model_name.clone();
-        self.administer(&model_name, move |reloader| reloader.unload(&name)).await?;
+        self.administer(Job::Unload, model_name).await?;
         Ok(Response::new(RepositoryModelUnloadResponse {}))
     }
 }
@@ -147,7 +198,34 @@ impl InferenceHandlers {
         Ok(vehicle)
     }
 
+    /// Answers a request and records it.
     async fn infer(
+        &self,
+        mut call: Call<'_>,
+        request: ModelInferRequest,
+    ) -> Result<Response<ModelInferResponse>, Status> {
+        if let Some(timeout) = inputs::timeout(&request) {
+            call.limit(timeout);
+        }
+        let answer = self.compute(&call, request).await;
+        call.end(answer)
+    }
+
+    fn statistics(&self, vehicle: &ServedVehicle) -> ModelStatistics {
+        let name = vehicle.model().vehicle().name.clone();
+        let transports = [Transport::grpc_infer, Transport::uds_infer];
+        let (count, ns) = self.handlers.shared.metrics.totals(&transports, &name);
+        let duration = Some(StatisticDuration { count, ns });
+        ModelStatistics {
+            name,
+            version: vehicle.model().version().to_string(),
+            inference_count: count,
+            execution_count: count,
+            inference_stats: Some(InferStatistics { success: duration, compute_infer: duration }),
+        }
+    }
+
+    async fn compute(
         &self,
         call: &Call<'_>,
         request: ModelInferRequest,
@@ -175,18 +253,12 @@ impl InferenceHandlers {
         Ok((response, answered))
     }
 
-    /// Reading and checking a bundle takes milliseconds, which must not stand before a query.
-    async fn administer<T: Send + 'static>(
-        &self,
-        vehicle: &str,
-        work: impl FnOnce(&Reloader) -> Result<T, UnknownVehicle> + Send + 'static,
-    ) -> Result<T, Status> {
+    async fn administer(&self, job: fn(String) -> Job, vehicle: String) -> Result<Vec<Reloaded>, Refusal> {
         if vehicle.is_empty() {
             // to the reloader an empty name is every vehicle
-            self.model(vehicle, "")?;
+            self.model(&vehicle, "")?;
         }
-        let reloader = Arc::clone(&self.handlers.shared.reloader);
-        Ok(blocking(move || work(&reloader)).await?.map_err(Refusal::from)?)
+        self.jobs.run(job(vehicle)).await
     }
 }
 
@@ -216,6 +288,35 @@ fn metadata(vehicle: &ServedVehicle) -> ModelMetadataResponse {
         platform: env!("CARGO_PKG_NAME").into(),
         inputs: INPUTS.iter().map(|&(field, width)| tensor(field.name(), "FP32", shape(-1, width))).collect(),
         outputs: outputs.map(|(output, shape)| tensor(output.name(), output.datatype(), shape)).collect(),
+    }
+}
+
+/// The metadata in the words of Triton's configuration of a model.
+fn config(vehicle: &ServedVehicle) -> ModelConfig {
+    let metadata = metadata(vehicle);
+    let data_type = |datatype: &str| match datatype {
+        "BOOL" => DataType::TypeBool,
+        "INT32" => DataType::TypeInt32,
+        _ => DataType::TypeFp32,
+    };
+    let input = metadata.inputs.into_iter().map(|tensor| ModelInput {
+        data_type: data_type(&tensor.datatype).into(),
+        optional: tensor.name != Field::Depth.name(),
+        name: tensor.name,
+        dims: tensor.shape,
+    });
+    let output = metadata.outputs.into_iter().map(|tensor| ModelOutput {
+        data_type: data_type(&tensor.datatype).into(),
+        name: tensor.name,
+        dims: tensor.shape,
+    });
+    ModelConfig {
+        name: metadata.name,
+        platform: metadata.platform.clone(),
+        max_batch_size: 0,
+        input: input.collect(),
+        output: output.collect(),
+        backend: metadata.platform,
     }
 }
 

@@ -1,18 +1,15 @@
 //! One answer a request, computed where the request is read, with no channel between.
 
-use std::future::Future;
 use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Instant;
 
-use tokio::sync::watch;
 use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
 use super::handlers::{Call, STATES_PER_TURN, answer_state};
-use super::{Shared, size_limit, stopped};
+use super::{Shared, size_limit};
 use crate::effects::Session;
-use crate::engine::Permit;
 use crate::metrics::Transport;
 use crate::service::proto;
 use crate::service::wire::Refusal;
@@ -26,10 +23,8 @@ pub struct Answers {
     session: Session,
     transport: Transport,
     deadline: Option<Instant>,
-    stop: Pin<Box<dyn Future<Output = ()> + Send>>,
     answers_this_turn: usize,
     ended: bool,
-    _permit: Permit,
 }
 
 impl Answers {
@@ -38,10 +33,7 @@ impl Answers {
         shared: Shared,
         transport: Transport,
         deadline: Option<Instant>,
-        permit: Permit,
-        stop: watch::Receiver<bool>,
     ) -> Self {
-        let stop = Box::pin(stopped(stop));
         Self {
             requests,
             shared,
@@ -49,10 +41,8 @@ impl Answers {
             session: Session::default(),
             transport,
             deadline,
-            stop,
             answers_this_turn: 0,
             ended: false,
-            _permit: permit,
         }
     }
 
@@ -76,10 +66,6 @@ impl Stream for Answers {
     fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
         if self.ended {
             return Poll::Ready(None);
-        }
-        if self.stop.as_mut().poll(context).is_ready() {
-            self.ended = true;
-            return Poll::Ready(Some(Err(Status::unavailable("the server is shutting down"))));
         }
         if self.answers_this_turn == STATES_PER_TURN {
             // a client that sends without waiting would keep the thread to itself

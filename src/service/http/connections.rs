@@ -1,62 +1,140 @@
-//! Connections to the HTTP port: so many at a time, and none for long without a request, so that whoever opens them by the
-//! thousand or never says what it wants takes a bounded share of the server.
+//! Connections to the HTTP port: so many at a time, and none for long without a request. Where all places are taken, the
+//! connection that has let the server wait for longest makes room, so that a probe never waits behind slow bodies.
 
+use std::convert::Infallible;
+use std::future::Future;
+use std::io;
+use std::pin::Pin;
 use std::sync::Arc;
+use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use axum::Router;
+use axum::body::Body;
+use axum::http::{Request, Response, StatusCode};
+use axum::response::IntoResponse;
+use hyper::body::{Body as HttpBody, Incoming};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
-use hyper_util::service::TowerToHyperService;
-use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::runtime::Handle;
+use tokio::sync::watch;
+use tower::ServiceExt;
 
-/// Connections at a time; further ones wait for a place.
-const MOST: usize = 128;
-/// Until the head of the next request is there, a connection without one is closed.
-const PATIENCE: Duration = Duration::from_secs(5);
-/// Pause where the system has no descriptor for a connection.
-const EXHAUSTED: Duration = Duration::from_millis(200);
+use super::Shared;
+use crate::metrics::Resource;
+use crate::service::accounts::{Closed, Computing, Connection, Sent};
+use crate::service::grpc::stopped;
+use crate::service::intake::{self, Listener, Socket};
+
+/// How often a connection's deadline is looked at.
+const LOOK: Duration = Duration::from_secs(1);
+
+/// Who answers what.
+#[derive(Debug, Clone)]
+pub struct Routes {
+    /// Answered at once, on the thread that reads.
+    pub probes: Router,
+    /// Everything else.
+    pub browsed: Router,
+    /// The runtime that answers it.
+    pub work: Handle,
+}
 
 /// Answers until `stop` turns true, and then what has been asked until then.
-pub async fn serve(listener: TcpListener, router: Router, mut stop: watch::Receiver<bool>) {
-    let places = Arc::new(Semaphore::new(MOST));
+pub async fn serve(listener: Listener, routes: Routes, shared: &Shared, stop: watch::Receiver<bool>) {
     let mut http = http1::Builder::new();
-    http.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
+    http.timer(TokioTimer::new()).header_read_timeout(Duration::from_secs_f64(shared.config.request_s));
     let open = GracefulShutdown::new();
-    loop {
-        let (stream, place) = tokio::select! {
-            // an error means that the sender is gone, and with it the server
-            _ = stop.wait_for(|&stop| stop) => break,
-            accepted = accept(&listener, &places) => accepted,
-        };
-        let service = TowerToHyperService::new(router.clone());
-        let connection = open.watch(http.serve_connection(TokioIo::new(stream), service));
+    let answer = Duration::from_secs_f64(shared.config.answer_s);
+    let serve = |socket, connection: Arc<Connection>, place| {
+        let service = Requests { routes: routes.clone(), connection: Arc::clone(&connection) };
+        let noted = Noted { socket, connection: Arc::clone(&connection) };
+        let served = open.watch(http.serve_connection(TokioIo::new(noted), service));
         tokio::spawn(async move {
-            // a client that breaks its own connection off is its own affair
-            let _ = connection.await;
+            tokio::select! {
+                // a client that breaks its own connection off is its own affair
+                _ = served => {}
+                _ = connection.closing() => {}
+                () = stalled(&connection, answer) => connection.close(Closed::answer_not_read),
+            }
             drop(place);
         });
+    };
+    tokio::select! {
+        () = intake::accept_all(listener, Arc::clone(&shared.accounts), Resource::http_connections, serve) => {}
+        () = stopped(stop) => {}
     }
-    drop(listener);
     open.shutdown().await;
 }
 
-/// The next connection, once there is a place for it.
-async fn accept(
-    listener: &TcpListener,
-    places: &Arc<Semaphore>,
-) -> (TcpStream, Option<OwnedSemaphorePermit>) {
-    // it is never closed
-    let place = Arc::clone(places).acquire_owned().await.ok();
-    loop {
-        match listener.accept().await {
-            Ok((stream, _)) => return (stream, place),
-            Err(error) => {
-                tracing::warn!(%error, "no connection could be taken on the HTTP port");
-                tokio::time::sleep(EXHAUSTED).await;
-            }
-        }
+/// Resolves when an answer has waited for too long.
+async fn stalled(connection: &Connection, longest: Duration) {
+    while connection.stalled_for() <= longest {
+        tokio::time::sleep(LOOK).await;
+    }
+}
+
+/// The requests of one connection.
+struct Requests {
+    routes: Routes,
+    connection: Arc<Connection>,
+}
+
+impl hyper::service::Service<Request<Incoming>> for Requests {
+    type Response = Response<Body>;
+    type Error = Infallible;
+    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, Infallible>> + Send>>;
+
+    fn call(&self, request: Request<Incoming>) -> Self::Future {
+        let Routes { probes, browsed, work } = self.routes.clone();
+        let connection = Arc::clone(&self.connection);
+        connection.moved();
+        Box::pin(async move {
+            // a request with a body is the client's to complete: who reads it says when it is there
+            let _computing = request.body().is_end_stream().then(|| Computing::begin(&connection));
+            let mut request = request.map(Body::new);
+            request.extensions_mut().insert(Arc::clone(&connection));
+            let response = if matches!(request.uri().path(), "/livez" | "/readyz" | "/metrics") {
+                probes.oneshot(request).await?
+            } else {
+                let answered = work.spawn(browsed.oneshot(request)).await;
+                answered.unwrap_or_else(|_| Ok(StatusCode::INTERNAL_SERVER_ERROR.into_response()))?
+            };
+            Ok(response.map(|body| Body::new(Sent::new(body, connection, None))))
+        })
+    }
+}
+
+/// A socket that notes what leaves.
+struct Noted {
+    socket: Socket,
+    connection: Arc<Connection>,
+}
+
+impl AsyncRead for Noted {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buf: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.socket).poll_read(cx, buf)
+    }
+}
+
+impl AsyncWrite for Noted {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        let written = ready!(Pin::new(&mut self.socket).poll_write(cx, bytes))?;
+        self.connection.sent();
+        Poll::Ready(Ok(written))
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.socket).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.socket).poll_shutdown(cx)
     }
 }

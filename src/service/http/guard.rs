@@ -37,7 +37,7 @@ const HEADERS: [(HeaderName, &str); 4] = [
 /// Refuses what comes from another site, and adds the headers to what is answered.
 pub async fn check(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     let asks = request.uri().path().starts_with("/v1/");
-    let checked = known_host(&request, &shared.hosts)
+    let checked = known_host(&request, &shared.config.hosts)
         // a link from another site may lead to the page
         .and_then(|()| if asks { same_site(request.headers()) } else { Ok(()) });
     let mut response = match checked {

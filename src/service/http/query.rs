@@ -6,14 +6,15 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::body::{Body, to_bytes};
-use axum::extract::{Path, RawQuery, State};
+use axum::extract::{Extension, Path, RawQuery, State};
 use axum::response::Response;
 use axum::routing::get;
 
 use super::Shared;
 use super::json;
 use super::rejection::Rejection;
-use crate::metrics::Transport;
+use crate::metrics::{Resource, Transport};
+use crate::service::accounts::{Computing, Connection};
 use crate::service::answer::Answer;
 use crate::service::grpc::{self, Call, answer_state};
 use crate::service::proto;
@@ -21,8 +22,6 @@ use crate::service::wire::Refusal;
 
 /// Longest body [bytes]: a query with every field takes about one kilobyte.
 const MAX_BODY: usize = 64 << 10;
-/// Longest wait for the rest of a body.
-const BODY_TIME: Duration = Duration::from_secs(10);
 
 /// The paths of this module.
 pub fn routes() -> Router<Arc<Shared>> {
@@ -35,22 +34,29 @@ pub fn routes() -> Router<Arc<Shared>> {
 
 async fn by_parameters(
     State(shared): State<Arc<Shared>>,
+    Extension(connection): Extension<Arc<Connection>>,
     RawQuery(parameters): RawQuery,
 ) -> Result<Response, Rejection> {
     let text = json::from_parameters("wade.v1.EvaluateRequest", &parameters.unwrap_or_default())?;
-    evaluate(&shared, &text)
+    evaluate(&shared, &connection, &text)
 }
 
-async fn by_body(State(shared): State<Arc<Shared>>, body: Body) -> Result<Response, Rejection> {
+async fn by_body(
+    State(shared): State<Arc<Shared>>,
+    Extension(connection): Extension<Arc<Connection>>,
+    body: Body,
+) -> Result<Response, Rejection> {
     let late = |_| Refusal::DeadlineExceeded { answered: None };
-    let text = tokio::time::timeout(BODY_TIME, to_bytes(body, MAX_BODY)).await.map_err(late)?;
+    let longest = Duration::from_secs_f64(shared.config.request_s);
+    let text = tokio::time::timeout(longest, to_bytes(body, MAX_BODY)).await.map_err(late)?;
     // the other errors are those of a connection that is gone, whom no answer reaches
     let text = text.map_err(|_| Rejection::TooLong { limit: MAX_BODY })?;
-    evaluate(&shared, &text)
+    let _computing = Computing::begin(&connection);
+    evaluate(&shared, &connection, &text)
 }
 
 /// Answers on this thread, as gRPC does on its own.
-fn evaluate(shared: &Shared, text: &[u8]) -> Result<Response, Rejection> {
+fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Result<Response, Rejection> {
     let call = Call::arriving(&shared.grpc, Transport::http, None);
     let request: proto::EvaluateRequest = match json::read("wade.v1.EvaluateRequest", text) {
         Ok(request) => request,
@@ -60,7 +66,9 @@ fn evaluate(shared: &Shared, text: &[u8]) -> Result<Response, Rejection> {
         }
     };
     let mut names = Vec::new();
-    let answer = call.admit(&shared.requests).and_then(|_permit| {
+    let admitted = shared.accounts.take(connection, Resource::requests, 1);
+    let overloaded = |overloaded| Refusal::Overloaded { what: Resource::requests.name(), overloaded };
+    let answer = admitted.map_err(overloaded).and_then(|_place| {
         let vehicle = shared.grpc.engine.vehicle(&request.vehicle)?;
         names = vehicle.model().vehicle().surfaces.iter().map(|surface| surface.name.clone()).collect();
         answer_state(&vehicle, request.state.as_ref(), None)

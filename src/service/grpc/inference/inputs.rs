@@ -1,6 +1,7 @@
 //! Tensors to the batch that they mean.
 
 use std::collections::HashMap;
+use std::time::Duration;
 
 use super::TensorFault;
 use crate::service::proto;
@@ -25,7 +26,8 @@ pub const INPUTS: [(Field, usize); 11] = [
 ];
 
 /// The parameters of a request, which hold for all its states.
-const PARAMETERS: &str = "ground_contact (string), implicit_added_mass (bool)";
+const PARAMETERS: &str =
+    "ground_contact (string), implicit_added_mass (bool), timeout (int64 [us]), priority (uint64)";
 
 /// Longest name that an error repeats.
 const MAX_NAME: usize = 64;
@@ -164,8 +166,23 @@ fn parameters(
             ("implicit_added_mass", Some(ParameterChoice::BoolParam(value))) => {
                 batch.implicit_added_mass = *value;
             }
+            // a deadline is the caller's affair, and nothing waits here that a priority could put first
+            (
+                "timeout" | "priority",
+                Some(ParameterChoice::Int64Param(_) | ParameterChoice::Uint64Param(_)),
+            ) => {}
             _ => return Err(TensorFault::Parameter { name: short(name), known: PARAMETERS }.into()),
         }
     }
     Ok(())
+}
+
+/// How long a request may take, where it says so; as in Triton, 0 is any time.
+pub fn timeout(request: &ModelInferRequest) -> Option<Duration> {
+    let us = match request.parameters.get("timeout")?.parameter_choice {
+        Some(ParameterChoice::Int64Param(us)) => u64::try_from(us).ok()?,
+        Some(ParameterChoice::Uint64Param(us)) => us,
+        _ => return None,
+    };
+    (us > 0).then(|| Duration::from_micros(us))
 }

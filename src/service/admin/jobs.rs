@@ -1,0 +1,188 @@
+//! The administrator's jobs, one after the other: reading bundles takes milliseconds, which must not stand before a query,
+//! and whoever asks for it a thousand times must not get a thousand threads. One job runs and one waits; the same question as
+//! the one that waits is answered with it, any other is refused.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tokio::sync::oneshot;
+
+use super::Reloader;
+use crate::engine::UnknownVehicle;
+use crate::service::proto::Reloaded;
+use crate::service::wire::Refusal;
+
+/// Longest pause between two jobs.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+/// What an administrator asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Job {
+    /// Read a vehicle's bundle again; all where the name is empty.
+    Reload {
+        /// The vehicle.
+        vehicle: String,
+        /// Only where it is read from this folder; from any where the path is empty.
+        bundle: PathBuf,
+    },
+    /// Serve a vehicle no more.
+    Unload(String),
+}
+
+impl Job {
+    /// Reads a vehicle's bundle again, whichever folder it is in.
+    pub fn reload(vehicle: String) -> Self {
+        Self::Reload { vehicle, bundle: PathBuf::new() }
+    }
+
+    /// Whether this job does what the other one asks for.
+    fn covers(&self, other: &Self) -> bool {
+        let every = |job: &Self| match job {
+            Self::Reload { vehicle, bundle } => vehicle.is_empty() && bundle.as_os_str().is_empty(),
+            Self::Unload(_) => false,
+        };
+        let any_folder = matches!(other, Self::Reload { bundle, .. } if bundle.as_os_str().is_empty());
+        self == other || (every(self) && any_folder)
+    }
+}
+
+type Outcome = Result<Vec<Reloaded>, UnknownVehicle>;
+
+#[derive(Debug)]
+struct Waiting {
+    job: Job,
+    askers: Vec<oneshot::Sender<Outcome>>,
+}
+
+#[derive(Debug, Default)]
+struct Queue {
+    running: bool,
+    waiting: Option<Waiting>,
+}
+
+/// The jobs of a server.
+#[derive(Debug)]
+pub struct Jobs {
+    reloader: Arc<Reloader>,
+    queue: Mutex<Queue>,
+}
+
+impl Jobs {
+    /// No job yet.
+    pub fn new(reloader: Arc<Reloader>) -> Arc<Self> {
+        Arc::new(Self { reloader, queue: Mutex::default() })
+    }
+
+    /// Has a job done, and waits for it.
+    pub async fn run(self: &Arc<Self>, job: Job) -> Result<Vec<Reloaded>, Refusal> {
+        let asked = job.clone();
+        let outcome = self.submit(job)?.await;
+        let mut reloaded = outcome.map_err(|_| Refusal::TooManyJobs)??;
+        if let Job::Reload { vehicle, .. } = asked
+            && !vehicle.is_empty()
+        {
+            reloaded.retain(|one| one.vehicle == vehicle);
+            if reloaded.is_empty() {
+                self.reloader.engine.vehicle(&vehicle)?;
+            }
+        }
+        Ok(reloaded)
+    }
+
+    /// Puts a job in its place: on the thread, beside one that waits, or nowhere.
+    fn submit(self: &Arc<Self>, job: Job) -> Result<oneshot::Receiver<Outcome>, Refusal> {
+        let (asker, answer) = oneshot::channel();
+        let mut queue = self.lock();
+        match &mut queue.waiting {
+            Some(waiting) if waiting.job.covers(&job) => waiting.askers.push(asker),
+            Some(_) => return Err(Refusal::TooManyJobs),
+            None => queue.waiting = Some(Waiting { job, askers: vec![asker] }),
+        }
+        if !queue.running {
+            let jobs = Arc::clone(self);
+            let thread = std::thread::Builder::new().name("wade-admin".into());
+            queue.running = thread.spawn(move || jobs.work()).is_ok();
+            if !queue.running {
+                queue.waiting = None;
+                return Err(Refusal::TooManyJobs);
+            }
+        }
+        self.note(&queue);
+        Ok(answer)
+    }
+
+    /// Does what waits until nothing does.
+    fn work(&self) {
+        loop {
+            let mut queue = self.lock();
+            let Some(Waiting { job, askers }) = queue.waiting.take() else {
+                queue.running = false;
+                self.note(&queue);
+                return;
+            };
+            self.note(&queue);
+            drop(queue);
+            let start = Instant::now();
+            let outcome = self.perform(&job);
+            let elapsed = start.elapsed();
+            for asker in askers {
+                // whoever has gone meanwhile needs no answer
+                let _ = asker.send(outcome.clone());
+            }
+            if self.lock().waiting.is_some() {
+                // whoever asks without end takes half a core at most
+                std::thread::sleep(elapsed.min(LONGEST_PAUSE));
+            }
+        }
+    }
+
+    fn perform(&self, job: &Job) -> Outcome {
+        match job {
+            Job::Reload { vehicle, bundle } => {
+                let reloaded = if bundle.as_os_str().is_empty() {
+                    self.reloader.reload(vehicle)?
+                } else {
+                    self.reloader.reload_from(vehicle, bundle)?
+                };
+                let reloaded = reloaded.into_iter().map(|reload| Reloaded {
+                    vehicle: reload.vehicle,
+                    bundle_version: reload.served_version,
+                    refusal: reload.refusal.map(|refusal| refusal.to_string()).unwrap_or_default(),
+                    elsewhere: reload.elsewhere,
+                });
+                Ok(reloaded.collect())
+            }
+            Job::Unload(vehicle) => self.reloader.unload(vehicle).map(|()| Vec::new()),
+        }
+    }
+
+    fn note(&self, queue: &Queue) {
+        let jobs = usize::from(queue.running) + usize::from(queue.waiting.is_some());
+        self.reloader.metrics.set_admin_jobs(jobs);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Job;
+
+    #[test]
+    fn reading_every_bundle_covers_each_and_nothing_else() {
+        let from = |name: &str, bundle: &str| Job::Reload { vehicle: name.into(), bundle: bundle.into() };
+        let reload = |name: &str| from(name, "");
+        assert!(reload("").covers(&reload("husky")) && reload("husky").covers(&reload("husky")));
+        assert!(!reload("husky").covers(&reload("")) && !reload("husky").covers(&reload("warthog")));
+        assert!(!reload("").covers(&Job::Unload("husky".into())));
+        let elsewhere = from("husky", "/srv/husky");
+        assert!(
+            elsewhere.covers(&elsewhere)
+                && !reload("").covers(&elsewhere)
+                && !elsewhere.covers(&reload("husky"))
+        );
+    }
+}

@@ -1,0 +1,119 @@
+//! One connection from its handshake to its end: its deadlines, and a drain.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use hyper::server::conn::http2;
+use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
+use tokio::sync::watch;
+
+use super::calls::Calls;
+use super::link::Link;
+use super::{Config, stopped};
+use crate::service::accounts::{Closed, Connection};
+
+/// How often a connection's deadlines are looked at.
+const LOOK: Duration = Duration::from_secs(1);
+/// Longest time for a peer that is asked to go.
+const GOODBYE: Duration = Duration::from_secs(2);
+/// What may be sent ahead of the server's reading [bytes]: by one stream, by all streams of a connection. What is sent ahead
+/// lies in memory.
+const STREAM_WINDOW: u32 = 128 << 10;
+const CONNECTION_WINDOW: u32 = 256 << 10;
+/// Most bytes of answers that one stream has in the library's buffer.
+const SEND_BUFFER: usize = 64 << 10;
+/// Longest headers of a request [bytes].
+const MAX_HEADERS: u32 = 16 << 10;
+/// Streams that a peer may have reset before they were looked at. More fit into no turn, so that it is the budget for frames
+/// that counts, which slows a flood down, where an end of the connection would have it come again at once.
+const MAX_PENDING_RESETS: usize = 1024;
+/// Streams that the server may have reset for a peer's faults before the connection ends.
+const MAX_FAULTS: usize = 64;
+
+/// The deadlines of a connection.
+#[derive(Debug, Clone, Copy)]
+pub struct Deadlines {
+    handshake: Duration,
+    first_request: Duration,
+    idle: Duration,
+    answer: Duration,
+}
+
+impl Deadlines {
+    /// As configured.
+    pub fn of(config: &Config) -> Self {
+        Self {
+            handshake: Duration::from_secs_f64(config.handshake_s),
+            first_request: Duration::from_secs_f64(config.first_request_s),
+            idle: Duration::from_secs_f64(config.idle_s),
+            answer: Duration::from_secs_f64(config.answer_s),
+        }
+    }
+
+    /// The deadline that a connection has missed.
+    fn missed(&self, connection: &Connection) -> Option<Closed> {
+        if !connection.has_shaken_hands() {
+            return (connection.age() > self.handshake).then_some(Closed::no_handshake);
+        }
+        if !connection.has_called() {
+            return (connection.age() > self.first_request).then_some(Closed::no_request);
+        }
+        if connection.stalled_for() > self.answer {
+            return Some(Closed::answer_not_read);
+        }
+        (!connection.has_calls() && connection.waits_for() > self.idle).then_some(Closed::idle)
+    }
+}
+
+/// The settings of HTTP/2.
+pub fn builder(config: &Config) -> http2::Builder<TokioExecutor> {
+    let mut builder = http2::Builder::new(TokioExecutor::new());
+    builder
+        .timer(TokioTimer::new())
+        .initial_stream_window_size(STREAM_WINDOW)
+        .initial_connection_window_size(CONNECTION_WINDOW)
+        .max_concurrent_streams(config.max_streams_per_connection)
+        .max_send_buf_size(SEND_BUFFER)
+        .max_header_list_size(MAX_HEADERS)
+        .max_pending_accept_reset_streams(MAX_PENDING_RESETS)
+        .max_local_error_reset_streams(MAX_FAULTS)
+        .keep_alive_interval(Duration::from_secs(config.keepalive_s));
+    builder
+}
+
+/// Serves one connection until it ends, is to be closed, or the server drains and its calls are answered.
+pub async fn serve(
+    http: http2::Builder<TokioExecutor>,
+    link: Link,
+    calls: Calls,
+    deadlines: Deadlines,
+    stop: watch::Receiver<bool>,
+) {
+    let connection = Arc::clone(&calls.connection);
+    let mut served = std::pin::pin!(http.serve_connection(TokioIo::new(link), calls));
+    let mut stop = std::pin::pin!(stopped(stop));
+    let mut look = tokio::time::interval_at((Instant::now() + LOOK).into(), LOOK);
+    let (mut draining, mut goodbye) = (false, None);
+    loop {
+        tokio::select! {
+            // a client that breaks its own connection off is its own affair
+            _ = &mut served => return,
+            _ = connection.closing() => return,
+            () = &mut stop, if !draining => {
+                draining = true;
+                served.as_mut().graceful_shutdown();
+            }
+            _ = look.tick() => match deadlines.missed(&connection) {
+                // one that has nothing to lose is asked to go, so that its next call finds a new connection
+                Some(Closed::idle | Closed::no_request) if goodbye.is_none() => {
+                    goodbye = Some(Instant::now());
+                    served.as_mut().graceful_shutdown();
+                }
+                Some(reason) if goodbye.is_none_or(|since| since.elapsed() > GOODBYE) => {
+                    connection.close(reason);
+                }
+                _ => {}
+            },
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Where connections come in: the sockets, and the loop that accepts them. A loop that can have no descriptor waits longer
+//! and longer instead of spinning, closes whoever asks nothing, and has a few descriptors of its own for HTTP, so that
+//! probes are answered meanwhile.
+
+use std::fs::File;
+use std::io::{self, IoSlice};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+
+use super::accounts::{Accounts, Closed, Connection, Peer, Place};
+use crate::metrics::Resource;
+
+/// First pause where the system has no descriptor for a connection; each further one is twice as long.
+const FIRST_PAUSE: Duration = Duration::from_millis(10);
+/// Longest such pause.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+/// Time between two connections while all places are taken.
+const PACE: Duration = Duration::from_millis(10);
+/// Descriptors that are held for probes.
+const RESERVE: usize = 4;
+
+/// A connection of either kind.
+#[derive(Debug)]
+pub enum Socket {
+    /// TCP, without delay.
+    Tcp(TcpStream),
+    /// The Unix socket.
+    Unix(UnixStream),
+}
+
+/// A listener of either kind.
+#[derive(Debug)]
+pub enum Listener {
+    /// TCP.
+    Tcp(TcpListener),
+    /// The Unix socket.
+    Unix(UnixListener),
+}
+
+impl Listener {
+    /// The next connection and who is at its other end. Without TCP_NODELAY answers would wait up to 41 ms for a delayed
+    /// acknowledgement.
+    pub async fn accept(&self) -> io::Result<(Socket, Peer)> {
+        match self {
+            Self::Tcp(listener) => {
+                let (stream, address) = listener.accept().await?;
+                stream.set_nodelay(true)?;
+                Ok((Socket::Tcp(stream), Peer::of(address)))
+            }
+            Self::Unix(listener) => {
+                let (stream, _) = listener.accept().await?;
+                let pid = stream.peer_cred().ok().and_then(|peer| peer.pid()).unwrap_or(0);
+                Ok((Socket::Unix(stream), Peer::Process(pid)))
+            }
+        }
+    }
+}
+
+/// Descriptors that the process can do without for a moment.
+#[derive(Debug, Default)]
+struct Reserve(Vec<File>);
+
+impl Reserve {
+    fn fill(&mut self) {
+        while self.0.len() < RESERVE {
+            match File::open("/dev/null") {
+                Ok(file) => self.0.push(file),
+                Err(_) => return,
+            }
+        }
+    }
+}
+
+/// Accepts connections for ever, and hands each to `serve` with its account and its place.
+pub async fn accept_all(
+    listener: Listener,
+    accounts: Arc<Accounts>,
+    kind: Resource,
+    serve: impl Fn(Socket, Arc<Connection>, Place),
+) {
+    let mut reserve = Reserve::default();
+    let mut pause = FIRST_PAUSE;
+    loop {
+        if kind == Resource::http_connections {
+            reserve.fill();
+        }
+        match listener.accept().await {
+            Ok((socket, peer)) => {
+                pause = FIRST_PAUSE;
+                match accounts.open(peer, kind).await {
+                    Ok((connection, place)) => serve(socket, connection, place),
+                    Err(refused) => {
+                        accounts.metrics().count_closed(Closed::no_room);
+                        tracing::warn!(%peer, kind = kind.name(), %refused, "a connection was refused");
+                    }
+                }
+                if kind == Resource::connections && accounts.is_full(kind) {
+                    // whoever connects without end must not keep the thread
+                    tokio::time::sleep(PACE).await;
+                } else {
+                    tokio::task::yield_now().await;
+                }
+            }
+            Err(error) => {
+                accounts.metrics().count_accept_error();
+                tracing::warn!(%error, kind = kind.name(), "no connection could be accepted");
+                if is_exhausted(&error) {
+                    accounts.make_room_for_descriptor();
+                    if reserve.0.pop().is_some() {
+                        continue;
+                    }
+                    tokio::time::sleep(pause).await;
+                    pause = (2 * pause).min(LONGEST_PAUSE);
+                }
+            }
+        }
+    }
+}
+
+/// Whether there is no descriptor, or no memory for one.
+fn is_exhausted(error: &io::Error) -> bool {
+    use nix::libc::{EMFILE, ENFILE, ENOBUFS, ENOMEM};
+    error.raw_os_error().is_some_and(|code| [EMFILE, ENFILE, ENOBUFS, ENOMEM].contains(&code))
+}
+
+/// The same call on whichever socket it is.
+macro_rules! either {
+    ($self:ident, $call:ident ( $($argument:expr),* )) => {
+        match $self.get_mut() {
+            Self::Tcp(stream) => Pin::new(stream).$call($($argument),*),
+            Self::Unix(stream) => Pin::new(stream).$call($($argument),*),
+        }
+    };
+}
+
+impl AsyncRead for Socket {
+    fn poll_read(self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        either!(self, poll_read(cx, buf))
+    }
+}
+
+impl AsyncWrite for Socket {
+    fn poll_write(self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        either!(self, poll_write(cx, bytes))
+    }
+
+    fn poll_write_vectored(
+        self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        either!(self, poll_write_vectored(cx, slices))
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        true
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        either!(self, poll_flush(cx))
+    }
+
+    fn poll_shutdown(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        either!(self, poll_shutdown(cx))
+    }
+}
