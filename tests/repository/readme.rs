@@ -51,16 +51,6 @@ impl Scratch {
         for name in ["tests", "clients", "src", "Cargo.toml", "Cargo.lock"] {
             symlink(root().join(name), path(name)).expect("linked");
         }
-        // no link, through which the shipped bundles would be written
-        for vehicle in ["husky", "warthog"] {
-            let from = root().join("vehicles").join(vehicle);
-            let to = path("vehicles").join(vehicle);
-            std::fs::create_dir_all(&to).expect("made");
-            for entry in std::fs::read_dir(from).expect("readable") {
-                let entry = entry.expect("readable");
-                std::fs::copy(entry.path(), to.join(entry.file_name())).expect("copied");
-            }
-        }
         for name in ["bin", "installed", "data"] {
             std::fs::create_dir(path(name)).expect("made");
         }
