@@ -404,7 +404,7 @@ fn an_administrator_loads_and_unloads() {
         shm.evaluate(&state).expect("answered");
         inference.repository_model_unload(unload("husky")).await.expect("unloaded");
         // a client whose ports are open hears of it, alone and in a batch
-        for error in [shm.evaluate(&state).map(drop), shm.evaluate_batch(&[state; 2]).map(drop)] {
+        for error in [shm.evaluate(&state).map(|_| ()), shm.evaluate_batch(&[state; 2]).map(|_| ())] {
             let unknown = error.expect_err("not served any more");
             assert!(matches!(unknown, ClientError::UnknownVehicle { .. }), "{unknown}");
             assert!(unknown.to_string().ends_with("warthog"), "{unknown}");
