@@ -26,7 +26,7 @@ use crate::service::{Evaluated, Evaluator};
 /// Why a call got no forces.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ClientError {
-    /// No answer came in time. The next call connects anew.
+    /// No answer came in time. The next call connects again.
     #[error("no answer within {} ms", .0.as_millis())]
     Timeout(Duration),
     /// Nobody serves there.

@@ -239,7 +239,7 @@ fn why_not(names: &Names, vehicle: &str) -> ClientError {
 pub(super) fn not_served(names: &Names, vehicle: &str) -> ClientError {
     let told = shm_served::served::<Ipc>(names);
     let mut served = told.map(|served| served.vehicles).unwrap_or_default();
-    // what is told may be a moment old
+    // the list may be a moment old
     served.retain(|served| served != vehicle);
     ClientError::UnknownVehicle { vehicle: vehicle.to_owned(), served }
 }
@@ -254,7 +254,7 @@ fn is_absent(service: &str) -> bool {
 
 /// A listener under a name that no other client has.
 fn listener(node: &Node<Ipc>, names: &Names) -> Result<(Listener<Ipc>, u64), ShmError> {
-    // the standard library's hasher is seeded at random in each process, and anew for each instance
+    // the standard library's hasher is seeded at random in each process, and again for each instance
     let key = RandomState::new().hash_one(std::process::id()).max(1);
     let error = |error: &dyn std::fmt::Display| ShmError::new("a listener")(error);
     let name = PortName::new(&wake_name(key)).map_err(|e| error(&format!("{e:?}")))?;
