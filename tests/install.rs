@@ -221,7 +221,7 @@ fn going_back_to_another_network_needs_a_yes() {
 }
 
 #[test]
-fn a_change_goes_where_it_can_be_written_and_hides_nothing() {
+fn a_named_place_that_cannot_be_a_folder_is_refused_before_any_work() {
     let folder = TempDir::new().unwrap();
     // a file in the way of a folder: nobody, root included, can write there
     std::fs::write(folder.path().join("file"), b"").unwrap();

@@ -30,8 +30,7 @@ pub fn place(staged: &Path, directory: &Path) -> io::Result<()> {
     if directory.exists() {
         return exchange(staged, directory);
     }
-    fs::rename(staged, directory)?;
-    sync_parent(directory)
+    move_folder(staged, directory)
 }
 
 /// Where the folder in place waits while the staged one takes its place, on file systems that cannot exchange two.
@@ -52,16 +51,40 @@ pub fn exchange(staged: &Path, directory: &Path) -> io::Result<()> {
     sync_parent(directory)
 }
 
-/// The same in three steps. Killed between them, the folder that was in place stands under [`aside_of`], whole.
-pub fn exchange_in_steps(staged: &Path, directory: &Path) -> io::Result<()> {
+/// The same in steps. Killed between them, the folder that was in place stands under [`aside_of`], whole.
+fn exchange_in_steps(staged: &Path, directory: &Path) -> io::Result<()> {
     let aside = aside_of(directory);
     let _ = fs::remove_dir_all(&aside);
-    move_folder(directory, &aside)?;
-    fs::rename(staged, directory).inspect_err(|_| {
-        let _ = fs::rename(&aside, directory);
-    })?;
-    sync_parent(directory)?;
-    fs::rename(&aside, staged)
+    match fs::rename(directory, &aside) {
+        // a folder of a lower layer stays where it is, and its files are replaced one by one
+        Err(error) if error.kind() == io::ErrorKind::CrossesDevices => {
+            copy_folder(directory, &aside)?;
+            replace_files(staged, directory)?;
+            fs::remove_dir_all(staged)?;
+        }
+        moved => {
+            moved?;
+            fs::rename(staged, directory).inspect_err(|_| {
+                let _ = fs::rename(&aside, directory);
+            })?;
+        }
+    }
+    move_folder(&aside, staged)
+}
+
+/// Moves the files of a folder over those of another, and removes what only the latter has.
+fn replace_files(from: &Path, to: &Path) -> io::Result<()> {
+    let names = |folder: &Path| {
+        fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>()
+    };
+    let new = names(from)?;
+    for name in &new {
+        fs::rename(from.join(name), to.join(name))?;
+    }
+    for name in names(to)?.iter().filter(|name| !new.contains(name)) {
+        fs::remove_file(to.join(name))?;
+    }
+    sync_folder(to)
 }
 
 /// Moves a folder, also to another file system.
