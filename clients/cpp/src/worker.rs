@@ -85,7 +85,10 @@ mod tests {
     #[test]
     fn a_thread_that_does_not_end_is_left_to_itself() {
         let (release, wait) = channel::<()>();
-        let worker = Worker::spawn("test", move || drop(wait.recv())).unwrap();
+        let worker = Worker::spawn("test", move || {
+            let _ = wait.recv();
+        })
+        .unwrap();
         let start = Instant::now();
         worker.end();
         assert!(start.elapsed() >= PATIENCE);
