@@ -229,11 +229,14 @@ impl Library {
     fn folder_to_write(&self, names: &[&str]) -> Result<PathBuf, LibraryError> {
         let mut tried = Vec::new();
         let writable = |folder: &Path| access(folder, AccessFlags::W_OK | AccessFlags::X_OK);
+        // one that is made before the folder in use would hide it
+        if let Some(folder) = self.folder.as_ref().filter(|folder| writable(folder).is_ok()) {
+            return Ok(folder.clone());
+        }
         for place in &self.places {
             let in_use = self.folder.as_ref() == Some(place);
             let made = if in_use { Ok(()) } else { fs::create_dir_all(place) };
             match made.and_then(|()| Ok(writable(place)?)) {
-                Ok(()) if in_use => return Ok(place.clone()),
                 Ok(()) => {
                     self.check_hidden(place, names)?;
                     return Ok(place.clone());
