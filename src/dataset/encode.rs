@@ -16,6 +16,9 @@ use super::file::{FORMAT, FORMAT_KEY, Fault, META_KEY};
 use super::schema::{self, LOADS, SCALARS, SECTION, STATES, SURFACE, TEXTS};
 use super::{Dataset, Sample, SurfaceLoad};
 
+/// Not the version of the program: the same data has the same bytes, and so the digest that provenances of weights state,
+/// whichever version writes it.
+const CREATED_BY: &str = "wade 0.1.0";
 const UNITS_KEY: &str = "wade.units";
 const FRAME_KEY: &str = "wade.frame";
 const FRAME: &str = "body frame: right-handed, x forward, y left, z up, origin at the center of the hull's bounding \
@@ -42,7 +45,7 @@ pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset, loads: Loa
     ];
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
-        .set_created_by(format!("wade {}", env!("CARGO_PKG_VERSION")))
+        .set_created_by(CREATED_BY.to_owned())
         .set_key_value_metadata(Some(pairs.map(|(key, value)| KeyValue::new(key.to_owned(), value)).into()));
     // those at rest repeat from section to section
     let moving = LOADS.iter().filter(|column| loads == Loads::Plain && !column.names[0].starts_with("rest"));
