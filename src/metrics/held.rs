@@ -49,19 +49,17 @@ pub enum Closed {
     idle,
     answer_not_read,
     control_frames,
-    slow_request,
     made_room,
     no_room,
 }
 
 impl Closed {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 7] = [
         Self::no_handshake,
         Self::no_request,
         Self::idle,
         Self::answer_not_read,
         Self::control_frames,
-        Self::slow_request,
         Self::made_room,
         Self::no_room,
     ];
@@ -74,7 +72,6 @@ impl Closed {
             Self::idle => "idle",
             Self::answer_not_read => "answer_not_read",
             Self::control_frames => "control_frames",
-            Self::slow_request => "slow_request",
             Self::made_room => "made_room",
             Self::no_room => "no_room",
         }

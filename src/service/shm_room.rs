@@ -11,9 +11,10 @@ use nix::unistd::{AccessFlags, access};
 
 use super::shm_owner::SHARED_MEMORY;
 
-/// Room that the services take whatever is served [bytes], and that each vehicle takes once clients write batches.
+/// Room that the services take whatever is served [bytes], and that each vehicle takes once it has answered a batch: one of
+/// 256 states has 1.3 MB.
 const ROOM: u64 = 1 << 20;
-const ROOM_OF_VEHICLE: u64 = 1 << 20;
+const ROOM_OF_VEHICLE: u64 = 2 << 20;
 
 /// Room that the ports of one client take with the first batch of 256 states [bytes]: 1.4 MB were measured.
 const ROOM_OF_CLIENT: u64 = 2 << 20;
