@@ -84,10 +84,15 @@ impl Worker {
         for vehicle in &vehicles {
             load(&reloader, vehicle);
         }
-        let owner = Owner::new(&config.shm.namespace, server).unwrap_or_else(|error| unavailable(&error));
+        let mut owner = Owner::new(&config.shm.namespace, server).unwrap_or_else(|error| unavailable(&error));
         shm_room::check(vehicles.len()).unwrap_or_else(|error| unavailable(&error));
+        let former: Vec<u32> = former.into_iter().chain(owner.former().iter().copied()).collect();
+        for process in &former {
+            shm_remains::remove_segments_of(*process);
+        }
+        owner.forget_former(server);
         let owner = Arc::new(owner);
-        let remains = Remains { crashed, former: former.into_iter().chain(owner.former()).collect() };
+        let remains = Remains { crashed, former };
         let (stop, own) = (Arc::new(AtomicBool::new(false)), Own::default());
         let watching: Arc<Mutex<Option<Watching>>> = Arc::default();
         let counts = Arc::new(Counts::new(Arc::clone(&metrics)));

@@ -34,7 +34,7 @@ pub(crate) enum OwnerError {
 pub(crate) struct Owner {
     lock: Flock<File>,
     path: PathBuf,
-    former: Option<u32>,
+    former: Vec<u32>,
 }
 
 impl Owner {
@@ -60,25 +60,30 @@ impl Owner {
             let lock = match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
                 Ok(lock) => lock,
                 Err((mut file, Errno::EWOULDBLOCK)) => {
-                    let [server, _] = numbers(&mut file);
+                    let server = numbers(&mut file).first().copied();
                     return Err(OwnerError::InUse { namespace: namespace.to_owned(), server });
                 }
                 Err((_, error)) => return Err(system(error.into())),
             };
-            let mut owner = Self { lock, path: path.clone(), former: None };
+            let mut owner = Self { lock, path: path.clone(), former: Vec::new() };
             // an owner before this one may have removed the file between the opening and the locking
             if owner.is_in_place() {
-                let [_, former] = numbers(&mut owner.lock);
-                owner.former = former;
+                owner.former = numbers(&mut owner.lock).into_iter().skip(1).collect();
                 owner.note(server);
                 return Ok(owner);
             }
         }
     }
 
-    /// The process that owned the namespace before and did not give it back.
-    pub(crate) fn former(&self) -> Option<u32> {
-        self.former
+    /// The processes that owned the namespace before and did not give it back.
+    pub(crate) fn former(&self) -> &[u32] {
+        &self.former
+    }
+
+    /// Forgets them, once what they left is removed: until then the next owner hears of them too.
+    pub(crate) fn forget_former(&mut self, server: u32) {
+        self.former.clear();
+        self.note(server);
     }
 
     /// Whether the lock is the one that another process would find.
@@ -88,11 +93,14 @@ impl Owner {
         held.is_some() && held == std::fs::symlink_metadata(&self.path).map(identity).ok()
     }
 
-    /// Writes the numbers of the server and of this process, for the message of another server and for the next owner.
+    /// Writes the numbers of the server, of this process and of those before it, for the message of another server and for the
+    /// next owner.
     fn note(&mut self, server: u32) {
+        let numbers: Vec<String> =
+            [server, std::process::id()].iter().chain(&self.former).map(u32::to_string).collect();
         let written = self.lock.set_len(0).and_then(|()| {
             self.lock.rewind()?;
-            write!(self.lock, "{server} {}", std::process::id())
+            self.lock.write_all(numbers.join(" ").as_bytes())
         });
         if let Err(error) = written {
             tracing::debug!(%error, "the lock of the namespace names no process");
@@ -109,15 +117,17 @@ impl Drop for Owner {
     }
 }
 
+/// Longest text of a lock that is read [bytes]: a server that is killed again and again before it has removed anything adds a
+/// number each time.
+const LONGEST: u64 = 4096;
+
 /// The numbers of the processes in a lock, as far as they can be read.
-fn numbers(file: &mut File) -> [Option<u32>; 2] {
+fn numbers(file: &mut File) -> Vec<u32> {
     let mut text = String::new();
-    // two numbers of ten digits
-    if file.rewind().and_then(|()| file.take(32).read_to_string(&mut text)).is_err() {
-        return [None; 2];
+    if file.rewind().and_then(|()| file.take(LONGEST).read_to_string(&mut text)).is_err() {
+        return Vec::new();
     }
-    let mut numbers = text.split_whitespace().map(|number| number.parse().ok());
-    [(); 2].map(|()| numbers.next().flatten())
+    text.split_whitespace().map_while(|number| number.parse().ok()).collect()
 }
 
 #[cfg(test)]
@@ -130,7 +140,7 @@ mod tests {
     fn a_namespace_has_one_owner_at_a_time_and_the_next_knows_the_one_that_died() {
         let namespace = format!("owner-{}", std::process::id());
         let first = Owner::new(&namespace, 7).unwrap();
-        assert!(first.is_in_place() && first.former().is_none());
+        assert!(first.is_in_place() && first.former().is_empty());
         let second = Owner::new(&namespace, 8).unwrap_err();
         assert!(second.to_string().starts_with("another server, process 7, serves"), "{second}");
         // a lock that was deleted under its owner is no lock any more
@@ -143,9 +153,15 @@ mod tests {
         let path = third.path.clone();
         drop(third);
         assert!(!path.exists());
-        std::fs::write(&path, "9 12345").unwrap();
-        assert_eq!(Owner::new(&namespace, 10).unwrap().former(), Some(12345));
+        std::fs::write(&path, "9 12345 678").unwrap();
+        let mut fourth = Owner::new(&namespace, 10).unwrap();
+        assert_eq!(fourth.former(), [12345, 678]);
+        let text = || std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text(), format!("10 {} 12345 678", std::process::id()), "kept until they are forgotten");
+        fourth.forget_former(10);
+        assert_eq!(text(), format!("10 {}", std::process::id()));
+        drop(fourth);
         std::fs::write(&path, "\u{7f}no numbers").unwrap();
-        assert_eq!(Owner::new(&namespace, 10).unwrap().former(), None);
+        assert!(Owner::new(&namespace, 10).unwrap().former().is_empty());
     }
 }

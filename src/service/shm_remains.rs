@@ -145,8 +145,19 @@ fn remove_service(file: &Path) {
     }
 }
 
+/// Removes the segments that a dead process answered in. iceoryx2 finds them by the port that they belong to, and so not those
+/// of a process that was killed before it had told anybody of its port.
+pub(crate) fn remove_segments_of(process: u32) {
+    let suffix = Config::global_config().global.service.data_segment_suffix.to_string();
+    remove_where(process, |name| name.ends_with(&suffix));
+}
+
 /// Removes whatever bears the number of a process that is dead: segments, connections, nodes.
 fn remove_files_of(process: u32) {
+    remove_where(process, |_| true);
+}
+
+fn remove_where(process: u32, chosen: impl Fn(&str) -> bool) {
     if Path::new("/proc").join(process.to_string()).exists() {
         // the number is another's by now
         return;
@@ -164,7 +175,7 @@ fn remove_files_of(process: u32) {
     for folder in [Path::new(SHARED_MEMORY), &root, &nodes] {
         for file in files_in(folder) {
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            if !ours(&name) || !(name.starts_with(&prefix) || folder == nodes) {
+            if !ours(&name) || !chosen(&name) || !(name.starts_with(&prefix) || folder == nodes) {
                 continue;
             }
             let _ = if file.is_dir() { fs::remove_dir_all(&file) } else { fs::remove_file(&file) };
