@@ -149,7 +149,7 @@ fn faults_behind_a_good_checksum_are_named() {
         (
             "network.safetensors",
             Box::new(header("windward drag", "standing drag")),
-            "what is left of archimedes + standing drag of the soaked part, force and moment, not of archimedes + windward drag of the soaked part, force and moment: train them anew",
+            "the weights are a remainder of archimedes + standing drag of the soaked part, force and moment, not of archimedes + windward drag of the soaked part, force and moment: train them again",
         ),
         ("vehicle.toml", Box::new(text(|t| t.replacen("format = 1", "format = 2", 1))), "newer"),
         (
@@ -199,7 +199,7 @@ fn weights_of_another_release_do_not_stand_in_the_way_of_new_ones() {
     let folder = copy.path().join("husky");
     replace(&folder, "network.safetensors", header("windward drag", "standing drag"));
     let refused = bundle::read(&folder).expect_err("refused").to_string();
-    assert!(refused.contains("train them anew"), "{refused}");
+    assert!(refused.contains("train them again"), "{refused}");
     let bundle = bundle::read_without_weights(&folder).expect("the vehicle is as it was");
     assert!(bundle.trained.is_none() && bundle.vehicle.name == "husky");
     replace(&folder, "hull.stl", |_| Vec::new());

@@ -217,7 +217,7 @@ fn an_effect_of_a_region_is_not_called_what_imitates_it_everywhere() {
     let report = report_at_full_size(Family::Gated, 14, 1, "gated-013-linear_damping");
     assert_eq!(report.verdict, gap::Verdict::NoCandidateFits, "{}", report.summary);
     let text = report.gap.unexplained.unwrap_or_default();
-    assert!(text.contains("where depth <=") && text.contains("it is like linear damping"), "{text}");
+    assert!(text.contains("where depth <=") && text.contains("it resembles linear damping"), "{text}");
 }
 
 #[test]

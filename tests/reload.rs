@@ -108,9 +108,10 @@ fn a_change_of_another_folder_leaves_a_server_alone() {
     let mut client = served.tcp("husky", Method::Unary);
     let mut version = || client.evaluate(&state()).expect("answered").bundle_version;
     let before = version();
+    let socket = format!("unix:{}", served.config.grpc.unix_socket.display());
     let rollback = |folder: &std::path::Path| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
-        command.args(["vehicle", "rollback", "husky", "--server", &served.url(), "--vehicles"]).arg(folder);
+        command.args(["vehicle", "rollback", "husky", "--server", &socket, "--vehicles"]).arg(folder);
         let output = command.output().expect("the program runs");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{said}");

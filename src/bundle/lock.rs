@@ -6,16 +6,15 @@
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::{BundleError, Fault, at};
 
-/// Longest wait for other writers; one takes some milliseconds.
-const WRITER_WAIT: Duration = Duration::from_secs(10);
-/// Longest wait of a reader. Then it reads all the same: the checksums find a bundle that is half written.
-const READER_WAIT: Duration = Duration::from_secs(10);
-/// Between two looks.
+/// Pause between two attempts.
 const PAUSE: Duration = Duration::from_millis(5);
+/// Most attempts, about ten seconds: a writer takes some milliseconds. A reader then reads all the same, and the checksums
+/// find a bundle that is half written.
+const ATTEMPTS: u32 = 2000;
 
 /// Held until it is dropped.
 #[derive(Debug)]
@@ -36,7 +35,7 @@ pub fn exclusive(directory: &Path) -> Result<Lock, BundleError> {
             fs::create_dir_all(folder)?;
         }
         let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path)?;
-        if !wait(WRITER_WAIT, || file.try_lock())? {
+        if !wait(|| file.try_lock())? {
             let by = fs::read_to_string(&path).unwrap_or_default();
             return Err(Fault::Locked { by: by.trim().to_owned() });
         }
@@ -51,18 +50,17 @@ pub fn exclusive(directory: &Path) -> Result<Lock, BundleError> {
 /// Waits for a writer of a bundle, and keeps writers out. `None` where there never was one, or where it takes too long.
 pub fn shared(directory: &Path) -> Option<Lock> {
     let file = File::open(path_of(directory)).ok()?;
-    let locked = wait(READER_WAIT, || file.try_lock_shared()).unwrap_or(false);
+    let locked = wait(|| file.try_lock_shared()).unwrap_or(false);
     locked.then_some(Lock { _file: file })
 }
 
-fn wait(longest: Duration, lock: impl Fn() -> Result<(), TryLockError>) -> io::Result<bool> {
-    let start = Instant::now();
-    loop {
+fn wait(lock: impl Fn() -> Result<(), TryLockError>) -> io::Result<bool> {
+    for _ in 0..ATTEMPTS {
         match lock() {
             Ok(()) => return Ok(true),
             Err(TryLockError::Error(error)) => return Err(error),
-            Err(TryLockError::WouldBlock) if start.elapsed() > longest => return Ok(false),
             Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
         }
     }
+    Ok(false)
 }

@@ -180,6 +180,6 @@ fn announce(served: &ServedVehicle, metrics: &Metrics) {
     let vehicle = &model.vehicle().name;
     metrics.set_bundle_version(vehicle, model.version());
     let (version, kernel, origin) = (model.version(), model.isa().name(), served.origin());
-    tracing::info!(vehicle, version, origin, effects, kernel, "bundle loaded");
-    tracing::debug!(vehicle, version, provenance = model.provenance(), "weights");
+    tracing::info!(vehicle, version, origin, effects, "bundle loaded");
+    tracing::debug!(vehicle, version, kernel, provenance = model.provenance(), "weights");
 }

@@ -104,7 +104,9 @@ fn quantile(name: &str) -> Option<f64> {
         return Some(1.0);
     }
     let percent: f64 = name.strip_prefix('p')?.parse().ok()?;
-    (percent > 0.0 && percent < 100.0).then_some(percent / 100.0)
+    // the binary fraction nearest to the decimal one: 99.9 / 100 lies above 0.999, which is the next response time's
+    let quantile = (percent * 1e6).round() / 1e8;
+    (quantile > 0.0 && quantile < 1.0).then_some(quantile)
 }
 
 impl Slo {
