@@ -526,7 +526,7 @@ fn bad_input_names_the_file_and_writes_nothing() {
     let out = root.join("none");
     for (arguments, expected) in [
         (vec!["--trials", "nowhere"], "nowhere"),
-        (vec!["--generated", "1", "--vehicles", "nowhere"], "warthog"),
+        (vec!["--generated", "1", "--vehicles", "nowhere"], "nowhere: there is no such folder"),
         (vec!["--generated", "1", "--config", "nowhere.toml"], "nowhere.toml"),
     ] {
         let output = validate(&arguments, &out);
