@@ -58,10 +58,10 @@ pub fn write_whole(place: &Path, bytes: &[u8]) -> io::Result<()> {
     file.finish()
 }
 
-/// A moment as year, month, day, hour and minute UTC; "unknown" before 1970.
-pub fn utc_date(time: std::time::SystemTime) -> String {
-    let Ok(since) = time.duration_since(std::time::UNIX_EPOCH) else { return "unknown".to_owned() };
-    let (days, seconds) = (since.as_secs() / 86_400, since.as_secs() % 86_400);
+/// Seconds since 1970 as year, month, day, hour and minute UTC; "unknown" before.
+pub fn utc_date(unix_s: i64) -> String {
+    let Ok(since) = u64::try_from(unix_s) else { return "unknown".to_owned() };
+    let (days, seconds) = (since / 86_400, since % 86_400);
     let (year, month, day) = civil(days);
     format!("{year}-{month:02}-{day:02} {:02}:{:02}", seconds / 3600, seconds / 60 % 60)
 }

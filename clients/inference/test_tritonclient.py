@@ -41,7 +41,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
     (folder / "wade.toml").write_text(
-        f'vehicles = "{ROOT / "vehicles"}"\n[grpc]\nlisten = "{address}"\nunix_socket = ""\n'
+        f'vehicles = "{ROOT / "vehicles"}"\n[grpc]\nlisten = "{address}"\nunix_socket = ""\nadmin_over_tcp = true\n'
         '[shm]\nenabled = false\n[http]\nlisten = ""\n'
     )
     with (folder / "log").open("wb") as log:

@@ -5,8 +5,8 @@
 //! going back without a number passes over it.
 
 use std::fs;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use super::place::{self, copy_folder, move_folder, sync_folder, write_synced};
 use super::source::{Source, read_bounded};
@@ -33,8 +33,8 @@ pub struct Kept {
     pub effects: Vec<&'static str>,
     /// Where it is.
     pub source: Source,
-    /// When it was written; unknown of what the program carries.
-    pub written: Option<SystemTime>,
+    /// When it was written, in seconds since 1970; unknown of what the program carries.
+    pub written_unix_s: Option<i64>,
     /// True where it was taken back.
     pub taken_back: bool,
 }
@@ -45,11 +45,9 @@ impl Kept {
         let Bundle { version, effects, trained, .. } = source.bundle()?;
         let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.name.name()).collect();
         let sums = checksums::parse(&source.file(SUMS_FILE)?).map_err(at(&source.path().join(SUMS_FILE)))?;
-        let written = match &source {
+        let written_unix_s = match &source {
             Source::Carried(_) => None,
-            Source::Folder(folder) => {
-                fs::metadata(folder.join(SUMS_FILE)).and_then(|file| file.modified()).ok()
-            }
+            Source::Folder(folder) => fs::metadata(folder.join(SUMS_FILE)).ok().map(|file| file.mtime()),
         };
         Ok(Self {
             version,
@@ -57,7 +55,7 @@ impl Kept {
             network_sha256: sums.get(NETWORK_FILE).cloned(),
             effects: effects.map(names).unwrap_or_default(),
             source,
-            written,
+            written_unix_s,
             taken_back: false,
         })
     }

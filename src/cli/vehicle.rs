@@ -260,7 +260,7 @@ fn weights_text(version: &Kept) -> String {
 
 /// What stands in the column of a version's date.
 fn date_of(version: &Kept) -> String {
-    version.written.map_or_else(|| "released".to_owned(), wade::files::utc_date)
+    version.written_unix_s.map_or_else(|| "released".to_owned(), wade::files::utc_date)
 }
 
 fn versions(name: &str, current: &Kept, others: &[Kept], as_json: bool) -> Result<()> {

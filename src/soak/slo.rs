@@ -251,7 +251,9 @@ mod tests {
             ("p50=499us", false),
             ("p99.9=999.5us", true),
             ("p12.5=124us", false),
-            ("max=1ms", true),
+            // a histogram of three digits: 1 ms reads as 1.0004
+            ("max=1001us", true),
+            ("max=999us", false),
             ("rate=990", true),
             ("rate=991", false),
             ("errors=10", true),

@@ -168,15 +168,12 @@ void a_server_of_another_layout(Server &server) {
 }
 
 void a_server_that_comes_back_with_other_vehicles(const std::string &address, Server &server) {
-  const auto others = server.folder() / "others";
-  std::filesystem::create_directory(others);
-  std::filesystem::create_directory_symlink(std::filesystem::path(environment("WADE_VEHICLES")) / "warthog", others / "warthog");
-  server.start();
-  wade::Client client = connected(address);
+  server.start(environment("WADE_ROVERS"), "rover");
+  wade::Client client = connected(address, "rover");
   wade::Forces before, forces;
   until_answered(client, wading(), before);
   server.kill();
-  server.start(others, "warthog");
+  server.start();
   const auto end = clock::now() + patience;
   Status status;
   while ((status = timed(client, wading(), 50ms, forces)) != Status::unknown_vehicle) {
@@ -187,10 +184,9 @@ void a_server_that_comes_back_with_other_vehicles(const std::string &address, Se
   CHECK(client.reason().find("warthog") != std::string::npos);
   wade::Client warthog = connected(address, "warthog");
   until_answered(warthog, wading(), forces);
-  server.start();
+  server.start(environment("WADE_ROVERS"), "rover");
   until_answered(client, wading(), forces);
   CHECK_EQUAL(forces.force_n[2], before.force_n[2]);
-  std::filesystem::remove_all(others);
 }
 
 void a_budget_of_zero_asks_and_gives_the_answer_to_an_earlier_call(const std::string &address) {
