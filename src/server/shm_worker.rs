@@ -258,18 +258,27 @@ impl Drop for Watching {
     }
 }
 
-/// Asks the server as a client does, and ends the process where that finds what a client would suffer from.
+/// Asks the server as a client does, and ends the process where that finds what a client would suffer from. Returns once the
+/// server's own client is connected: its place is taken before another client can be answered.
 fn start_watching(watched: Watched) -> Watching {
     let (stop, stopped) = channel::<()>();
+    let (connected, is_connected) = channel::<()>();
     let thread = start("wade-shm-watch", move || {
         let mut asking = Asking { probe: None, unanswered: 0 };
-        while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(ASK) {
+        asking.connect(&watched);
+        drop(connected);
+        loop {
             if !watched.owner.is_in_place() || !watched.files.are_in_place() {
                 unavailable(&"its files were removed or replaced by somebody else; they are made again");
             }
             asking.ask(&watched);
+            if stopped.recv_timeout(ASK) != Err(RecvTimeoutError::Timeout) {
+                break;
+            }
         }
     });
+    // ends with the sender
+    let _ = is_connected.recv();
     Watching { stop: Some(stop), thread: Some(thread) }
 }
 
@@ -279,21 +288,30 @@ struct Asking {
 }
 
 impl Asking {
-    fn ask(&mut self, watched: &Watched) {
+    /// Connects to the first vehicle, or stays with one that is still served. False where there is nothing to ask, which is
+    /// no fault: without a vehicle, and where other clients have every place.
+    fn connect(&mut self, watched: &Watched) -> bool {
         let Watched { namespace, engine, own, .. } = watched;
         let vehicles = engine.vehicles();
-        if self.probe.as_ref().is_none_or(|(vehicle, _)| !vehicles.contains_key(vehicle)) {
-            let Some(vehicle) = vehicles.keys().next() else {
-                // nothing is served that could be asked for
-                return say(&Report::Answered);
-            };
-            self.probe = match Probe::new(namespace, vehicle, own) {
-                Ok(probe) => Some((vehicle.clone(), probe)),
-                Err(error) => {
-                    tracing::debug!(%error, "the server's own client");
-                    None
-                }
-            };
+        if self.probe.as_ref().is_some_and(|(vehicle, _)| vehicles.contains_key(vehicle)) {
+            return true;
+        }
+        self.probe = None;
+        let Some(vehicle) = vehicles.keys().next() else { return false };
+        match Probe::new(namespace, vehicle, own) {
+            Ok(Some(probe)) => self.probe = Some((vehicle.clone(), probe)),
+            Ok(None) => {
+                tracing::debug!(vehicle, "other clients have every place: the server is not asked");
+                return false;
+            }
+            Err(error) => tracing::debug!(%error, "the server's own client"),
+        }
+        true
+    }
+
+    fn ask(&mut self, watched: &Watched) {
+        if !self.connect(watched) {
+            return say(&Report::Answered);
         }
         let start = Instant::now();
         if self.probe.as_mut().is_some_and(|(_, probe)| probe.is_answered(PATIENCE)) {

@@ -136,10 +136,9 @@ where
     let service = name.try_into().map_err(|error| ShmError::new(name)(&error))?;
     node.service_builder(&service)
         .request_response::<Q, A>()
-        // one more for the server's own client
-        .max_clients(max_clients + 1)
+        .max_clients(max_clients)
         .max_servers(1)
-        .max_nodes(max_clients + 5)
+        .max_nodes(max_clients + 4)
         .max_active_requests_per_client(2)
         .max_loaned_requests(1)
         .max_response_buffer_size(1)
@@ -345,8 +344,10 @@ impl ShmServer {
 
     fn open_door(&mut self, vehicle: String) -> Result<(), ShmError> {
         let clients = self.config.max_clients;
+        // one more where the server's own client asks, which is at the first vehicle
+        let own = usize::from(self.doors.is_empty());
         let names = [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)];
-        let single = own_exchange::<Query, Answer>(&self.node, &names[0], clients)?;
+        let single = own_exchange::<Query, Answer>(&self.node, &names[0], clients + own)?;
         let batch = own_exchange::<BatchQuery, BatchAnswer>(&self.node, &names[1], clients)?;
         for name in &names {
             self.files.add(name, MessagingPattern::RequestResponse);

@@ -8,6 +8,7 @@ use iceoryx2::node::Node;
 use iceoryx2::port::client::Client;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::ipc;
+use iceoryx2::service::port_factory::client::ClientCreateError;
 
 use super::shm::{self, ShmError};
 use super::shm_layout::{Answer, Names, Query};
@@ -28,18 +29,22 @@ pub(crate) struct Probe {
 }
 
 impl Probe {
-    /// Connects to a vehicle of the namespace.
-    pub(crate) fn new(namespace: &str, vehicle: &str, own: &Own) -> Result<Self, ShmError> {
+    /// Connects to a vehicle of the namespace; none where other clients have every place.
+    pub(crate) fn new(namespace: &str, vehicle: &str, own: &Own) -> Result<Option<Self>, ShmError> {
         let names = Names::new(namespace);
         let node = shm::node::<ipc::Service>()?;
         let name = names.evaluate(vehicle);
         let failed = |reason: &dyn std::fmt::Display| ShmError::new("the server's own client")(reason);
         let service = shm::open::<_, Query, Answer>(&node, &name).map_err(|error| failed(&error))?;
-        let client = service.client_builder().create().map_err(|error| failed(&error))?;
+        let client = match service.client_builder().create() {
+            Ok(client) => client,
+            Err(ClientCreateError::ExceedsMaxSupportedClients) => return Ok(None),
+            Err(error) => return Err(failed(&error)),
+        };
         let wake = shm::events(&node, &names.wake())?.notifier_builder().create();
         let wake = wake.map_err(|error| failed(&error))?;
         *own.lock().unwrap_or_else(PoisonError::into_inner) = Some(client.id());
-        Ok(Self { client, wake, sequence: 0, _node: node })
+        Ok(Some(Self { client, wake, sequence: 0, _node: node }))
     }
 
     /// Whether a query is answered in this time.

@@ -136,7 +136,7 @@ void a_server_that_stands_still_in_the_middle_of_a_loop(const std::string &addre
 std::filesystem::path of_another_layout(const Server &server) {
   std::ifstream file(environment("WADE_BIN"), std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  const std::string ours = "wade::v3::", theirs = "wade::v9::";
+  const std::string ours = "wade::v4::", theirs = "wade::v9::";
   std::size_t names = 0;
   for (auto at = bytes.find(ours); at != std::string::npos; at = bytes.find(ours, at)) {
     bytes.replace(at, theirs.size(), theirs);
@@ -156,7 +156,7 @@ void a_server_of_another_layout(Server &server) {
   CHECK_EQUAL(client.open(server.shm().c_str(), "husky"), Status::ok);
   const auto end = clock::now() + patience;
   while (client.wait(100ms) != Status::layout_mismatch) CHECK(clock::now() < end);
-  CHECK(client.reason().find("layout v3") != std::string::npos);
+  CHECK(client.reason().find("layout v4") != std::string::npos);
   wade::Forces forces;
   CHECK_EQUAL(timed(client, wading(), 100s, forces), Status::layout_mismatch);  // at once: more time would not help
   CHECK_EQUAL(forces.age_ns, WADE_NEVER);

@@ -21,11 +21,12 @@ VEHICLES = Path(os.environ.get("WADE_TEST_VEHICLES", ROOT / "vehicles")).resolve
 
 
 def binary() -> Path:
-    """`$WADE_BIN`, or what cargo built last of release and debug, in this order."""
+    """`$WADE_BIN`, or what cargo built last of release and debug."""
+    if "WADE_BIN" in os.environ:
+        return Path(os.environ["WADE_BIN"]).resolve(strict=True)
     built = [ROOT / "target" / profile / "wade" for profile in ("release", "debug")]
-    for path in [Path(os.environ["WADE_BIN"])] if "WADE_BIN" in os.environ else built:
-        if path.is_file():
-            return path.resolve()
+    if found := [path for path in built if path.is_file()]:
+        return max(found, key=lambda path: path.stat().st_mtime).resolve()
     raise FileNotFoundError(f"no wade at {', '.join(map(str, built))}: run cargo build, or name one by WADE_BIN")
 
 

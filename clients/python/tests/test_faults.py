@@ -264,7 +264,7 @@ def test_a_batch_never_mixes_two_bundles(kind: str, mortal_server: Server, loop:
     done = threading.Event()
 
     def exchange(pause_s: float) -> None:
-        with grpc.insecure_channel(mortal_server.address) as channel:
+        with grpc.insecure_channel(f"unix:{mortal_server.socket}") as channel:
             admin, next_link = admin_pb2_grpc.AdminStub(channel), vehicles.parent / "next"
             for target in itertools.cycle((higher, lower)):
                 if done.wait(pause_s):
@@ -282,6 +282,7 @@ def test_a_batch_never_mixes_two_bundles(kind: str, mortal_server: Server, loop:
         try:
             # until both were seen, and a while longer
             for _ in itertools.takewhile(lambda turn: len(seen) < 2 or turn < 20, itertools.count()):
+                assert not exchanging.done(), exchanging.exception()
                 forces = client.evaluate_batch("husky", states)
                 assert len(np.unique(forces.moment_nm, axis=0)) == 1
                 seen[forces.bundle_version] = tuple(forces.moment_nm[0])
