@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -54,6 +55,51 @@ impl OwnIceoryx {
         servers.into_iter().for_each(Process::kill);
     }
 
+    /// What one leaves that is killed while it makes or clears away a node is not found by iceoryx2 any more.
+    fn clears_what_no_list_has(&self, ends: &str) {
+        let serve = || {
+            let server = self.start("lake");
+            // one that asks the dead one still has no answer
+            let client = ShmClient::new("husky", Wait::Block, Duration::from_millis(200));
+            until_answered(&mut client.in_namespace("lake"));
+            server.terminate();
+            self.nodes_and_memory()
+        };
+        let start = Instant::now();
+        let (mut before, mut after) = (serve(), serve());
+        while before != after {
+            assert!(start.elapsed() < PATIENCE, "{:?}", before.symmetric_difference(&after));
+            (before, after) = (after, serve());
+        }
+        self.leave_remains(["lake"]);
+        let lost: Vec<_> = self.nodes_and_memory().into_iter().filter(|file| file.ends_with(ends)).collect();
+        assert!(!lost.is_empty(), "no file ends with {ends}");
+        lost.iter().for_each(|file| std::fs::remove_file(file).expect("removed"));
+        let start = Instant::now();
+        loop {
+            let left = serve();
+            if left == before {
+                return println!("{ends} lost: answered, and cleared away, after {:?}", start.elapsed());
+            }
+            assert!(start.elapsed() < PATIENCE, "{ends} lost: {:?}", left.symmetric_difference(&before));
+        }
+    }
+
+    /// Paths of all files and folders of nodes and services.
+    fn nodes_and_memory(&self) -> BTreeSet<String> {
+        let mut found: BTreeSet<String> = self.files().map(|file| file.display().to_string()).collect();
+        let mut folders = vec![self.folder.path().join("root")];
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+                if entry.path().is_dir() {
+                    folders.push(entry.path());
+                }
+                found.insert(entry.path().display().to_string());
+            }
+        }
+        found
+    }
+
     fn start(&self, namespace: &str) -> Process {
         let settings = self.folder.path().join(namespace);
         std::fs::create_dir_all(&settings).expect("a folder");
@@ -103,6 +149,9 @@ fn node() -> Node<ipc::Service> {
 #[test]
 fn the_reason_is_right_among_the_remains_of_other_servers() {
     let own = OwnIceoryx::new();
+    for ends in [".node_monitor", "node.details"] {
+        own.clears_what_no_list_has(ends);
+    }
     // names that begin as ours does, and the other way round
     let others = ["ford", "ford-2", "for", "bed"];
     own.leave_remains(others);
@@ -149,6 +198,7 @@ fn the_reason_is_right_among_the_remains_of_other_servers() {
     for file in damaged {
         std::fs::write(file, "").expect("emptied");
     }
-    let _server = own.start("fort");
+    let server = own.start("fort");
     until_answered(&mut client("husky", "fort"));
+    server.kill();
 }

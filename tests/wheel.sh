@@ -80,19 +80,19 @@ mkdir "$work/home" "$work/elsewhere"
 cd "$work/elsewhere"
 port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 # nothing of ours: no cargo, no index, no settings
-clean() { env -i PATH="$work/fresh/bin:/usr/bin:/bin" HOME="$work/home" PIP_NO_INDEX=1 "$@"; }
-clean sh -c 'command -v cargo' && fail "cargo is in PATH"
+bare=(env -i PATH="$work/fresh/bin:/usr/bin:/bin" HOME="$work/home" PIP_NO_INDEX=1)
+"${bare[@]}" sh -c 'command -v cargo' && fail "cargo is in PATH"
 start=$(date +%s)
-clean pip install --quiet --disable-pip-version-check --no-index --find-links "$work/dist" wade
-clean wade serve --listen "127.0.0.1:$port" --unix-socket "$work/wade.sock" --http "" --namespace "wheel-$$" 2> "$work/log" &
+"${bare[@]}" pip install --quiet --disable-pip-version-check --no-index --find-links "$work/dist" wade
+"${bare[@]}" wade serve --listen "127.0.0.1:$port" --unix-socket "$work/wade.sock" --http "" --namespace "wheel-$$" 2> "$work/log" &
 server=$!
 query=(wade query --vehicle husky --speed 0.8 --depth 0.18 --json)
-until clean "${query[@]}" --addr "http://127.0.0.1:$port" > "$work/served.json" 2> "$work/refusal"; do
+until "${bare[@]}" "${query[@]}" --addr "http://127.0.0.1:$port" > "$work/served.json" 2> "$work/refusal"; do
     kill -0 "$server" 2>/dev/null || { cat "$work/log"; fail "the server ended"; }
     [ $(($(date +%s) - start)) -lt "$max_seconds" ] || { cat "$work/log" "$work/refusal"; fail "no answer within $max_seconds s"; }
     sleep 0.1
 done
-clean python - "$port" "$work/served.json" <<'PY'
+"${bare[@]}" python - "$port" "$work/served.json" <<'PY'
 import json, sys
 import numpy as np
 import wade

@@ -30,10 +30,7 @@ const STEADY: Duration = Duration::from_secs(3);
 /// How often deadlines are looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Longest time in which the process opens its services; iceoryx2 waits half a second for each that is unfinished.
-const OPENING: Duration = Duration::from_secs(20);
-
-/// A process that has not answered its own question for this long is ended; it asks once a second.
+/// A process that has not opened its services, or answered its own question, for this long is ended; it asks once a second.
 const SILENCE: Duration = Duration::from_secs(6);
 
 /// Longest wait of a reload for the process.
@@ -187,8 +184,7 @@ impl Keeper {
                     running.killed_at = Some(Instant::now() + drain + GRACE);
                 }
             }
-            let bound = if running.opened { SILENCE } else { OPENING };
-            if !silent && running.killed_at.is_none() && running.heard.elapsed() > bound {
+            if !silent && running.killed_at.is_none() && running.heard.elapsed() > SILENCE {
                 (silent, running.killed_at) = (true, Some(Instant::now()));
             }
             if running.killed_at.is_some_and(|at| Instant::now() >= at) {
@@ -200,11 +196,14 @@ impl Keeper {
         if stops {
             return End::Stopped;
         }
-        if let Some(reason) = running.unavailable {
+        if let Some(reason) = running.unavailable.take_if(|_| !running.opened) {
             return End::Unavailable(reason);
         }
+        // it left everything as it was
         self.former.push(number);
-        End::Crashed(if silent {
+        End::Crashed(if let Some(reason) = running.unavailable {
+            reason
+        } else if silent {
             "its process did not answer its own question and was ended; it is started again".to_owned()
         } else {
             format!("its process ended{}; it is started again", described(status.ok()))

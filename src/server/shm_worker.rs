@@ -88,7 +88,7 @@ impl Worker {
         shm_room::check(vehicles.len()).unwrap_or_else(|error| unavailable(&error));
         let former: Vec<u32> = former.into_iter().chain(owner.former().iter().copied()).collect();
         for process in &former {
-            shm_remains::remove_segments_of(*process);
+            shm_remains::remove_untold_of(*process);
         }
         owner.forget_former(server);
         let owner = Arc::new(owner);
@@ -103,8 +103,15 @@ impl Worker {
             std::thread::Builder::new().name("wade-shm".into()).spawn(move || {
                 // a panic must not leave a process that serves nothing
                 let _end = EndOfServing(Arc::clone(&stop));
-                let opening = Opening { metrics, remains, own: Arc::clone(&own) };
-                let opened = ShmServer::new(settings.clone(), Arc::clone(&engine), opening);
+                let open = |remains| {
+                    let opening = Opening { metrics: Arc::clone(&metrics), remains, own: Arc::clone(&own) };
+                    ShmServer::new(settings.clone(), Arc::clone(&engine), opening)
+                };
+                let opened = open(remains.clone()).or_else(|error| {
+                    // a dead server may keep its place in a service whatever iceoryx2 tries
+                    tracing::warn!(%error, "the services are made anew");
+                    open(Remains { crashed: true, ..remains })
+                });
                 let server = opened.unwrap_or_else(|error| unavailable(&error));
                 say(&Report::Opened);
                 let (namespace, files) = (settings.namespace, server.files());

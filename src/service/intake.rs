@@ -85,13 +85,18 @@ pub async fn accept_all(
 ) {
     let mut reserve = Reserve::default();
     let mut pause = FIRST_PAUSE;
+    let has_reserve = kind == Resource::http_connections;
+    if has_reserve {
+        reserve.fill();
+    }
     loop {
-        if kind == Resource::http_connections {
-            reserve.fill();
-        }
         match listener.accept().await {
             Ok((socket, peer)) => {
                 pause = FIRST_PAUSE;
+                // not before: it would take what was given up for this one
+                if has_reserve {
+                    reserve.fill();
+                }
                 match accounts.open(peer, kind).await {
                     Ok((connection, place)) => serve(socket, connection, place),
                     Err(refused) => {

@@ -198,32 +198,6 @@ pub(crate) fn events<S: Service>(node: &Node<S>, name: &str) -> Result<event::Po
     builder.open_or_create().map_err(|error| ShmError::new(name)(&error))
 }
 
-/// As [`events`], for the owner of the namespace: a service that cannot be opened is replaced.
-fn own_events(node: &Node<ipc::Service>, name: &str) -> Result<event::PortFactory<ipc::Service>, ShmError> {
-    events(node, name).or_else(|error| {
-        replacing(name, &error);
-        shm_remains::remove(name, MessagingPattern::Event);
-        events(node, name)
-    })
-}
-
-/// As [`exchange`], for the owner of the namespace: a service that cannot be opened is replaced.
-fn own_exchange<Q, A>(
-    node: &Node<ipc::Service>,
-    name: &str,
-    max_clients: usize,
-) -> Result<Exchange<ipc::Service, Q, A>, ShmError>
-where
-    Q: ZeroCopySend + std::fmt::Debug + 'static,
-    A: ZeroCopySend + std::fmt::Debug + 'static,
-{
-    exchange(node, name, max_clients).or_else(|error| {
-        replacing(name, &error);
-        shm_remains::remove(name, MessagingPattern::RequestResponse);
-        exchange(node, name, max_clients)
-    })
-}
-
 fn replacing(name: &str, error: &ShmError) {
     tracing::info!(name, %error, "a service that cannot be opened is replaced");
 }
@@ -304,8 +278,8 @@ impl ShmServer {
             shm_remains::remove_node_counter();
             node()
         })?;
-        let wake = own_events(&node, &names.wake())?.listener_builder().create();
-        let done = own_events(&node, &names.done())?.notifier_builder().create();
+        let wake = events(&node, &names.wake())?.listener_builder().create();
+        let done = events(&node, &names.done())?.notifier_builder().create();
         let desk = Desk {
             engine,
             metrics,
@@ -347,8 +321,8 @@ impl ShmServer {
         // one more where the server's own client asks, which is at the first vehicle
         let own = usize::from(self.doors.is_empty());
         let names = [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)];
-        let single = own_exchange::<Query, Answer>(&self.node, &names[0], clients + own)?;
-        let batch = own_exchange::<BatchQuery, BatchAnswer>(&self.node, &names[1], clients)?;
+        let single = exchange::<Query, Answer>(&self.node, &names[0], clients + own)?;
+        let batch = exchange::<BatchQuery, BatchAnswer>(&self.node, &names[1], clients)?;
         for name in &names {
             self.files.add(name, MessagingPattern::RequestResponse);
         }
@@ -390,10 +364,17 @@ impl ShmServer {
         while self.answer_round() && Instant::now() < end {}
     }
 
-    /// One vehicle's trouble is not the others'.
+    /// One vehicle's trouble is not the others'. Services of a new vehicle that cannot be opened are replaced.
     fn open_new_doors(&mut self) {
         for vehicle in self.without_door() {
-            if let Err(error) = self.open_door(vehicle) {
+            let opened = self.open_door(vehicle.clone()).or_else(|error| {
+                for name in [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)] {
+                    replacing(&name, &error);
+                    shm_remains::remove(&name, MessagingPattern::RequestResponse);
+                }
+                self.open_door(vehicle)
+            });
+            if let Err(error) = opened {
                 tracing::error!(%error, "a new vehicle is not served over shared memory");
             }
         }

@@ -5,6 +5,7 @@
 //! machine is cleared beside the serving: iceoryx2 waits half a second for each damaged file, minutes where a machine lost
 //! power again and again, so nobody's start waits for it.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeState};
+use iceoryx2::node::{Node, NodeState, NodeView};
 use iceoryx2::prelude::{CallbackProgression, MessagingPattern, ServiceName, ipc};
 use iceoryx2::service::Service;
 use iceoryx2::service::service_hash::ServiceHash;
@@ -33,7 +34,7 @@ pub(super) fn config() -> Config {
 const FINISHING: Duration = Duration::from_millis(100);
 
 /// What is known of the processes before this one.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Remains {
     /// The last one crashed: nothing of the namespace is trusted.
     pub crashed: bool,
@@ -56,15 +57,22 @@ fn services<'n>(
     services
 }
 
-/// Puts the services of a namespace right, which this process owns: those that a dead process left unfinished are removed,
-/// and after a crash all of them, with everything else of the processes that crashed.
+/// Puts the services of a namespace right, which this process owns: those that a dead process left unfinished are removed, or
+/// that a broken node was in, and after a crash all of them, with everything else of the processes that crashed.
 pub(super) fn prepare<'n>(names: &Names, vehicles: impl Iterator<Item = &'n String>, remains: &Remains) {
+    let broken = broken_nodes();
     let mut removed = Vec::new();
     for (name, pattern) in services(names, vehicles) {
         let Some(file) = service_file(&name, pattern) else { continue };
-        if is_unfinished(&file) || (remains.crashed && file.exists()) {
+        let is_left = remains.crashed || broken.iter().any(|node| node.services.contains(&file));
+        if is_unfinished(&file) || (is_left && file.exists()) {
             remove_service(&file);
             removed.push(name);
+        }
+    }
+    for node in broken {
+        if node.services.iter().all(|service| !service.exists()) {
+            remove_files_of(process_of(node.id));
         }
     }
     if !removed.is_empty() {
@@ -145,11 +153,28 @@ fn remove_service(file: &Path) {
     }
 }
 
-/// Removes the segments that a dead process answered in. iceoryx2 finds them by the port that they belong to, and so not those
-/// of a process that was killed before it had told anybody of its port.
-pub(crate) fn remove_segments_of(process: u32) {
-    let suffix = Config::global_config().global.service.data_segment_suffix.to_string();
-    remove_where(process, |name| name.ends_with(&suffix));
+/// Removes what iceoryx2 finds by a port or a service, and so not where a process was killed before it had told anybody of it:
+/// segments that a dead process answered in, its connections with itself, its listeners, and the memory of services that no
+/// file names.
+pub(crate) fn remove_untold_of(process: u32) {
+    let global = &Config::global_config().global;
+    let services = PathBuf::from(global.root_path().to_string()).join(global.service.directory.to_string());
+    let named: Vec<u128> =
+        files_in(&services).filter_map(|file| id_in(&fs::read_to_string(file).ok()?)).collect();
+    let of = |suffix: &str, name: &str| name.strip_suffix(suffix).map(numbers_in);
+    let [segment, connection, listener, service] = [
+        &global.service.data_segment_suffix,
+        &global.service.connection_suffix,
+        &global.service.event_connection_suffix,
+        &global.service.dynamic_config_storage_suffix,
+    ]
+    .map(ToString::to_string);
+    remove_where(process, |name| {
+        name.ends_with(&segment)
+            || name.trim_end_matches("_mgmt").ends_with(&listener)
+            || of(&connection, name).is_some_and(|ends| ends.iter().all(|end| process_of(*end) == process))
+            || of(&service, name).is_some_and(|ids| ids.iter().all(|id| !named.contains(id)))
+    });
 }
 
 /// Removes whatever bears the number of a process that is dead: segments, connections, nodes.
@@ -157,25 +182,39 @@ fn remove_files_of(process: u32) {
     remove_where(process, |_| true);
 }
 
+/// The numbers in a name that are iceoryx2's: the upper half is that of a process and a counter.
+fn numbers_in(name: &str) -> Vec<u128> {
+    let numbers = name.split(|c: char| !c.is_ascii_digit()).filter_map(|number| number.parse().ok());
+    numbers.filter(|number| *number > u128::from(u64::MAX)).collect()
+}
+
+fn process_of(number: u128) -> u32 {
+    (number >> 64) as u32
+}
+
+/// Whether a process is dead, which one is too that nobody has waited for.
+fn is_gone(process: u32) -> bool {
+    let Ok(stat) = fs::read_to_string(format!("/proc/{process}/stat")) else { return true };
+    // the state follows the name, which may hold anything
+    stat.rsplit(')').next().is_some_and(|rest| rest.trim_start().starts_with(['Z', 'X']))
+}
+
 fn remove_where(process: u32, chosen: impl Fn(&str) -> bool) {
-    if Path::new("/proc").join(process.to_string()).exists() {
+    if !is_gone(process) {
         // the number is another's by now
         return;
     }
     let global = &Config::global_config().global;
     let root = PathBuf::from(global.root_path().to_string());
-    let nodes = root.join(global.node.directory.to_string());
+    let nodes = nodes_folder();
     let prefix = global.prefix.to_string();
-    let ours = |name: &str| {
-        let numbers =
-            name.split(|c: char| !c.is_ascii_digit()).filter_map(|number| number.parse::<u128>().ok());
-        // the upper half of a number is that of its process and a counter
-        numbers.filter(|number| *number > u128::from(u64::MAX)).any(|number| (number >> 64) as u32 == process)
-    };
     for folder in [Path::new(SHARED_MEMORY), &root, &nodes] {
         for file in files_in(folder) {
-            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            if !ours(&name) || !chosen(&name) || !(name.starts_with(&prefix) || folder == nodes) {
+            let name = name_of(&file);
+            if numbers_in(&name).iter().all(|number| process_of(*number) != process)
+                || !chosen(&name)
+                || !(name.starts_with(&prefix) || folder == nodes)
+            {
                 continue;
             }
             let _ = if file.is_dir() { fs::remove_dir_all(&file) } else { fs::remove_file(&file) };
@@ -214,8 +253,95 @@ impl ServiceFiles {
     }
 }
 
+/// A node of a dead process that has no monitor or no details, as one leaves that was killed while it made or cleared a node.
+/// iceoryx2 does not find it, or gives up on it, and takes a second for each service that it was in.
+struct BrokenNode {
+    id: u128,
+    /// Files of the services that it was in.
+    services: Vec<PathBuf>,
+}
+
+fn broken_nodes() -> Vec<BrokenNode> {
+    let mut nodes = incomplete_nodes();
+    if !nodes.is_empty() {
+        // the number of a process says nothing of one in another container, which may be at work on its node
+        std::thread::sleep(FINISHING);
+        let still: Vec<u128> = incomplete_nodes().iter().map(|node| node.id).collect();
+        nodes.retain(|node| still.contains(&node.id));
+    }
+    nodes
+}
+
+fn incomplete_nodes() -> Vec<BrokenNode> {
+    let global = &Config::global_config().global;
+    let (prefix, nodes) = (global.prefix.to_string(), nodes_folder());
+    dead_nodes(|id| {
+        let monitor = nodes.join(format!("{prefix}{id}{}", global.node.monitor_suffix));
+        let details = nodes.join(format!("{id}/{prefix}node{}", global.node.static_config_suffix));
+        monitor.exists() && details.exists()
+    })
+}
+
+/// Nodes whose process is dead, as far as its number tells, but for those to spare.
+fn dead_nodes(is_spared: impl Fn(u128) -> bool) -> Vec<BrokenNode> {
+    let global = &Config::global_config().global;
+    let (nodes, tag) = (nodes_folder(), global.node.service_tag_suffix.to_string());
+    let services = PathBuf::from(global.root_path().to_string()).join(global.service.directory.to_string());
+    let ids: BTreeSet<u128> = files_in(&nodes).flat_map(|file| numbers_in(&name_of(&file))).collect();
+    let dead = ids.into_iter().filter(|id| is_gone(process_of(*id)) && !is_spared(*id));
+    let node = |id: u128| {
+        let names = files_in(&nodes.join(id.to_string()))
+            .filter_map(|file| Some(name_of(&file).strip_suffix(&tag)?.to_owned()));
+        let files =
+            names.map(|name| services.join(name + &global.service.static_config_storage_suffix.to_string()));
+        BrokenNode { id, services: files.collect() }
+    };
+    dead.map(node).collect()
+}
+
+fn nodes_folder() -> PathBuf {
+    let global = &Config::global_config().global;
+    PathBuf::from(global.root_path().to_string()).join(global.node.directory.to_string())
+}
+
+fn name_of(file: &Path) -> String {
+    file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Removes the dead nodes that iceoryx2 left and that were in no service that is left. The others' services are put right by
+/// who owns them.
+fn sweep() {
+    let dead = || {
+        let living = living_nodes();
+        let mut nodes = dead_nodes(|id| living.as_ref().is_none_or(|living| living.contains(&id)));
+        nodes.retain(|node| node.services.iter().all(|service| !service.exists()));
+        nodes.into_iter().map(|node| node.id)
+    };
+    let seen: Vec<u128> = dead().collect();
+    if !seen.is_empty() {
+        // one in another container may be at work on its node
+        std::thread::sleep(FINISHING);
+        dead().filter(|id| seen.contains(id)).for_each(|id| remove_files_of(process_of(id)));
+    }
+}
+
+/// Nodes that hold the lock of their monitor, in whatever container; none where they cannot be listed.
+fn living_nodes() -> Option<BTreeSet<u128>> {
+    let mut living = BTreeSet::new();
+    Node::<ipc::Service>::list(&config(), |node| {
+        if let NodeState::Alive(node) = node {
+            living.insert(node.id().value());
+        }
+        CallbackProgression::Continue
+    })
+    .ok()?;
+    Some(living)
+}
+
 /// Clears away what is left on this machine, one dead process after the other, until `stop` turns true.
 pub(crate) fn clear(stop: &AtomicBool) {
+    // iceoryx2 may take seconds for each of the others, and may give up on some
+    sweep();
     let (mut cleared, mut left) = (0_u32, 0_u32);
     let listed = Node::<ipc::Service>::list(&config(), |node| {
         if stop.load(Ordering::Relaxed) {
@@ -232,6 +358,9 @@ pub(crate) fn clear(stop: &AtomicBool) {
         }
         CallbackProgression::Continue
     });
+    if !stop.load(Ordering::Relaxed) {
+        sweep();
+    }
     if let Err(error) = listed {
         tracing::warn!(?error, "what killed processes left in shared memory cannot be listed");
     }

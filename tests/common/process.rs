@@ -35,6 +35,16 @@ impl Process {
     }
 }
 
+impl Process {
+    /// Ends it as an administrator does.
+    #[allow(dead_code, reason = "not every test that has a server ends one in order")]
+    pub fn terminate(mut self) {
+        let pid = nix::unistd::Pid::from_raw(self.0.id().cast_signed());
+        nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM).expect("sent");
+        assert!(self.0.wait().expect("reaped").success());
+    }
+}
+
 impl Drop for Process {
     fn drop(&mut self) {
         let _ = self.0.kill();
