@@ -109,7 +109,7 @@ impl Worker {
                 };
                 let opened = open(remains.clone()).or_else(|error| {
                     // a dead server may keep its place in a service whatever iceoryx2 tries
-                    tracing::warn!(%error, "the services are made anew");
+                    tracing::warn!(%error, "all services are created again");
                     open(Remains { crashed: true, ..remains })
                 });
                 let server = opened.unwrap_or_else(|error| unavailable(&error));
