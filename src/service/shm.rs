@@ -218,13 +218,13 @@ type Request<Q, A> = ActiveRequest<ipc::Service, Q, (), A, ()>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Run {
     client: UniqueClientId,
-    /// Number of the vehicle's door.
-    door: usize,
+    /// Number of the vehicle's ports.
+    ports: usize,
     session: u64,
 }
 
 /// The ports of one vehicle, and what has come in through them in this round.
-struct Door {
+struct Ports {
     vehicle: String,
     single: Server<ipc::Service, Query, (), Answer, ()>,
     batch: Server<ipc::Service, BatchQuery, (), BatchAnswer, ()>,
@@ -239,7 +239,7 @@ pub struct ShmServer {
     config: Config,
     names: Names,
     node: Node<ipc::Service>,
-    doors: Vec<Door>,
+    ports: Vec<Ports>,
     wake: Listener<ipc::Service>,
     told: Told,
     desk: Desk,
@@ -296,9 +296,9 @@ impl ShmServer {
             files.add(&name, MessagingPattern::Event);
         }
         let told = Told::default();
-        let mut server = Self { config, names, node, doors: Vec::new(), wake, told, desk, files };
-        for vehicle in server.without_door() {
-            server.open_door(vehicle)?;
+        let mut server = Self { config, names, node, ports: Vec::new(), wake, told, desk, files };
+        for vehicle in server.without_ports() {
+            server.open_ports(vehicle)?;
         }
         server.tell();
         Ok(server)
@@ -310,16 +310,16 @@ impl ShmServer {
     }
 
     /// Vehicles that are served and have no ports yet.
-    fn without_door(&self) -> Vec<String> {
+    fn without_ports(&self) -> Vec<String> {
         let vehicles = self.desk.engine.vehicles();
-        let has_door = |name: &String| self.doors.iter().any(|door| door.vehicle == *name);
-        vehicles.keys().filter(|name| !has_door(name)).cloned().collect()
+        let has_ports = |name: &String| self.ports.iter().any(|ports| ports.vehicle == *name);
+        vehicles.keys().filter(|name| !has_ports(name)).cloned().collect()
     }
 
-    fn open_door(&mut self, vehicle: String) -> Result<(), ShmError> {
+    fn open_ports(&mut self, vehicle: String) -> Result<(), ShmError> {
         let clients = self.config.max_clients;
         // one more where the server's own client asks, which is at the first vehicle
-        let own = usize::from(self.doors.is_empty());
+        let own = usize::from(self.ports.is_empty());
         let names = [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)];
         let single = exchange::<Query, Answer>(&self.node, &names[0], clients + own)?;
         let batch = exchange::<BatchQuery, BatchAnswer>(&self.node, &names[1], clients)?;
@@ -330,7 +330,7 @@ impl ShmServer {
         let discard = BackpressureStrategy::DiscardData;
         let port = |error: &dyn std::fmt::Display| ShmError::new(format!("a server for {vehicle}"))(error);
         let metrics = &self.desk.metrics;
-        self.doors.push(Door {
+        self.ports.push(Ports {
             single: single.server_builder().backpressure_strategy(discard).create().map_err(|e| port(&e))?,
             batch: batch.server_builder().backpressure_strategy(discard).create().map_err(|e| port(&e))?,
             singles: Vec::new(),
@@ -356,7 +356,7 @@ impl ShmServer {
             let look = (idle && self.config.wait == Wait::Block) || round.is_multiple_of(ROUNDS_PER_LOOK);
             if look && Instant::now() >= next_housekeeping {
                 next_housekeeping = Instant::now() + HOUSEKEEPING;
-                self.open_new_doors();
+                self.open_new_ports();
                 self.tell();
             }
         }
@@ -365,14 +365,14 @@ impl ShmServer {
     }
 
     /// One vehicle's trouble is not the others'. Services of a new vehicle that cannot be opened are replaced.
-    fn open_new_doors(&mut self) {
-        for vehicle in self.without_door() {
-            let opened = self.open_door(vehicle.clone()).or_else(|error| {
+    fn open_new_ports(&mut self) {
+        for vehicle in self.without_ports() {
+            let opened = self.open_ports(vehicle.clone()).or_else(|error| {
                 for name in [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)] {
                     replacing(&name, &error);
                     shm_remains::remove(&name, MessagingPattern::RequestResponse);
                 }
-                self.open_door(vehicle)
+                self.open_ports(vehicle)
             });
             if let Err(error) = opened {
                 tracing::error!(%error, "a new vehicle is not served over shared memory");
@@ -420,27 +420,27 @@ impl ShmServer {
     /// and again, since that is where looking starts. True where there was anything.
     fn answer_round(&mut self) -> bool {
         let mut any = false;
-        for (number, door) in self.doors.iter_mut().enumerate() {
-            while let Some(request) = taken(door.single.receive()) {
-                door.singles.push((Instant::now(), request));
+        for (number, ports) in self.ports.iter_mut().enumerate() {
+            while let Some(request) = taken(ports.single.receive()) {
+                ports.singles.push((Instant::now(), request));
             }
-            while let Some(request) = taken(door.batch.receive()) {
-                door.batches.push((Instant::now(), request));
+            while let Some(request) = taken(ports.batch.receive()) {
+                ports.batches.push((Instant::now(), request));
             }
-            any |= !door.singles.is_empty() || !door.batches.is_empty();
-            if let Ok(vehicle) = self.desk.engine.vehicle(&door.vehicle) {
-                let at = At { vehicle: &vehicle, door: number };
-                for (arrived, request) in door.singles.drain(..) {
-                    self.desk.answer(at, arrived, &request, &door.single_recorder);
+            any |= !ports.singles.is_empty() || !ports.batches.is_empty();
+            if let Ok(vehicle) = self.desk.engine.vehicle(&ports.vehicle) {
+                let at = At { vehicle: &vehicle, ports: number };
+                for (arrived, request) in ports.singles.drain(..) {
+                    self.desk.answer(at, arrived, &request, &ports.single_recorder);
                 }
-                for (arrived, request) in door.batches.drain(..) {
-                    self.desk.answer_batch(at, arrived, &request, &door.batch_recorder);
+                for (arrived, request) in ports.batches.drain(..) {
+                    self.desk.answer_batch(at, arrived, &request, &ports.batch_recorder);
                 }
             } else {
-                for (_, request) in door.singles.drain(..) {
+                for (_, request) in ports.singles.drain(..) {
                     self.desk.decline(&request);
                 }
-                for (_, request) in door.batches.drain(..) {
+                for (_, request) in ports.batches.drain(..) {
                     self.desk.decline_batch(&request);
                 }
             }
@@ -453,7 +453,7 @@ impl ShmServer {
 #[derive(Clone, Copy)]
 struct At<'s> {
     vehicle: &'s ServedVehicle,
-    door: usize,
+    ports: usize,
 }
 
 impl Desk {
@@ -465,7 +465,7 @@ impl Desk {
         query: &Query,
         answer: &mut Answer,
     ) -> Result<(), InvalidState> {
-        let run = Run { client, door: at.door, session: query.session };
+        let run = Run { client, ports: at.ports, session: query.session };
         let outcome = query.state().and_then(|state| {
             // a query that is refused begins no session
             let known = match query.session {
