@@ -76,6 +76,7 @@ fn alerts_and_dashboard_ask_for_metrics_that_exist() {
     metrics.refuse(Transport::shm, "invalid_argument");
     metrics.set_bundle_version("husky", 1);
     metrics.count_reload(false);
+    metrics.set_transport_up("grpc", true);
     let rendered = metrics.render();
     for name in ["alerts.yml", "grafana/wade.json"] {
         let file = text(name);
