@@ -141,7 +141,8 @@ fn prometheus_accepts_its_settings_and_the_alerts_fire() {
 }
 
 /// Server a is well. Server b has every trouble there is: half of its single requests take 2 ms to 5 ms, it refuses
-/// four requests a second, shared memory does not answer, and it refuses a bundle at minute 5. Server c has no vehicle, server d does not answer.
+/// four requests a second, its shared memory does not answer, and it refuses a bundle at minute 5. Server c has no vehicle,
+/// server d does not answer.
 const STORY: &str = r#"
 rule_files: [RULES]
 evaluation_interval: 15s
@@ -163,8 +164,8 @@ tests:
       - {series: 'wade_request_duration_seconds_bucket{instance="b", transport="shm", vehicle="husky", le="+Inf"}', values: '0+100x40'}
       - {series: 'wade_refusals_total{instance="a", transport="shm", reason="not_found"}', values: '0+1x40'}
       - {series: 'wade_refusals_total{instance="b", transport="shm", reason="not_found"}', values: '0+60x40'}
-      - {series: 'wade_transport_up{instance="a", transport="shm"}', values: '1x40'}
-      - {series: 'wade_transport_up{instance="b", transport="shm"}', values: '0x40'}
+      - {series: 'wade_transport_up{instance="a", transport="shared_memory"}', values: '1x40'}
+      - {series: 'wade_transport_up{instance="b", transport="shared_memory"}', values: '0x40'}
       - {series: 'wade_transport_up{instance="b", transport="grpc"}', values: '1x40'}
       - {series: 'wade_reloads_total{instance="a", outcome="accepted"}', values: '0x20 1x20'}
       - {series: 'wade_reloads_total{instance="b", outcome="refused"}', values: '0x20 1x20'}

@@ -70,11 +70,7 @@ pub(super) fn prepare<'n>(names: &Names, vehicles: impl Iterator<Item = &'n Stri
             removed.push(name);
         }
     }
-    for node in broken {
-        if node.services.iter().all(|service| !service.exists()) {
-            remove_files_of(process_of(node.id));
-        }
-    }
+    remove_nodes(broken);
     if !removed.is_empty() {
         tracing::info!(services = removed.join(" "), "removed what a process left that was killed");
     }
@@ -108,8 +104,7 @@ pub(super) fn service_file(name: &str, pattern: MessagingPattern) -> Option<Path
     let hash = ServiceHash::new::<<ipc::Service as Service>::ServiceNameHasher>(&name, pattern);
     let global = &Config::global_config().global;
     let file = format!("{}{hash}{}", global.prefix, global.service.static_config_storage_suffix);
-    let folder = PathBuf::from(global.root_path().to_string());
-    Some(folder.join(global.service.directory.to_string()).join(file))
+    Some(services_folder().join(file))
 }
 
 /// Whether a service was begun and never finished: its file is still writable, or the memory that it names is not there.
@@ -158,9 +153,8 @@ fn remove_service(file: &Path) {
 /// file names.
 pub(crate) fn remove_untold_of(process: u32) {
     let global = &Config::global_config().global;
-    let services = PathBuf::from(global.root_path().to_string()).join(global.service.directory.to_string());
     let named: Vec<u128> =
-        files_in(&services).filter_map(|file| id_in(&fs::read_to_string(file).ok()?)).collect();
+        files_in(&services_folder()).filter_map(|file| id_in(&fs::read_to_string(file).ok()?)).collect();
     let of = |suffix: &str, name: &str| name.strip_suffix(suffix).map(numbers_in);
     let [segment, connection, listener, service] = [
         &global.service.data_segment_suffix,
@@ -253,55 +247,78 @@ impl ServiceFiles {
     }
 }
 
-/// A node of a dead process that has no monitor or no details, as one leaves that was killed while it made or cleared a node.
-/// iceoryx2 does not find it, or gives up on it, and takes a second for each service that it was in.
-struct BrokenNode {
+/// A node of a dead process.
+struct DeadNode {
     id: u128,
     /// Files of the services that it was in.
     services: Vec<PathBuf>,
 }
 
-fn broken_nodes() -> Vec<BrokenNode> {
-    let mut nodes = incomplete_nodes();
-    if !nodes.is_empty() {
-        // the number of a process says nothing of one in another container, which may be at work on its node
-        std::thread::sleep(FINISHING);
-        let still: Vec<u128> = incomplete_nodes().iter().map(|node| node.id).collect();
-        nodes.retain(|node| still.contains(&node.id));
+impl DeadNode {
+    fn is_in_no_service(&self) -> bool {
+        self.services.iter().all(|service| !service.exists())
     }
-    nodes
 }
 
-fn incomplete_nodes() -> Vec<BrokenNode> {
+/// Dead nodes without monitor or details, as one leaves that was killed while it made or cleared a node. iceoryx2 does not find
+/// them, or gives up on them, and takes a second for each service that they were in.
+fn broken_nodes() -> Vec<DeadNode> {
     let global = &Config::global_config().global;
     let (prefix, nodes) = (global.prefix.to_string(), nodes_folder());
     dead_nodes(|id| {
         let monitor = nodes.join(format!("{prefix}{id}{}", global.node.monitor_suffix));
         let details = nodes.join(format!("{id}/{prefix}node{}", global.node.static_config_suffix));
-        monitor.exists() && details.exists()
+        !monitor.exists() || !details.exists()
     })
 }
 
-/// Nodes whose process is dead, as far as its number tells, but for those to spare.
-fn dead_nodes(is_spared: impl Fn(u128) -> bool) -> Vec<BrokenNode> {
+/// Dead nodes among those that are chosen, on a second look too: the number of a process says nothing of one in another
+/// container, which may have nodes that live, or be at work on one.
+fn dead_nodes(is_chosen: impl Fn(u128) -> bool) -> Vec<DeadNode> {
     let global = &Config::global_config().global;
     let (nodes, tag) = (nodes_folder(), global.node.service_tag_suffix.to_string());
-    let services = PathBuf::from(global.root_path().to_string()).join(global.service.directory.to_string());
-    let ids: BTreeSet<u128> = files_in(&nodes).flat_map(|file| numbers_in(&name_of(&file))).collect();
-    let dead = ids.into_iter().filter(|id| is_gone(process_of(*id)) && !is_spared(*id));
+    let look = || -> BTreeSet<u128> {
+        let ids = files_in(&nodes).flat_map(|file| numbers_in(&name_of(&file)));
+        ids.filter(|id| is_gone(process_of(*id)) && is_chosen(*id)).collect()
+    };
+    let seen = look();
+    if seen.is_empty() {
+        return Vec::new();
+    }
+    std::thread::sleep(FINISHING);
+    let Some(living) = living_processes() else { return Vec::new() };
+    let dead = look().into_iter().filter(|id| seen.contains(id) && !living.contains(&process_of(*id)));
     let node = |id: u128| {
         let names = files_in(&nodes.join(id.to_string()))
             .filter_map(|file| Some(name_of(&file).strip_suffix(&tag)?.to_owned()));
-        let files =
-            names.map(|name| services.join(name + &global.service.static_config_storage_suffix.to_string()));
-        BrokenNode { id, services: files.collect() }
+        let suffix = global.service.static_config_storage_suffix.to_string();
+        let services = names.map(|name| services_folder().join(name + &suffix)).collect();
+        DeadNode { id, services }
     };
     dead.map(node).collect()
+}
+
+/// Processes with a node that holds the lock of its monitor, in whatever container; none where they cannot be listed.
+fn living_processes() -> Option<BTreeSet<u32>> {
+    let mut living = BTreeSet::new();
+    Node::<ipc::Service>::list(&config(), |node| {
+        if let NodeState::Alive(node) = node {
+            living.insert(process_of(node.id().value()));
+        }
+        CallbackProgression::Continue
+    })
+    .ok()?;
+    Some(living)
 }
 
 fn nodes_folder() -> PathBuf {
     let global = &Config::global_config().global;
     PathBuf::from(global.root_path().to_string()).join(global.node.directory.to_string())
+}
+
+fn services_folder() -> PathBuf {
+    let global = &Config::global_config().global;
+    PathBuf::from(global.root_path().to_string()).join(global.service.directory.to_string())
 }
 
 fn name_of(file: &Path) -> String {
@@ -311,31 +328,11 @@ fn name_of(file: &Path) -> String {
 /// Removes the dead nodes that iceoryx2 left and that were in no service that is left. The others' services are put right by
 /// who owns them.
 fn sweep() {
-    let dead = || {
-        let living = living_nodes();
-        let mut nodes = dead_nodes(|id| living.as_ref().is_none_or(|living| living.contains(&id)));
-        nodes.retain(|node| node.services.iter().all(|service| !service.exists()));
-        nodes.into_iter().map(|node| node.id)
-    };
-    let seen: Vec<u128> = dead().collect();
-    if !seen.is_empty() {
-        // one in another container may be at work on its node
-        std::thread::sleep(FINISHING);
-        dead().filter(|id| seen.contains(id)).for_each(|id| remove_files_of(process_of(id)));
-    }
+    remove_nodes(dead_nodes(|_| true));
 }
 
-/// Nodes that hold the lock of their monitor, in whatever container; none where they cannot be listed.
-fn living_nodes() -> Option<BTreeSet<u128>> {
-    let mut living = BTreeSet::new();
-    Node::<ipc::Service>::list(&config(), |node| {
-        if let NodeState::Alive(node) = node {
-            living.insert(node.id().value());
-        }
-        CallbackProgression::Continue
-    })
-    .ok()?;
-    Some(living)
+fn remove_nodes(dead: Vec<DeadNode>) {
+    dead.iter().filter(|node| node.is_in_no_service()).for_each(|node| remove_files_of(process_of(node.id)));
 }
 
 /// Clears away what is left on this machine, one dead process after the other, until `stop` turns true.

@@ -33,9 +33,7 @@ impl Process {
         let status = self.0.wait().expect("reaped");
         assert_eq!(status.signal(), Some(9));
     }
-}
 
-impl Process {
     /// Ends it as an administrator does.
     #[allow(dead_code, reason = "not every test that has a server ends one in order")]
     pub fn terminate(mut self) {
