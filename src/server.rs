@@ -104,7 +104,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
             config.grpc.clone(),
             shared.clone(),
             Arc::clone(&accounts),
-        ))),
+        ))?),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         health: Arc::clone(&health),
         shm: None,
@@ -143,7 +143,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
 }
 
 fn runtime() -> std::io::Result<Runtime> {
-    tokio::runtime::Builder::new_current_thread().enable_all().build()
+    tokio::runtime::Builder::new_current_thread().event_interval(8).enable_all().build()
 }
 
 impl Running {

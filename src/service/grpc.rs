@@ -188,12 +188,7 @@ impl Drop for Listeners {
 
 fn bind_tcp(listen: &str) -> Result<TcpListener, GrpcError> {
     let address: SocketAddr = listen.parse().map_err(|_| GrpcError::Address { listen: listen.to_owned() })?;
-    let bind = || {
-        let listener = TcpListener::bind(address)?;
-        listener.set_nonblocking(true)?;
-        Ok(listener)
-    };
-    bind().map_err(|source| {
+    intake::listen_on_tcp(address).map_err(|source| {
         let way_out = "--listen (grpc.listen)";
         let reason = occupant::in_the_way(&source, occupant::of_tcp(address), way_out);
         GrpcError::Bind { at: address.to_string(), reason }
@@ -251,16 +246,16 @@ pub struct Server {
 }
 
 impl Server {
-    /// A server that is not ready yet.
-    pub async fn new(config: Config, shared: Shared, accounts: Arc<Accounts>) -> Self {
-        let jobs = Jobs::new(Arc::clone(&shared.reloader));
+    /// A server that is not ready yet; an error where the thread for the administrator's jobs does not start.
+    pub async fn new(config: Config, shared: Shared, accounts: Arc<Accounts>) -> std::io::Result<Self> {
+        let jobs = Jobs::start(Arc::clone(&shared.reloader))?;
         let gate = Arc::new(Semaphore::new(config.threads));
         let server = Self { config, shared, accounts, jobs, gate, health: HealthReporter::new() };
         // the crate registers the empty name as SERVING, and nothing is served yet
         for service in HEALTH_NAMES {
             server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
         }
-        server
+        Ok(server)
     }
 
     /// Says SERVING of what answers, and of the server as a whole where it is ready.

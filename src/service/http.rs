@@ -23,7 +23,7 @@ use tokio::sync::watch;
 
 use super::accounts::Accounts;
 use super::health::Health;
-use super::intake::Listener;
+use super::intake::{Listener, listen_on_tcp};
 use super::{grpc, occupant};
 use connections::Routes;
 use rejection::Rejection;
@@ -83,12 +83,7 @@ pub fn bind(config: &Config) -> Result<Option<TcpListener>, HttpError> {
     let listen = config.listen.clone();
     let address: SocketAddr =
         config.listen.parse().map_err(|_| HttpError::Address { listen: listen.clone() })?;
-    let bind = || {
-        let listener = TcpListener::bind(address)?;
-        listener.set_nonblocking(true)?;
-        Ok(listener)
-    };
-    bind().map(Some).map_err(|source| {
+    listen_on_tcp(address).map(Some).map_err(|source| {
         let way_out = "--http (http.listen)";
         let reason = occupant::in_the_way(&source, occupant::of_tcp(address), way_out);
         HttpError::Bind { listen, reason }

@@ -4,11 +4,13 @@
 
 use std::fs::File;
 use std::io::{self, IoSlice};
+use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use nix::sys::socket::{setsockopt, sockopt};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 
@@ -23,6 +25,9 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 const PACE: Duration = Duration::from_millis(10);
 /// Descriptors that are held for probes.
 const RESERVE: usize = 4;
+
+/// What the system holds of a connection in each direction [bytes], as far ahead as HTTP/2 lets a peer send.
+const SOCKET_BUFFER: usize = 256 << 10;
 
 /// A connection of either kind.
 #[derive(Debug)]
@@ -40,6 +45,16 @@ pub enum Listener {
     Tcp(TcpListener),
     /// The Unix socket.
     Unix(UnixListener),
+}
+
+/// Listens on TCP. What the system holds for a peer that does not read, or sends faster than it is read, counts in no account
+/// of ours: it is bounded here, where the system would go to megabytes a connection.
+pub fn listen_on_tcp(address: SocketAddr) -> io::Result<std::net::TcpListener> {
+    let listener = std::net::TcpListener::bind(address)?;
+    listener.set_nonblocking(true)?;
+    setsockopt(&listener, sockopt::RcvBuf, &SOCKET_BUFFER)?;
+    setsockopt(&listener, sockopt::SndBuf, &SOCKET_BUFFER)?;
+    Ok(listener)
 }
 
 impl Listener {

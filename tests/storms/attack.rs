@@ -120,12 +120,28 @@ pub enum Flood {
     WindowUpdate,
     Reset,
     EmptyData,
+    Priority,
+    Unknown,
+    Continuation,
+    Greeting,
+    GetVehicle,
     Reload,
 }
 
 impl Flood {
-    pub const ALL: [Self; 6] =
-        [Self::Ping, Self::Settings, Self::WindowUpdate, Self::Reset, Self::EmptyData, Self::Reload];
+    pub const ALL: [Self; 11] = [
+        Self::Ping,
+        Self::Settings,
+        Self::WindowUpdate,
+        Self::Reset,
+        Self::EmptyData,
+        Self::Priority,
+        Self::Unknown,
+        Self::Continuation,
+        Self::Greeting,
+        Self::GetVehicle,
+        Self::Reload,
+    ];
 
     /// What precedes the flood on a connection, and the flood from this stream on: about 16 kB.
     fn frames(self, stream: &mut u32) -> Vec<u8> {
@@ -138,6 +154,17 @@ impl Flood {
             Self::Settings => frame(4, 0, 0, &[]).repeat(1800),
             Self::WindowUpdate => frame(8, 0, 0, &1_u32.to_be_bytes()).repeat(1260),
             Self::EmptyData => frame(0, 0, 1, &[]).repeat(1800),
+            Self::Priority => frame(2, 0, 3, &[0, 0, 0, 1, 7]).repeat(1170),
+            Self::Unknown => frame(0xf0, 0, 0, &[]).repeat(1800),
+            Self::Continuation => [frame(1, 0, next(), &[0x83]), frame(9, 0, *stream, &[]).repeat(1800)].concat(),
+            Self::Greeting => Vec::new(),
+            Self::GetVehicle => {
+                let body = [text(1, "husky"), vec![2 << 3, 1]].concat();
+                let of = |id: u32| {
+                    [call(id, "/wade.v1.Hydrodynamics/GetVehicle"), message(id, &body, true)].concat()
+                };
+                (0..64).flat_map(|_| of(next())).collect()
+            }
             Self::Reset => {
                 let pair = |id| {
                     [call(id, "/wade.v1.Hydrodynamics/GetVehicle"), frame(3, 0, id, &8_u32.to_be_bytes())]
@@ -171,6 +198,8 @@ impl Flood {
                 let Some((wire, stream, left)) = slot else { continue };
                 if left.is_empty() {
                     *left = self.frames(stream);
+                    // whoever only shakes hands is back at once
+                    idle &= self != Self::Greeting;
                 }
                 match wire.send(left) {
                     Ok(sent) => {
@@ -182,7 +211,7 @@ impl Flood {
                         continue;
                     }
                 }
-                if !wire.drain() || *stream > 1 << 30 {
+                if !wire.drain() || *stream > 1 << 30 || self == Self::Greeting {
                     *slot = None;
                 }
             }

@@ -28,7 +28,8 @@ pub struct Connection {
     opened_ms: u64,
     shaken: AtomicBool,
     called: AtomicBool,
-    refused: AtomicU32,
+    dear_calls: AtomicU32,
+    turns: AtomicU64,
     closed: OnceLock<Closed>,
     closing: Notify,
 }
@@ -49,7 +50,8 @@ impl Connection {
             opened_ms: now,
             shaken: AtomicBool::new(false),
             called: AtomicBool::new(false),
-            refused: AtomicU32::new(0),
+            dear_calls: AtomicU32::new(0),
+            turns: AtomicU64::new(0),
             closed: OnceLock::new(),
             closing: Notify::new(),
         }
@@ -111,15 +113,25 @@ impl Connection {
         self.called.store(true, Relaxed);
     }
 
-    /// Notes that a call was refused, which its peer pays for where it goes on regardless.
-    pub fn refuses(&self) {
-        self.refused.fetch_add(1, Relaxed);
+    /// Notes a call that its peer pays for where it goes on regardless: it was refused, or is the administrator's.
+    pub fn pays_for_call(&self) {
+        self.dear_calls.fetch_add(1, Relaxed);
     }
 
-    /// How many calls were refused since this was asked.
-    pub fn take_refused(&self) -> u32 {
+    /// How many such calls there were since this was asked.
+    pub fn take_dear_calls(&self) -> u32 {
         // a swap writes even where there is nothing to take
-        if self.refused.load(Relaxed) == 0 { 0 } else { self.refused.swap(0, Relaxed) }
+        if self.dear_calls.load(Relaxed) == 0 { 0 } else { self.dear_calls.swap(0, Relaxed) }
+    }
+
+    /// Notes that it is the connection's turn on the thread.
+    pub fn begins_turn(&self) {
+        self.turns.store(self.turns.load(Relaxed) + 1, Relaxed);
+    }
+
+    /// How many turns it has had.
+    pub fn turns(&self) -> u64 {
+        self.turns.load(Relaxed)
     }
 
     /// Whether anything was ever asked.

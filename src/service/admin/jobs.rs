@@ -2,10 +2,14 @@
 //! and whoever asks for it a thousand times must not get a thousand threads. One job runs and one waits; the same question as
 //! the one that waits is answered with it, any other is refused.
 
+use std::io;
 use std::path::PathBuf;
+use std::sync::mpsc::{self, SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use rustix::process::setpriority_process;
+use rustix::thread::gettid;
 use tokio::sync::oneshot;
 
 use super::Reloader;
@@ -13,6 +17,8 @@ use crate::engine::UnknownVehicle;
 use crate::service::proto::Reloaded;
 use crate::service::wire::Refusal;
 
+/// Niceness of the thread: a tenth of the weight of a query's.
+const NICE: i32 = 10;
 /// Longest pause between two jobs.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
@@ -65,17 +71,31 @@ struct Queue {
 #[derive(Debug)]
 pub struct Jobs {
     reloader: Arc<Reloader>,
-    queue: Mutex<Queue>,
+    queue: Arc<Mutex<Queue>>,
+    /// Wakes the thread, which ends with the last of these.
+    wake: SyncSender<()>,
 }
 
 impl Jobs {
-    /// No job yet.
-    pub fn new(reloader: Arc<Reloader>) -> Arc<Self> {
-        Arc::new(Self { reloader, queue: Mutex::default() })
+    /// No job yet, and the thread that will do them: on two cores, whoever asks without end must not have the processor
+    /// before a query.
+    pub fn start(reloader: Arc<Reloader>) -> io::Result<Arc<Self>> {
+        let (wake, woken) = mpsc::sync_channel(1);
+        let worker = Worker { reloader: Arc::clone(&reloader), queue: Arc::default() };
+        let queue = Arc::clone(&worker.queue);
+        std::thread::Builder::new().name("wade-admin".into()).spawn(move || {
+            if let Err(error) = setpriority_process(Some(gettid()), NICE) {
+                tracing::warn!(%error, "the administrator's jobs run with the priority of queries");
+            }
+            while woken.recv().is_ok() {
+                worker.work();
+            }
+        })?;
+        Ok(Arc::new(Self { reloader, queue, wake }))
     }
 
     /// Has a job done, and waits for it.
-    pub async fn run(self: &Arc<Self>, job: Job) -> Result<Vec<Reloaded>, Refusal> {
+    pub async fn run(&self, job: Job) -> Result<Vec<Reloaded>, Refusal> {
         let asked = job.clone();
         let outcome = self.submit(job)?.await;
         let mut reloaded = outcome.map_err(|_| Refusal::TooManyJobs)??;
@@ -91,7 +111,7 @@ impl Jobs {
     }
 
     /// Puts a job in its place: on the thread, beside one that waits, or nowhere.
-    fn submit(self: &Arc<Self>, job: Job) -> Result<oneshot::Receiver<Outcome>, Refusal> {
+    fn submit(&self, job: Job) -> Result<oneshot::Receiver<Outcome>, Refusal> {
         let (asker, answer) = oneshot::channel();
         let mut queue = self.lock();
         match &mut queue.waiting {
@@ -99,30 +119,42 @@ impl Jobs {
             Some(_) => return Err(Refusal::TooManyJobs),
             None => queue.waiting = Some(Waiting { job, askers: vec![asker] }),
         }
-        if !queue.running {
-            let jobs = Arc::clone(self);
-            let thread = std::thread::Builder::new().name("wade-admin".into());
-            queue.running = thread.spawn(move || jobs.work()).is_ok();
-            if !queue.running {
-                queue.waiting = None;
-                return Err(Refusal::TooManyJobs);
-            }
+        // a thread that was woken and has not looked yet finds this job as well
+        if let Err(TrySendError::Disconnected(())) = self.wake.try_send(()) {
+            queue.waiting = None;
+            return Err(Refusal::TooManyJobs);
         }
-        self.note(&queue);
+        note(&queue, &self.reloader);
         Ok(answer)
     }
 
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn note(queue: &Queue, reloader: &Reloader) {
+    let jobs = usize::from(queue.running) + usize::from(queue.waiting.is_some());
+    reloader.metrics.set_admin_jobs(jobs);
+}
+
+/// What the thread has.
+#[derive(Debug)]
+struct Worker {
+    reloader: Arc<Reloader>,
+    queue: Arc<Mutex<Queue>>,
+}
+
+impl Worker {
     /// Does what waits until nothing does.
     fn work(&self) {
         loop {
             let mut queue = self.lock();
-            let Some(Waiting { job, askers }) = queue.waiting.take() else {
-                queue.running = false;
-                self.note(&queue);
-                return;
-            };
-            self.note(&queue);
+            let waiting = queue.waiting.take();
+            queue.running = waiting.is_some();
+            note(&queue, &self.reloader);
             drop(queue);
+            let Some(Waiting { job, askers }) = waiting else { return };
             let start = Instant::now();
             let outcome = self.perform(&job);
             let elapsed = start.elapsed();
@@ -155,11 +187,6 @@ impl Jobs {
             }
             Job::Unload(vehicle) => self.reloader.unload(vehicle).map(|()| Vec::new()),
         }
-    }
-
-    fn note(&self, queue: &Queue) {
-        let jobs = usize::from(queue.running) + usize::from(queue.waiting.is_some());
-        self.reloader.metrics.set_admin_jobs(jobs);
     }
 
     fn lock(&self) -> MutexGuard<'_, Queue> {

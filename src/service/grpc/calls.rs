@@ -105,10 +105,13 @@ impl Calls {
         let place = match self.admit(method).await {
             Ok(place) => {
                 self.connection.moved();
+                if method.administers {
+                    self.connection.pays_for_call();
+                }
                 place
             }
             Err(refusal) => {
-                self.connection.refuses();
+                self.connection.pays_for_call();
                 self.rules.metrics.refuse(method.transport, refusal.reason());
                 return Err(refusal.into());
             }

@@ -28,6 +28,13 @@ pub struct Head {
     pub flags: u8,
 }
 
+impl Head {
+    /// A frame of data that is empty and ends nothing.
+    fn is_empty_data(self) -> bool {
+        self.kind == DATA && self.len == 0 && self.flags & END_STREAM == 0
+    }
+}
+
 /// A piece of the bytes that were scanned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Piece {
@@ -92,6 +99,39 @@ impl Scanner {
     }
 }
 
+/// What a connection may cost before others get their turn, in the cost of a frame that carries nothing: about a tenth of
+/// a millisecond.
+const TURN: usize = 64;
+/// What the beginning of a call costs.
+const CALL: usize = 8;
+/// Bytes that cost as much as a frame.
+const BYTES_A_FRAME: usize = 128;
+
+/// What a connection has cost since it last stood back for others.
+#[derive(Debug, Default)]
+pub struct Turn {
+    frames: usize,
+    bytes: usize,
+}
+
+impl Turn {
+    /// Counts a piece of what was received.
+    pub fn takes(&mut self, piece: Piece, len: usize) {
+        self.bytes += len;
+        self.frames += match piece {
+            Piece::Head(Head { kind: HEADERS | CONTINUATION, .. }) => CALL,
+            Piece::Head(head) if head.is_empty_data() => TURN,
+            Piece::Head(_) => 1,
+            Piece::Nothing | Piece::Payload(_) => 0,
+        };
+    }
+
+    /// Whether it is the others' turn.
+    pub fn is_over(&self) -> bool {
+        self.frames + self.bytes / BYTES_A_FRAME >= TURN
+    }
+}
+
 /// Frames without a request that may come at once, as after a pause: tokens.
 const BURST: f64 = 1000.0;
 /// A frame of data that is shorter than this [bytes] carries no message of ours.
@@ -100,8 +140,10 @@ const SHORT_DATA: usize = 16;
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// A connection that has been over its budget for this long without a break is closed.
 const TOLERANCE: Duration = Duration::from_secs(10);
-/// What a call costs that was refused: whoever goes on asking is asked to wait.
-const REFUSED: f64 = 10.0;
+/// What a frame of data costs that is empty and ends nothing.
+const EMPTY_DATA: f64 = -50.0;
+/// What a call costs that was refused, or that has the administrator's work done: whoever goes on asking is asked to wait.
+const DEAR_CALL: f64 = 10.0;
 /// Bytes of an answer that earn the receiver one frame, such as a WINDOW_UPDATE.
 const BYTES_A_TOKEN: f64 = 4096.0;
 
@@ -138,15 +180,17 @@ impl Budget {
             // the end of a request may be a frame of its own
             DATA if head.flags & END_STREAM != 0 => 0.0,
             HEADERS => 1.0,
+            // the library ends a connection with its hundredth, and whoever floods would be back at once
+            _ if head.is_empty_data() => EMPTY_DATA,
             // a request that is begun and given up costs the server the whole of it
             RST_STREAM => -4.0,
             _ => -1.0,
         };
     }
 
-    /// Counts calls that were refused.
-    pub fn refused(&mut self, calls: u32) {
-        self.tokens -= REFUSED * f64::from(calls);
+    /// Counts calls that were refused, or that an administrator made.
+    pub fn dear_calls(&mut self, calls: u32) {
+        self.tokens -= DEAR_CALL * f64::from(calls);
     }
 
     /// Counts a frame of data that was sent.

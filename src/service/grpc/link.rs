@@ -11,12 +11,9 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Sleep;
 
 use super::authority::Authority;
-use super::frames::{Budget, DATA, Piece, Scanner, Verdict};
+use super::frames::{Budget, DATA, Piece, Scanner, Turn, Verdict};
 use crate::service::accounts::{Closed, Connection};
 use crate::service::intake::Socket;
-
-/// Bytes that are read of a connection before others get their turn.
-const BYTES_PER_TURN: usize = 8 << 10;
 
 /// A socket with its account.
 #[derive(Debug)]
@@ -28,7 +25,11 @@ pub struct Link {
     budget: Budget,
     pause: Option<Pin<Box<Sleep>>>,
     authority: Option<Authority>,
-    read_this_turn: usize,
+    turn: Turn,
+    /// Which turn that is: the library asks for bytes several times in each.
+    turns: u64,
+    /// What was read of the socket and is not yet the library's: its turn is over before.
+    ahead: Vec<u8>,
 }
 
 impl Link {
@@ -43,14 +44,21 @@ impl Link {
             budget: Budget::new(control_frames_per_s, Instant::now()),
             pause: None,
             authority,
-            read_this_turn: 0,
+            turn: Turn::default(),
+            turns: 0,
+            ahead: Vec::new(),
         }
     }
 
-    fn note_received(&mut self, mut bytes: &mut [u8]) {
+    /// Notes what was received, up to the end of the turn; how many bytes that were.
+    fn note_received(&mut self, bytes: &mut [u8]) -> usize {
         let (mut moved, before) = (false, self.received.is_past_preface());
-        while !bytes.is_empty() {
+        let mut noted = 0;
+        while noted < bytes.len() && !self.turn.is_over() {
+            let bytes = &mut bytes[noted..];
             let (piece, len) = self.received.step(bytes);
+            self.turn.takes(piece, len);
+            noted += len;
             match piece {
                 Piece::Head(head) => {
                     self.budget.received(head);
@@ -66,7 +74,6 @@ impl Link {
                 }
                 Piece::Nothing => {}
             }
-            bytes = &mut bytes[len..];
         }
         if !before && self.received.is_past_preface() {
             self.connection.shakes_hands();
@@ -74,7 +81,7 @@ impl Link {
         if moved {
             self.connection.moved();
         }
-        self.budget.refused(self.connection.take_refused());
+        self.budget.dear_calls(self.connection.take_dear_calls());
         match self.budget.judge(Instant::now()) {
             Verdict::Within => {}
             Verdict::Pause(pause) => {
@@ -83,6 +90,18 @@ impl Link {
             }
             Verdict::Close => self.connection.close(Closed::control_frames),
         }
+        noted
+    }
+
+    /// What was read ahead, else what the socket has.
+    fn poll_bytes(&mut self, cx: &mut Context<'_>, buf: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        if self.ahead.is_empty() {
+            return Pin::new(&mut self.socket).poll_read(cx, buf);
+        }
+        let len = self.ahead.len().min(buf.remaining());
+        buf.put_slice(&self.ahead[..len]);
+        self.ahead.drain(..len);
+        Poll::Ready(Ok(()))
     }
 
     fn note_sent(&mut self, mut bytes: &[u8]) {
@@ -113,21 +132,21 @@ impl AsyncRead for Link {
             ready!(pause.as_mut().poll(cx));
             self.pause = None;
         }
-        if self.read_this_turn >= BYTES_PER_TURN {
+        let turns = self.connection.turns();
+        if turns != self.turns {
+            (self.turns, self.turn) = (turns, Turn::default());
+        }
+        if self.turn.is_over() {
             // the rest is read when the others have had theirs
-            self.read_this_turn = 0;
             cx.waker().wake_by_ref();
             return Poll::Pending;
         }
         let before = buf.filled().len();
-        let polled = Pin::new(&mut self.socket).poll_read(cx, buf);
-        match &polled {
-            Poll::Ready(Ok(())) => {
-                let bytes = &mut buf.filled_mut()[before..];
-                self.read_this_turn += bytes.len();
-                self.note_received(bytes);
-            }
-            _ => self.read_this_turn = 0,
+        let polled = self.poll_bytes(cx, buf);
+        if let Poll::Ready(Ok(())) = &polled {
+            let noted = before + self.note_received(&mut buf.filled_mut()[before..]);
+            self.ahead.splice(..0, buf.filled()[noted..].iter().copied());
+            buf.set_filled(noted);
         }
         polled
     }

@@ -1,5 +1,6 @@
 //! One connection from its handshake to its end: its deadlines, and a drain.
 
+use std::future::{Future, poll_fn};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -95,9 +96,13 @@ pub async fn serve(
     let mut look = tokio::time::interval_at((Instant::now() + LOOK).into(), LOOK);
     let (mut draining, mut goodbye) = (false, None);
     loop {
+        let turn = poll_fn(|cx| {
+            connection.begins_turn();
+            served.as_mut().poll(cx)
+        });
         tokio::select! {
             // a client that breaks its own connection off is its own affair
-            _ = &mut served => return,
+            _ = turn => return,
             _ = connection.closing() => return,
             () = &mut stop, if !draining => {
                 draining = true;
