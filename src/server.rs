@@ -143,7 +143,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
 }
 
 fn runtime() -> std::io::Result<Runtime> {
-    tokio::runtime::Builder::new_current_thread().event_interval(8).enable_all().build()
+    tokio::runtime::Builder::new_current_thread().enable_all().build()
 }
 
 impl Running {

@@ -49,17 +49,19 @@ pub enum Closed {
     idle,
     answer_not_read,
     control_frames,
+    broke_protocol,
     made_room,
     no_room,
 }
 
 impl Closed {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::no_handshake,
         Self::no_request,
         Self::idle,
         Self::answer_not_read,
         Self::control_frames,
+        Self::broke_protocol,
         Self::made_room,
         Self::no_room,
     ];
@@ -72,6 +74,7 @@ impl Closed {
             Self::idle => "idle",
             Self::answer_not_read => "answer_not_read",
             Self::control_frames => "control_frames",
+            Self::broke_protocol => "broke_protocol",
             Self::made_room => "made_room",
             Self::no_room => "no_room",
         }

@@ -8,6 +8,7 @@ mod sent;
 use std::collections::HashMap;
 use std::fmt;
 use std::net::IpAddr;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
@@ -130,6 +131,8 @@ pub struct Accounts {
     open: Mutex<Open>,
     /// Told when something is given back.
     given_back: Notify,
+    /// Whether a connection has ended by its peer's fault since this was last asked.
+    fault: AtomicBool,
     metrics: Arc<Metrics>,
     start: Instant,
 }
@@ -155,6 +158,7 @@ impl Accounts {
             total: Held(Resource::ALL.map(|resource| metrics.held(resource))),
             open: Mutex::default(),
             given_back: Notify::new(),
+            fault: AtomicBool::new(false),
             metrics,
             start: Instant::now(),
         })
@@ -277,6 +281,11 @@ impl Accounts {
     /// Whether all places are taken.
     pub fn is_full(&self, resource: Resource) -> bool {
         self.total.get(resource) >= self.limits[resource as usize]
+    }
+
+    /// Whether a connection has ended by its peer's fault since this was last asked: whoever is put out is back at once.
+    pub fn take_fault(&self) -> bool {
+        self.fault.swap(false, Relaxed)
     }
 
     /// Closes a connection without calls, for its descriptor.

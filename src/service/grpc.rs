@@ -9,6 +9,7 @@ mod inference;
 mod link;
 mod serving;
 mod stream;
+mod turns;
 
 pub use convert::{added_mass, single};
 pub(super) use convert::{latency, summary, vehicle};
@@ -31,6 +32,7 @@ use tonic::{Code, Status};
 use tonic_health::pb::health_server::HealthServer;
 use tonic_health::server::{HealthReporter, HealthService};
 
+use self::turns::Turnstile;
 use super::accounts::{Accounts, Connection};
 use super::admin::{Jobs, Reloader};
 use super::health::{Health, Part, State};
@@ -242,6 +244,7 @@ pub struct Server {
     accounts: Arc<Accounts>,
     jobs: Arc<Jobs>,
     gate: Arc<Semaphore>,
+    turnstile: Turnstile,
     health: HealthReporter,
 }
 
@@ -250,7 +253,8 @@ impl Server {
     pub async fn new(config: Config, shared: Shared, accounts: Arc<Accounts>) -> std::io::Result<Self> {
         let jobs = Jobs::start(Arc::clone(&shared.reloader))?;
         let gate = Arc::new(Semaphore::new(config.threads));
-        let server = Self { config, shared, accounts, jobs, gate, health: HealthReporter::new() };
+        let (turnstile, health) = (Turnstile::new(), HealthReporter::new());
+        let server = Self { config, shared, accounts, jobs, gate, turnstile, health };
         // the crate registers the empty name as SERVING, and nothing is served yet
         for service in HEALTH_NAMES {
             server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
@@ -357,7 +361,8 @@ impl Server {
         let serve = |socket, connection: Arc<Connection>, place| {
             let link = link::Link::new(socket, Arc::clone(&connection), frames);
             let calls = calls::Calls { routes: routes.clone(), connection, rules: Arc::clone(&rules) };
-            let serving = serving::serve(http.clone(), link, calls, deadlines, stop.clone());
+            let serving =
+                serving::serve(http.clone(), link, calls, self.turnstile.turns(), deadlines, stop.clone());
             let open = open.clone();
             tokio::spawn(async move {
                 serving.await;

@@ -21,8 +21,8 @@ use crate::metrics::Resource;
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
 /// Longest such pause.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// Time between two connections while all places are taken.
-const PACE: Duration = Duration::from_millis(10);
+/// Time between two connections while all places are taken, or after one ended by its peer's fault.
+const PACE: Duration = Duration::from_millis(50);
 /// Descriptors that are held for probes.
 const RESERVE: usize = 4;
 
@@ -119,7 +119,7 @@ pub async fn accept_all(
                         tracing::warn!(%peer, kind = kind.name(), %refused, "a connection was refused");
                     }
                 }
-                if kind == Resource::connections && accounts.is_full(kind) {
+                if kind == Resource::connections && (accounts.take_fault() || accounts.is_full(kind)) {
                     // whoever connects without end must not keep the thread
                     tokio::time::sleep(PACE).await;
                 } else {

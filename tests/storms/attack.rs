@@ -1,12 +1,12 @@
 //! What a bad neighbour sends: frames by hand (RFC 9113), since no client library sends such things.
 
 use std::io::{ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 const END_STREAM: u8 = 0x1;
@@ -156,7 +156,9 @@ impl Flood {
             Self::EmptyData => frame(0, 0, 1, &[]).repeat(1800),
             Self::Priority => frame(2, 0, 3, &[0, 0, 0, 1, 7]).repeat(1170),
             Self::Unknown => frame(0xf0, 0, 0, &[]).repeat(1800),
-            Self::Continuation => [frame(1, 0, next(), &[0x83]), frame(9, 0, *stream, &[]).repeat(1800)].concat(),
+            Self::Continuation => {
+                [frame(1, 0, next(), &[0x83]), frame(9, 0, *stream, &[]).repeat(1800)].concat()
+            }
             Self::Greeting => Vec::new(),
             Self::GetVehicle => {
                 let body = [text(1, "husky"), vec![2 << 3, 1]].concat();
@@ -229,13 +231,33 @@ pub fn cpu_ns() -> u64 {
     text.split_whitespace().next().and_then(|ns| ns.parse().ok()).expect("the first number")
 }
 
+/// A port that floods cost nothing: connections are accepted, and so many a second are closed.
+pub fn sink(closed_per_s: f64) -> Target {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("bound");
+    std::thread::spawn(move || {
+        let mut open = std::collections::VecDeque::new();
+        let mut due = Instant::now();
+        // until the last flood has gone, with the test
+        while let Ok((stream, _)) = listener.accept() {
+            open.push_back(stream);
+            if closed_per_s > 0.0 {
+                due = due.max(Instant::now()) + Duration::from_secs_f64(1.0 / closed_per_s);
+                std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                open.pop_front();
+            }
+        }
+    });
+    Target::Tcp(address)
+}
+
 /// Burns this share of a core in this many threads until `stop`, by writing to a socket of its own.
-pub fn burn(share: f64, stop: &AtomicBool) {
-    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+pub fn burn(share: f64, stop: &AtomicBool) -> u64 {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let mut sender = TcpStream::connect(listener.local_addr().expect("bound")).expect("connected");
     let (mut receiver, _) = listener.accept().expect("accepted");
     let (block, mut sink) = (vec![7; 16 << 10], vec![0; 16 << 10]);
-    let start = std::time::Instant::now();
+    let start = Instant::now();
     while !stop.load(Relaxed) {
         if (cpu_ns() as f64) < share * start.elapsed().as_nanos() as f64 {
             sender.write_all(&block).expect("sent");
@@ -244,6 +266,7 @@ pub fn burn(share: f64, stop: &AtomicBool) {
             std::thread::sleep(Duration::from_millis(1));
         }
     }
+    cpu_ns()
 }
 
 /// Connections that ask for vehicles and never read.

@@ -29,7 +29,7 @@ pub struct Connection {
     shaken: AtomicBool,
     called: AtomicBool,
     dear_calls: AtomicU32,
-    turns: AtomicU64,
+    stands_back: AtomicBool,
     closed: OnceLock<Closed>,
     closing: Notify,
 }
@@ -51,7 +51,7 @@ impl Connection {
             shaken: AtomicBool::new(false),
             called: AtomicBool::new(false),
             dear_calls: AtomicU32::new(0),
-            turns: AtomicU64::new(0),
+            stands_back: AtomicBool::new(false),
             closed: OnceLock::new(),
             closing: Notify::new(),
         }
@@ -70,6 +70,9 @@ impl Connection {
     /// Has the connection closed by the task that serves it; the first reason counts.
     pub fn close(&self, reason: Closed) {
         if self.closed.set(reason).is_ok() {
+            if matches!(reason, Closed::control_frames | Closed::broke_protocol) {
+                self.accounts.fault.store(true, Relaxed);
+            }
             self.accounts.metrics.count_closed(reason);
             tracing::debug!(peer = %self.peer, reason = reason.name(), "closing a connection");
         }
@@ -124,14 +127,14 @@ impl Connection {
         if self.dear_calls.load(Relaxed) == 0 { 0 } else { self.dear_calls.swap(0, Relaxed) }
     }
 
-    /// Notes that it is the connection's turn on the thread.
-    pub fn begins_turn(&self) {
-        self.turns.store(self.turns.load(Relaxed) + 1, Relaxed);
+    /// Notes whether the connection has had its turn on the thread, so that others go first.
+    pub fn set_stands_back(&self, stands_back: bool) {
+        self.stands_back.store(stands_back, Relaxed);
     }
 
-    /// How many turns it has had.
-    pub fn turns(&self) -> u64 {
-        self.turns.load(Relaxed)
+    /// Whether others go first.
+    pub fn stands_back(&self) -> bool {
+        self.stands_back.load(Relaxed)
     }
 
     /// Whether anything was ever asked.

@@ -99,9 +99,9 @@ impl Scanner {
     }
 }
 
-/// What a connection may cost before others get their turn, in the cost of a frame that carries nothing: about a tenth of
-/// a millisecond.
-const TURN: usize = 64;
+/// What a connection may cost before others get their turn, in the cost of a frame that carries nothing: three
+/// calls, or 50 microseconds.
+const TURN: usize = 32;
 /// What the beginning of a call costs.
 const CALL: usize = 8;
 /// Bytes that cost as much as a frame.

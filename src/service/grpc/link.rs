@@ -26,8 +26,6 @@ pub struct Link {
     pause: Option<Pin<Box<Sleep>>>,
     authority: Option<Authority>,
     turn: Turn,
-    /// Which turn that is: the library asks for bytes several times in each.
-    turns: u64,
     /// What was read of the socket and is not yet the library's: its turn is over before.
     ahead: Vec<u8>,
 }
@@ -45,7 +43,6 @@ impl Link {
             pause: None,
             authority,
             turn: Turn::default(),
-            turns: 0,
             ahead: Vec::new(),
         }
     }
@@ -132,13 +129,8 @@ impl AsyncRead for Link {
             ready!(pause.as_mut().poll(cx));
             self.pause = None;
         }
-        let turns = self.connection.turns();
-        if turns != self.turns {
-            (self.turns, self.turn) = (turns, Turn::default());
-        }
-        if self.turn.is_over() {
-            // the rest is read when the others have had theirs
-            cx.waker().wake_by_ref();
+        if self.connection.stands_back() {
+            // whoever polls the connection wakes it when the others have had their turn
             return Poll::Pending;
         }
         let before = buf.filled().len();
@@ -147,6 +139,10 @@ impl AsyncRead for Link {
             let noted = before + self.note_received(&mut buf.filled_mut()[before..]);
             self.ahead.splice(..0, buf.filled()[noted..].iter().copied());
             buf.set_filled(noted);
+            self.connection.set_stands_back(self.turn.is_over());
+        }
+        if polled.is_pending() || self.turn.is_over() {
+            self.turn = Turn::default();
         }
         polled
     }

@@ -1,7 +1,9 @@
 //! One connection from its handshake to its end: its deadlines, and a drain.
 
+use std::error::Error;
 use std::future::{Future, poll_fn};
 use std::sync::Arc;
+use std::task::ready;
 use std::time::{Duration, Instant};
 
 use hyper::server::conn::http2;
@@ -10,6 +12,7 @@ use tokio::sync::watch;
 
 use super::calls::Calls;
 use super::link::Link;
+use super::turns::Turns;
 use super::{Config, stopped};
 use crate::service::accounts::{Closed, Connection};
 
@@ -82,11 +85,18 @@ pub fn builder(config: &Config) -> http2::Builder<TokioExecutor> {
     builder
 }
 
+/// Whether it is the library that ended the connection: for its peer's fault.
+fn broke_protocol(error: &hyper::Error) -> bool {
+    let cause = error.source().and_then(|cause| cause.downcast_ref::<h2::Error>());
+    cause.is_some_and(h2::Error::is_library)
+}
+
 /// Serves one connection until it ends, is to be closed, or the server drains and its calls are answered.
 pub async fn serve(
     http: http2::Builder<TokioExecutor>,
     link: Link,
     calls: Calls,
+    mut turns: Turns,
     deadlines: Deadlines,
     stop: watch::Receiver<bool>,
 ) {
@@ -96,13 +106,20 @@ pub async fn serve(
     let mut look = tokio::time::interval_at((Instant::now() + LOOK).into(), LOOK);
     let (mut draining, mut goodbye) = (false, None);
     loop {
-        let turn = poll_fn(|cx| {
-            connection.begins_turn();
-            served.as_mut().poll(cx)
+        let served_turn = poll_fn(|cx| {
+            let _turn = ready!(turns.poll_turn(&connection, cx));
+            let polled = served.as_mut().poll(cx);
+            turns.end_turn(&connection, cx);
+            polled
         });
         tokio::select! {
-            // a client that breaks its own connection off is its own affair
-            _ = turn => return,
+            ended = served_turn => {
+                // a client that breaks its own connection off is its own affair
+                if ended.is_err_and(|error| broke_protocol(&error)) {
+                    connection.close(Closed::broke_protocol);
+                }
+                return;
+            }
             _ = connection.closing() => return,
             () = &mut stop, if !draining => {
                 draining = true;
