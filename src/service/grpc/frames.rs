@@ -278,6 +278,43 @@ mod tests {
     }
 
     #[test]
+    fn a_turn_ends_with_three_calls_or_one_empty_frame_and_not_with_a_query() {
+        let pieces = |heads: &[Head]| {
+            let mut turn = Turn::default();
+            for &head in heads {
+                turn.takes(Piece::Head(head), HEADER);
+                turn.takes(Piece::Payload(head), head.len);
+            }
+            turn.is_over()
+        };
+        let head = |kind, len| Head { len, kind, flags: 0 };
+        let call = [head(HEADERS, 90), head(DATA, 30)];
+        assert!(!pieces(&call) && pieces(&call.repeat(3)));
+        // a message of a stream that holds 20 states
+        assert!(!pieces(&[head(DATA, 3000)]));
+        assert!(pieces(&[head(DATA, 0)]));
+        // the end of a request
+        assert!(!pieces(&[Head { flags: END_STREAM, ..head(DATA, 0) }]));
+    }
+
+    #[test]
+    fn a_flood_of_empty_data_is_ended_by_us_before_the_library_would() {
+        let start = Instant::now();
+        let mut budget = Budget::new(200.0, start);
+        let (mut frames, mut now) = (0, start);
+        loop {
+            budget.received(Head { len: 0, kind: DATA, flags: 0 });
+            frames += 1;
+            match budget.judge(now) {
+                Verdict::Within => {}
+                Verdict::Pause(pause) => now += pause,
+                Verdict::Close => break,
+            }
+        }
+        assert!(now >= start + TOLERANCE && frames < 100, "{frames}");
+    }
+
+    #[test]
     fn requests_that_are_given_up_at_once_are_a_flood() {
         let start = Instant::now();
         let mut budget = Budget::new(100.0, start);

@@ -66,3 +66,80 @@ impl Turns {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+    use std::task::{Wake, Waker};
+
+    use super::*;
+    use crate::metrics::Metrics;
+    use crate::service::accounts::{Accounts, Limits, Peer};
+
+    #[derive(Default)]
+    struct Woken(AtomicUsize);
+
+    impl Wake for Woken {
+        fn wake(self: Arc<Self>) {
+            self.0.fetch_add(1, Relaxed);
+        }
+    }
+
+    struct Heavy {
+        turns: Turns,
+        connection: Arc<Connection>,
+        woken: Arc<Woken>,
+    }
+
+    impl Heavy {
+        /// Polled once: whether it was its turn, which it uses up.
+        fn polled(&mut self) -> bool {
+            self.woken.0.store(0, Relaxed);
+            let waker = Waker::from(Arc::clone(&self.woken));
+            let mut cx = Context::from_waker(&waker);
+            let Poll::Ready(_turn) = self.turns.poll_turn(&self.connection, &mut cx) else { return false };
+            self.connection.set_stands_back(true);
+            self.turns.end_turn(&self.connection, &mut cx);
+            true
+        }
+
+        fn is_woken(&self) -> bool {
+            self.woken.0.load(Relaxed) > 0
+        }
+    }
+
+    #[tokio::test]
+    async fn of_those_who_stand_back_one_at_a_time_goes_on_and_none_is_forgotten() {
+        let limits = Limits {
+            connections: 9,
+            http_connections: 9,
+            requests: 9,
+            streams: 9,
+            bytes: 9,
+            peer_share: 1.0,
+        };
+        let accounts = Accounts::new(&limits, Arc::new(Metrics::new()));
+        let turnstile = Turnstile::new();
+        let mut heavies = Vec::new();
+        for pid in 0..3 {
+            let (connection, _) =
+                accounts.open(Peer::Process(pid), crate::metrics::Resource::connections).await.expect("room");
+            heavies.push(Heavy { turns: turnstile.turns(), connection, woken: Arc::default() });
+        }
+        // the first turn is everybody's
+        assert!(heavies.iter_mut().all(Heavy::polled));
+        let mut had = [0; 3];
+        for _ in 0..30 {
+            let woken: Vec<_> = (0..3).filter(|&index| heavies[index].is_woken()).collect();
+            assert_eq!(woken.len(), 1, "one goes on in each round");
+            assert!(heavies[woken[0]].polled());
+            had[woken[0]] += 1;
+        }
+        assert_eq!(had, [10; 3]);
+        // one that waits and is polled for another reason waits on; one that has gone is passed over
+        let next = (0..3).find(|&index| heavies[index].is_woken()).expect("one");
+        assert!(!heavies[(next + 1) % 3].polled());
+        drop(heavies.remove(next));
+        assert_eq!(heavies.iter().filter(|heavy| heavy.is_woken()).count(), 1);
+    }
+}
