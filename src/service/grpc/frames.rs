@@ -99,13 +99,13 @@ impl Scanner {
     }
 }
 
-/// What a connection may cost before others get their turn, in the cost of a frame that carries nothing: three
-/// calls, or 50 microseconds.
+/// What a connection may cost before others get their turn, in the cost of a frame that carries nothing: three calls, or
+/// 50 microseconds.
 const TURN: usize = 32;
 /// What the beginning of a call costs.
 const CALL: usize = 8;
 /// Bytes that cost as much as a frame.
-const BYTES_A_FRAME: usize = 128;
+const BYTES_A_FRAME: usize = 512;
 
 /// What a connection has cost since it last stood back for others.
 #[derive(Debug, Default)]
