@@ -103,7 +103,7 @@ impl Scanner {
 /// 50 microseconds.
 const TURN: usize = 32;
 /// What the beginning of a call costs.
-const CALL: usize = 8;
+const CALL: usize = 10;
 /// Bytes that cost as much as a frame.
 const BYTES_A_FRAME: usize = 512;
 
