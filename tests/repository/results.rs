@@ -26,6 +26,7 @@ fn table(name: &str) -> String {
         "soak" => latency::soak(),
         "query" => latency::query(),
         "round trips" => latency::round_trips(),
+        "storms" => latency::storms(),
         "python" => latency::python(),
         "epoch" => latency::epoch(),
         "forces" => accuracy::forces(),

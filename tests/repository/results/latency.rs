@@ -134,6 +134,19 @@ pub fn round_trips() -> String {
     bench("latency.csv", ["subject", "p50_us", "p99_us", "p99_9_us", "max_us"])
 }
 
+/// A stream beside a bad neighbour, and beside one who asks another port.
+pub fn storms() -> String {
+    let (comments, rows) = csv(newest("storms.csv"));
+    let columns = ["attacker_percent", "p50_us", "p99_us", "control_p99_us", "probes_p99_us"];
+    let rows = rows.iter().map(|row| {
+        let cells = columns.map(|name| cell(row, name)).into_iter();
+        std::iter::once(row["subject"].clone()).chain(cells).collect()
+    });
+    let header =
+        ["storm", "attacker [% of a core]", "p50 [us]", "p99 [us]", "control p99 [us]", "probes p99 [us]"];
+    format!("Condition: {}.\n\n{}", condition(&comments), markdown(&header, rows.collect()))
+}
+
 pub fn python() -> String {
     let result = json(newest("python.json"));
     let machine = &result["machine"];
