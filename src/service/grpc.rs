@@ -14,7 +14,6 @@ mod turns;
 pub use convert::{added_mass, single};
 pub(super) use convert::{latency, summary, vehicle};
 pub(super) use handlers::{Call, answer_state};
-pub use inference::TensorFault;
 
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};

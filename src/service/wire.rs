@@ -1,15 +1,17 @@
 //! Checks on what comes from outside, the same for every transport, and the map from errors to gRPC status.
 
+mod tensor_fault;
+
 use nalgebra::UnitVector3;
 use tonic::Code;
 use tonic_types::{ErrorDetails, StatusExt};
 
+pub use self::tensor_fault::TensorFault;
 use super::accounts::Overloaded;
 use crate::condition::{Condition, FRESH_WATER, GroundContact};
 use crate::effects::Circumstances;
 use crate::engine::UnknownVehicle;
 use crate::frame::Vec3;
-use crate::service::grpc::TensorFault;
 
 /// A state as it travels: single precision, body frame, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]

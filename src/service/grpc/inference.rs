@@ -1,11 +1,8 @@
 //! The Open Inference Protocol: a vehicle as a model whose tensors are the arrays of a batch. The computation is the one
 //! of `EvaluateBatch`, so that the bits are the same.
 
-mod fault;
 mod inputs;
 mod outputs;
-
-pub use fault::TensorFault;
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -23,7 +20,7 @@ use crate::service::proto::inference::infer_parameter::ParameterChoice;
 use crate::service::proto::inference::model_metadata_response::TensorMetadata;
 use crate::service::proto::inference::repository_index_response::ModelIndex;
 use crate::service::proto::inference::*;
-use crate::service::wire::{Field, Refusal};
+use crate::service::wire::{Field, Refusal, TensorFault};
 use inputs::{INPUTS, shape, short};
 
 /// The state of a model that can be asked.
