@@ -118,16 +118,21 @@ impl Server {
 
     /// How many connections the server has closed.
     fn closed(&self) -> f64 {
-        let text = http_get(self.http, "/metrics").expect("answered");
-        let lines = text.lines().filter(|line| line.starts_with("wade_connections_closed_total"));
-        lines.filter_map(|line| line.rsplit(' ').next()?.parse::<f64>().ok()).sum()
+        self.metrics("wade_connections_closed_total").iter().sum()
     }
 
     fn metric(&self, name: &str) -> f64 {
+        self.metrics(name)[0]
+    }
+
+    /// The values of all metrics whose line begins like this; at least one.
+    fn metrics(&self, name: &str) -> Vec<f64> {
         let text = http_get(self.http, "/metrics").expect("answered");
-        let line = text.lines().find(|line| line.starts_with(name));
-        line.and_then(|line| line.rsplit(' ').next()?.parse().ok())
-            .unwrap_or_else(|| panic!("{name}: {text}"))
+        let lines = text.lines().filter(|line| line.starts_with(name));
+        let value = |line: &str| line.rsplit(' ').next()?.parse().ok();
+        let values: Vec<f64> = lines.map(|line| value(line).unwrap_or_else(|| panic!("{line}"))).collect();
+        assert!(!values.is_empty(), "{name}: {text}");
+        values
     }
 }
 
@@ -231,8 +236,8 @@ fn storm(name: &str, server: &Server, flood: Option<Flood>, attack: impl Fn() ->
     let [control, _] = measure(server, &mut client, seconds);
     let control_share = controlled.end() / start.elapsed().as_secs_f64();
     println!(
-        "{name}: attacker {:.0} % of a core, {closed:.0} connections closed; stream p50 {:.3} p99 {:.3} longest {:.1} ms, {} failed; \
-         control {:.0} % of a core, p99 {:.3} ms; \
+        "{name}: attacker {:.0} % of a core, {closed:.0} connections closed; \
+         stream p50 {:.3} p99 {:.3} longest {:.1} ms, {} failed; control {:.0} % of a core, p99 {:.3} ms; \
          probes p99 {:.1} longest {:.1} ms, {} failed; {memory:.0} MB",
         100.0 * share,
         stream.p50,

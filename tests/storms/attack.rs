@@ -238,7 +238,7 @@ pub fn sink(closed_per_s: f64) -> Target {
     std::thread::spawn(move || {
         let mut open = std::collections::VecDeque::new();
         let mut due = Instant::now();
-        // until the last flood has gone, with the test
+        // for ever: it ends with the tests
         while let Ok((stream, _)) = listener.accept() {
             open.push_back(stream);
             if closed_per_s > 0.0 {

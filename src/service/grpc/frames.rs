@@ -1,5 +1,6 @@
 //! The frames of an HTTP/2 connection by their headers alone (RFC 9113, section 4.1), and the budget for those that carry
-//! nothing: each costs the receiver a thousand times what it costs the sender, and no request comes of it.
+//! nothing: each costs the receiver a thousand times what it costs the sender, and no request comes of it. And what a
+//! connection may cost before others get their turn.
 
 use std::time::{Duration, Instant};
 
@@ -141,7 +142,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// A connection that has been over its budget for this long without a break is closed.
 const TOLERANCE: Duration = Duration::from_secs(10);
 /// What a frame of data costs that is empty and ends nothing.
-const EMPTY_DATA: f64 = -50.0;
+const EMPTY_DATA: f64 = 50.0;
 /// What a call costs that was refused, or that has the administrator's work done: whoever goes on asking is asked to wait.
 const DEAR_CALL: f64 = 10.0;
 /// Bytes of an answer that earn the receiver one frame, such as a WINDOW_UPDATE.
@@ -181,7 +182,7 @@ impl Budget {
             DATA if head.flags & END_STREAM != 0 => 0.0,
             HEADERS => 1.0,
             // the library ends a connection with its hundredth, and whoever floods would be back at once
-            _ if head.is_empty_data() => EMPTY_DATA,
+            _ if head.is_empty_data() => -EMPTY_DATA,
             // a request that is begun and given up costs the server the whole of it
             RST_STREAM => -4.0,
             _ => -1.0,
