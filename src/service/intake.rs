@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use nix::sys::socket::{setsockopt, sockopt};
+use rustix::net::sockopt::{set_socket_recv_buffer_size, set_socket_send_buffer_size};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 
@@ -52,8 +52,8 @@ pub enum Listener {
 pub fn listen_on_tcp(address: SocketAddr) -> io::Result<std::net::TcpListener> {
     let listener = std::net::TcpListener::bind(address)?;
     listener.set_nonblocking(true)?;
-    setsockopt(&listener, sockopt::RcvBuf, &SOCKET_BUFFER)?;
-    setsockopt(&listener, sockopt::SndBuf, &SOCKET_BUFFER)?;
+    set_socket_recv_buffer_size(&listener, SOCKET_BUFFER)?;
+    set_socket_send_buffer_size(&listener, SOCKET_BUFFER)?;
     Ok(listener)
 }
 
