@@ -19,10 +19,10 @@ use wade::client::{Client, GrpcClient, Method, ShmClient};
 use wade::config::Config;
 use wade::cores;
 use wade::server::{self, Running};
-use wade::service::proto;
-use wade::service::proto::hydrodynamics_client::HydrodynamicsClient;
-use wade::service::shm::Wait;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::proto;
+use wade::wire::proto::hydrodynamics_client::HydrodynamicsClient;
+use wade::wire::shm::Wait;
 
 const TIMEOUT: Duration = Duration::from_secs(5);
 

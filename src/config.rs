@@ -150,7 +150,12 @@ impl Config {
         let frames = grpc.control_frames_per_s;
         range((1.0..=1e6).contains(&frames), "grpc.control_frames_per_s", &frames, "1 to 1000000")?;
         let clients = self.shm.max_clients;
-        range((1..=shm::MAX_CLIENTS).contains(&clients), "shm.max_clients", &clients, "1 to 64")?;
+        range(
+            (1..=crate::wire::shm::MAX_CLIENTS).contains(&clients),
+            "shm.max_clients",
+            &clients,
+            "1 to 64",
+        )?;
         let namespace = &self.shm.namespace;
         let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
         let named = (1..=64).contains(&namespace.len()) && namespace.bytes().all(plain);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use arc_swap::ArcSwap;
 
 use crate::served::ServedVehicle;
+use crate::wire::UnknownVehicle;
 
 /// Longest name that an error repeats; no bundle's name is longer.
 const MAX_NAME: usize = 64;
@@ -17,16 +18,6 @@ pub type Vehicles = BTreeMap<String, Arc<ServedVehicle>>;
 #[derive(Debug, Default)]
 pub struct Engine {
     vehicles: ArcSwap<Vehicles>,
-}
-
-/// No vehicle of this name is served.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no vehicle named \"{name}\" is served; served: {served}")]
-pub struct UnknownVehicle {
-    /// The name asked for.
-    pub name: String,
-    /// The names served.
-    pub served: String,
 }
 
 impl Engine {

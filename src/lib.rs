@@ -36,10 +36,16 @@ pub mod bundle;
 pub mod model;
 pub mod served;
 
+pub mod wire;
+
 pub mod dataset;
 pub mod engine;
 pub mod metrics;
 pub mod trials;
+
+pub mod parameter_table;
+pub mod published;
+pub mod recordings;
 
 pub mod client;
 pub mod cores;

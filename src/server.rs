@@ -29,6 +29,7 @@ use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
 use crate::service::health::{Health, Part, State};
 use crate::service::http::{self, HttpError};
+use crate::service::{call, stopped};
 
 /// Longest time for answers over HTTP that are under way when everything else has ended.
 const HTTP_DRAIN: Duration = Duration::from_secs(1);
@@ -88,7 +89,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     ));
     let listeners = Arc::new(Listeners::bind(&config.grpc)?);
     let http_listener = http::bind(&config.http)?;
-    let shared = grpc::Shared {
+    let shared = call::Shared {
         engine: Arc::clone(&engine),
         metrics: Arc::clone(&metrics),
         reloader: Arc::clone(&reloader),
@@ -249,7 +250,7 @@ impl Running {
             work.block_on(async {
                 tokio::select! {
                     () = rotating => {}
-                    () = grpc::stopped(end) => {}
+                    () = stopped(end) => {}
                 }
             });
             work.shutdown_background();
@@ -264,7 +265,7 @@ impl Running {
                             tracing::error!(%error, "HTTP ended");
                         }
                     }
-                    None => grpc::stopped(stop).await,
+                    None => stopped(stop).await,
                 }
             });
             ended.send_replace(true);
@@ -362,7 +363,7 @@ async fn bounded<F: Future + Unpin>(
 ) -> Option<F::Output> {
     tokio::select! {
         output = &mut work => return Some(output),
-        () = grpc::stopped(stop) => {}
+        () = stopped(stop) => {}
     }
     tokio::time::timeout(bound, work).await.ok()
 }

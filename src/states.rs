@@ -3,8 +3,8 @@
 use serde::Deserialize;
 
 use crate::frame::up_from_roll_pitch;
-use crate::service::grpc::single;
-use crate::service::wire::State;
+use crate::wire::State;
+use crate::wire::single;
 
 /// Columns that describe a state.
 const STATE: [&str; 25] = [

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use common::{Numbers, Served, VEHICLES, comparable, served_vehicle};
 use wade::client::{InProcess, Reply};
-use wade::service::wire::State;
+use wade::wire::State;
 
 fn states(count: usize) -> Vec<State> {
     let mut numbers = Numbers::new(42);

@@ -16,8 +16,8 @@ use wade::dataset::split::{By, Split, SplitError, split};
 use wade::dataset::summary::Summary;
 use wade::dataset::{self, Dataset, Fault, Flaw, Image, MergeError, Meta, Rest, Sample, analytic};
 use wade::frame::{Vec3, up_from_roll_pitch};
+use wade::parameter_table::ParameterTable;
 use wade::random::Random;
-use wade::train::plan::Table;
 use wade::vehicle::{Vehicle, shipped};
 
 fn warthog() -> &'static Vehicle {
@@ -42,7 +42,7 @@ fn names(vehicle: &Vehicle) -> Vec<String> {
 fn data(cases: usize) -> Dataset {
     let mut random = Random::new(1);
     let mut samples = Vec::new();
-    for (vehicle, table) in [(husky(), Table::HUSKY), (warthog(), Table::WARTHOG)] {
+    for (vehicle, table) in [(husky(), ParameterTable::HUSKY), (warthog(), ParameterTable::WARTHOG)] {
         let steady = analytic::samples(vehicle, "paper", &table.latin_hypercube(cases, &mut random));
         samples.extend(steady.iter().cloned().map(|s| Sample { start_s: 2.0, end_s: 2.1, ..s }));
         samples.extend(steady.into_iter().map(|s| Sample { section: 1, start_s: 2.1, end_s: 2.2, ..s }));
@@ -163,7 +163,7 @@ fn by_pandas(name: &str) -> PathBuf {
 #[test]
 fn what_pandas_wrote_back_is_the_same_data_set() {
     let mut random = Random::new(4);
-    let states = Table::HUSKY.latin_hypercube(2, &mut random.fork());
+    let states = ParameterTable::HUSKY.latin_hypercube(2, &mut random.fork());
     let mut expected =
         rounded(Dataset { samples: analytic::samples(husky(), "paper", &states), ..data(1) }).samples;
     // its rows stand in reverse, and samples are in the order of their first row
@@ -407,7 +407,7 @@ fn a_depth_that_is_held_out_is_not_learnt() {
     let splits = split(&data, By::Depth { bins: 5 }, 1).unwrap();
     assert_eq!(splits.len(), 5);
     for (index, split) in splits.iter().enumerate() {
-        for (vehicle, table) in [("husky", Table::HUSKY), ("warthog", Table::WARTHOG)] {
+        for (vehicle, table) in [("husky", ParameterTable::HUSKY), ("warthog", ParameterTable::WARTHOG)] {
             let depths = |side: &[usize]| -> Vec<f64> {
                 let samples = side.iter().map(|&i| &data.samples[i]).filter(|s| s.vehicle == vehicle);
                 samples.map(|s| s.condition.depth).collect()

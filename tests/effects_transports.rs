@@ -14,8 +14,8 @@ use wade::bundle;
 use wade::client::{Client, InProcess, Method, Reply};
 use wade::effects::{Effect, LeftOut};
 use wade::model::kernel::Isa;
-use wade::service::shm::Wait;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::shm::Wait;
 
 fn states(count: usize) -> Vec<State> {
     let mut numbers = Numbers::new(7);
@@ -215,11 +215,11 @@ fn a_vehicle_with_effects_answers_as_the_library_does() {
 
 #[test]
 fn a_session_over_shared_memory_says_when_it_begins() {
-    use wade::service::shm_layout::SESSION_BEGINS;
+    use wade::wire::shm::layout::SESSION_BEGINS;
     let served = Served::start();
     let mut client = served.shm("husky", Wait::Block).in_session(3);
     let state = run(0.0)[0];
-    let begins = |answer: wade::service::shm_layout::Answer| answer.flags & SESSION_BEGINS != 0;
+    let begins = |answer: wade::wire::shm::layout::Answer| answer.flags & SESSION_BEGINS != 0;
     client.evaluate(&State { depth: f32::NAN, ..state }).expect_err("refused");
     assert!(begins(client.evaluate(&state).expect("answered")), "a query that was refused begins nothing");
     assert!(!begins(client.evaluate(&state).expect("answered")));

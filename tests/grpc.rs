@@ -13,8 +13,8 @@ use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 use tonic_types::StatusExt;
 use wade::client::{GrpcClient, Method};
-use wade::service::proto;
-use wade::service::proto::hydrodynamics_client::HydrodynamicsClient;
+use wade::wire::proto;
+use wade::wire::proto::hydrodynamics_client::HydrodynamicsClient;
 
 fn runtime() -> tokio::runtime::Runtime {
     tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime")
@@ -477,12 +477,12 @@ fn an_administrators_call_over_tcp_is_refused_with_the_way_out_and_answered_on_t
     assert!(refused.contains(&socket) && refused.contains("grpc.admin_over_tcp"), "{refused}");
     let reloaded = wade::client::reload(&socket, husky(), PATIENCE).expect("answered");
     assert_eq!((reloaded.len(), reloaded[0].refusal.as_str()), (1, ""));
-    let unload = wade::service::proto::inference::RepositoryModelUnloadRequest {
+    let unload = wade::wire::proto::inference::RepositoryModelUnloadRequest {
         model_name: "husky".into(),
         ..Default::default()
     };
     runtime().block_on(async {
-        use wade::service::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
+        use wade::wire::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
         let mut inference = GrpcInferenceServiceClient::new(channel(&served).await);
         let status = inference.repository_model_unload(unload).await.expect_err("refused");
         assert_eq!(status.code(), Code::PermissionDenied);

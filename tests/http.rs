@@ -18,7 +18,7 @@ use http::{Answer, get, post, send};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use wade::client::{Client, GrpcClient, Method};
-use wade::service::wire::State;
+use wade::wire::State;
 
 fn address(served: &Served) -> SocketAddr {
     served.running.http_address().expect("HTTP is on")

@@ -10,11 +10,11 @@ use tonic::transport::Channel;
 use tonic::{Code, Status};
 use tonic_types::StatusExt;
 use wade::client::{Client, ClientError, Method, Reply};
-use wade::service::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
-use wade::service::proto::inference::infer_parameter::ParameterChoice;
-use wade::service::proto::inference::model_infer_request::{InferInputTensor, InferRequestedOutputTensor};
-use wade::service::proto::inference::*;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
+use wade::wire::proto::inference::infer_parameter::ParameterChoice;
+use wade::wire::proto::inference::model_infer_request::{InferInputTensor, InferRequestedOutputTensor};
+use wade::wire::proto::inference::*;
 
 type Inference = GrpcInferenceServiceClient<Channel>;
 
@@ -400,7 +400,7 @@ fn an_administrator_loads_and_unloads() {
         let ready = VEHICLES.map(|vehicle| format!("{vehicle} {} READY", version(vehicle)));
         assert_eq!(index(&mut inference, false).await, ready);
         let state = State { depth: 0.1, ..State::default() };
-        let mut shm = served.shm("husky", wade::service::shm::Wait::Block);
+        let mut shm = served.shm("husky", wade::wire::shm::Wait::Block);
         shm.evaluate(&state).expect("answered");
         inference.repository_model_unload(unload("husky")).await.expect("unloaded");
         // a client whose ports are open hears of it, alone and in a batch

@@ -12,9 +12,9 @@ use hdrhistogram::Histogram;
 use tempfile::TempDir;
 use wade::bundle;
 use wade::client::{ClientError, Method};
-use wade::service::proto;
-use wade::service::shm::Wait;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::proto;
+use wade::wire::shm::Wait;
 
 fn state() -> State {
     State { depth: 0.15, velocity: [0.5, 0.0, 0.0], ..State::default() }

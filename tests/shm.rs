@@ -14,13 +14,13 @@ use iceoryx2::prelude::ipc;
 use process::{Process, state, until_answered};
 use tempfile::TempDir;
 use wade::client::{ClientError, ShmClient};
-use wade::service::shm::Wait;
-use wade::service::shm_layout::{
+use wade::wire::shm::Wait;
+use wade::wire::shm::layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, HAS_BED, HAS_BED_CLEARANCE, HAS_HEADING, HAS_WATER_LEVEL,
     HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, MAX_BATCH, MAX_WHEELS, Names, Query, SERVER_POLLS, Status,
     SurfaceAnswer,
 };
-use wade::service::wire::{Field, InvalidState, Problem};
+use wade::wire::{Field, InvalidState, Problem};
 
 #[test]
 fn a_living_client_finds_a_killed_and_restarted_server_again() {

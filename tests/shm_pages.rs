@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::mem::offset_of;
 use std::path::PathBuf;
 
-use wade::service::shm_layout::{
+use wade::wire::shm::layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, EffectAnswer, MAX_BATCH, MAX_EFFECTS, MAX_QUANTITIES,
     MAX_WHEELS, Query, Status, SurfaceAnswer,
 };

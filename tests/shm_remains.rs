@@ -17,8 +17,8 @@ use iceoryx2::prelude::{AttributeSpecifier, MessagingPattern, Service as _, ipc}
 use process::{Process, state, until_answered};
 use tempfile::TempDir;
 use wade::client::{ClientError, ShmClient};
-use wade::service::shm::Wait;
-use wade::service::shm_layout::{Names, SERVED_LAYOUT, SERVED_VEHICLES};
+use wade::wire::shm::Wait;
+use wade::wire::shm::layout::{Names, SERVED_LAYOUT, SERVED_VEHICLES};
 
 /// From here on this process and its children have an iceoryx2 of their own, in which nobody else cleans up.
 struct OwnIceoryx {

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use attack::{Attack, Flood, Target, Wire};
 use tempfile::TempDir;
 use wade::client::{GrpcClient, Method};
-use wade::service::wire::State;
+use wade::wire::State;
 
 /// No test is about this time.
 const PATIENCE: Duration = Duration::from_secs(60);

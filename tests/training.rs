@@ -14,15 +14,15 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use wade::bundle;
 use wade::condition::{Condition, GroundContact};
+use wade::dataset::label::{labels, order};
 use wade::dataset::split::{By, Split, split};
 use wade::dataset::{self, Dataset, Image, Rest, SurfaceLoad};
 use wade::features;
 use wade::forces::Forces;
 use wade::frame::{GRAVITY, Vec3};
 use wade::model::{Model, Workspace, kernel::Isa};
+use wade::parameter_table::ParameterTable;
 use wade::train::checkpoint::Checkpoint;
-use wade::train::label::{labels, order};
-use wade::train::plan::Table;
 use wade::train::report::Record;
 use wade::train::samples::samples;
 use wade::train::task::Task;
@@ -78,7 +78,7 @@ fn reports_each_vehicle_with_its_domain_and_error() {
     let trained = run(&Config { epochs: 1, ..short() });
     let names: Vec<_> = trained.vehicles.iter().map(|v| v.name.as_str()).collect();
     assert_eq!(names, ["husky", "warthog"]);
-    for (vehicle, table) in trained.vehicles.iter().zip([Table::HUSKY, Table::WARTHOG]) {
+    for (vehicle, table) in trained.vehicles.iter().zip([ParameterTable::HUSKY, ParameterTable::WARTHOG]) {
         // 4 cases with four images; of the Warthog, which is not symmetric, 8 with two
         assert_eq!(vehicle.score.samples, 16);
         assert!(trained.learnt.rms[&vehicle.name].iter().all(|rms| rms.is_finite() && *rms > 0.0));

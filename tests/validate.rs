@@ -11,12 +11,10 @@ use serde_json::Value;
 use tempfile::TempDir;
 use wade::condition::Condition;
 use wade::frame::Vec3;
+use wade::recordings::{Kinematics, MocapConfig, Recording, Recordings, Rig, generated};
 use wade::signal::FilterError;
 use wade::trials::Trials;
-use wade::validate::{
-    self, Config, Kinematics, MocapConfig, NotPlanar, PlanarConfig, Prediction, Recording, Recordings, Rig,
-    ValidateError, generated,
-};
+use wade::validate::{self, Config, NotPlanar, PlanarConfig, Prediction, ValidateError};
 use wade::vehicle::Vehicle;
 
 fn warthog() -> Vehicle {

@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use std::sync::LazyLock;
 use wade::effects::Session;
 use wade::served::ServedVehicle;
-use wade::service::Evaluator;
-use wade::service::wire::State;
+use wade::wire::Evaluator;
+use wade::wire::State;
 
 static HUSKY: LazyLock<ServedVehicle> = LazyLock::new(|| served_with("husky", every_effect("husky")));
 
@@ -23,7 +23,7 @@ fn vector(scale: f32) -> impl Strategy<Value = [f32; 3]> {
 
 fn direction() -> impl Strategy<Value = [f32; 3]> {
     let unit = (-3.2_f64..3.2, -3.2_f64..3.2).prop_map(|(roll, pitch)| {
-        wade::service::grpc::single(&-wade::frame::up_from_roll_pitch(roll, pitch).into_inner())
+        wade::wire::single(&-wade::frame::up_from_roll_pitch(roll, pitch).into_inner())
     });
     prop_oneof![6 => unit, 2 => Just([0.0, 0.0, -1.0]), 1 => vector(1.0)]
 }
@@ -53,7 +53,7 @@ proptest! {
             Ok(evaluated) => {
                 let forces = evaluated.forces;
                 let effects = evaluated.effects;
-                let single = |v: &wade::frame::Vec3| wade::service::grpc::single(v).iter().all(|x| x.is_finite());
+                let single = |v: &wade::frame::Vec3| wade::wire::single(v).iter().all(|x| x.is_finite());
                 prop_assert!(single(&forces.wrench.force) && single(&forces.wrench.moment), "{forces:?}");
                 prop_assert!(forces.surfaces.iter().all(|load| single(&load.force) && single(&load.point)));
                 prop_assert!(single(&forces.uncertainty));

@@ -12,7 +12,7 @@ use super::case::{SECTIONS_BEFORE_S, Settings};
 use crate::condition::{Condition, GroundContact};
 use crate::files::{hexadecimal, write_whole};
 use crate::frame::{Vec3, up_from_roll_pitch};
-use crate::train::plan::Table;
+use crate::parameter_table::ParameterTable;
 use crate::vehicle::Vehicle;
 
 /// File of the settings.
@@ -189,7 +189,7 @@ pub struct Campaign {
     /// SHA-256 of its hull and surfaces, so that a vehicle that changed since is noticed.
     pub hull_sha256: String,
     /// The table that the plan covers.
-    pub table: Table,
+    pub table: ParameterTable,
     /// How every case is computed.
     #[serde(default)]
     pub settings: Settings,
@@ -472,7 +472,7 @@ pub(super) fn empty() -> Plan {
         format: FORMAT,
         vehicle: "warthog".into(),
         hull_sha256: String::new(),
-        table: Table::WARTHOG,
+        table: ParameterTable::WARTHOG,
         settings: Settings::default(),
     };
     Plan { campaign, cases: Vec::new() }

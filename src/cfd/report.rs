@@ -18,8 +18,8 @@ use crate::dataset::summary::Summary;
 use crate::domain::Range;
 use crate::frame::Vec3;
 use crate::page::PlotError;
+use crate::published::{self, PaperDepth};
 use crate::signal;
-use crate::validate::paper::{self, PaperDepth};
 use crate::vehicle::Vehicle;
 
 /// Water that may be lost before a case looks odd, as a share of what went in.
@@ -284,14 +284,15 @@ fn at_rest(vehicle: &Vehicle, case: &CaseSummary) -> AtRest {
 }
 
 fn head_on(vehicle: &Vehicle, case: &CaseSummary) -> HeadOn {
-    let is_the_papers =
-        |depth: &&PaperDepth| vehicle.name == paper::VEHICLE && (depth.depth_m - case.depth_m).abs() < 1e-3;
+    let is_the_papers = |depth: &&PaperDepth| {
+        vehicle.name == published::VEHICLE && (depth.depth_m - case.depth_m).abs() < 1e-3
+    };
     HeadOn {
         id: case.id.clone(),
         depth_m: case.depth_m,
         speed_mps: case.speed_mps,
         c: -case.fx_n / case.speed_mps.powi(2),
-        paper_c: paper::DEPTHS.iter().find(is_the_papers).map(|depth| depth.c_d_eff),
+        paper_c: published::DEPTHS.iter().find(is_the_papers).map(|depth| depth.c_d_eff),
     }
 }
 

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::plan::{Bed, Case, Plan, PlanError, Set};
 use crate::domain::Range;
+use crate::parameter_table::ParameterTable;
 use crate::random::Random;
-use crate::train::plan::Table;
 
 impl Plan {
     /// Adds cases of a set; no name and no state is repeated, and the earlier ones stay as they are.
@@ -89,7 +89,7 @@ impl Plan {
     /// neither drag nor waves hide what the acceleration does: below Fr_h = 1 at every depth, the last four below the speed at
     /// which a channel chokes, within 60 degrees of ahead.
     fn surges(&self) -> Vec<Case> {
-        let Table { speed_mps, depth_m, .. } = self.campaign.table;
+        let ParameterTable { speed_mps, depth_m, .. } = self.campaign.table;
         let depth = |share: f64| depth_m.min + share * (depth_m.max - depth_m.min);
         let (slow, fast) = (0.25 * speed_mps.max, 0.5 * speed_mps.max);
         let moving = [
@@ -153,7 +153,7 @@ impl Plan {
     /// Straight ahead at quarters of the highest speed: what the checks leave out at their depths, and all of it at
     /// three depths between and above them.
     fn ahead(&self) -> Vec<Case> {
-        let Table { speed_mps, depth_m, .. } = self.campaign.table;
+        let ParameterTable { speed_mps, depth_m, .. } = self.campaign.table;
         let depth = |share: f64| depth_m.min + share * (depth_m.max - depth_m.min);
         let between = [1.0 / 6.0, 0.75, 1.0].map(|share| (depth(share), [0.25, 0.5, 0.75, 1.0].as_slice()));
         let checked = self.trial_depths().map(|depth| (depth, [0.75, 1.0].as_slice()));
@@ -181,12 +181,12 @@ fn coordinates(case: &Case) -> [f64; 6] {
 const ZERO: Range = Range { min: 0.0, max: 0.0 };
 
 /// Speed, heading, depth, density, roll, pitch; a flow angle of 90 degrees is a heading of 0.
-fn paper_ranges(table: &Table) -> [Range; 6] {
+fn paper_ranges(table: &ParameterTable) -> [Range; 6] {
     let heading = Range { min: 90.0 - table.angle_deg.max, max: 90.0 - table.angle_deg.min };
     [table.speed_mps, heading, table.depth_m, table.density_kgpm3, ZERO, ZERO]
 }
 
-fn wide_ranges(table: &Table, float_depth: f64) -> [Range; 6] {
+fn wide_ranges(table: &ParameterTable, float_depth: f64) -> [Range; 6] {
     let speed = Range { min: 0.0, max: table.speed_mps.max };
     let heading = Range { min: 0.0, max: 180.0 };
     let depth = Range { min: table.depth_m.min, max: table.depth_m.max.max(float_depth) };

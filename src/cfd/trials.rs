@@ -17,11 +17,10 @@ use super::mesh::Channel;
 use super::placement::Placement;
 use super::plan::{Plan, Set};
 use crate::condition::{Condition, GroundContact};
+use crate::dataset::label::{OtherSurfaces, labels, order};
 use crate::dataset::{Dataset, Image, Sample};
 use crate::effects;
 use crate::frame::{GRAVITY, Vec3};
-use crate::train::TrainError;
-use crate::train::label::{labels, order};
 use crate::trials::{Columns, Manifest, Measured, Method, SIMULATED, SimIs, WHEELS, WRENCH};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
@@ -48,7 +47,7 @@ pub enum CaseTrialsError {
     NoTwins,
     /// Surfaces that are not the vehicle's.
     #[error(transparent)]
-    Surfaces(#[from] TrainError),
+    Surfaces(#[from] OtherSurfaces),
     /// A load without a moment.
     #[error("case `{case}` has no moments, which a wrench about the center of mass needs")]
     NoMoments {

@@ -506,6 +506,6 @@ mod tests {
             toml::Table::try_from(value).expect("a table")
         }
         assert_eq!(toml::from_str(SETTINGS), Ok(table(&Settings::default())));
-        assert_eq!(toml::from_str(TABLE), Ok(table(&train::plan::Table::WARTHOG)));
+        assert_eq!(toml::from_str(TABLE), Ok(table(&wade::parameter_table::ParameterTable::WARTHOG)));
     }
 }

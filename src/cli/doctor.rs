@@ -15,8 +15,8 @@ use wade::config::Config;
 use wade::cores;
 use wade::model::kernel::Isa;
 use wade::service::occupant::{self, Occupant};
-use wade::service::shm::Wait;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::shm::Wait;
 
 use super::{PROGRAM, Vehicles, emit};
 

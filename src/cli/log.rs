@@ -11,7 +11,7 @@ use wade::bundle::Library;
 use wade::config::{Config, Log};
 use wade::server::Running;
 use wade::service::health::{Part, State};
-use wade::service::shm::Wait;
+use wade::wire::shm::Wait;
 
 use super::log_limit::Limit;
 

@@ -10,9 +10,9 @@ use wade::effects::Session;
 use wade::files::StagedFile;
 use wade::frame::Vec3;
 use wade::model::Model;
-use wade::service::wire::State;
-use wade::service::{Evaluated, Evaluator};
 use wade::states::{Row, unknown_columns};
+use wade::wire::State;
+use wade::wire::{Evaluated, Evaluator};
 
 use super::{Vehicles, outside};
 

@@ -10,9 +10,9 @@ use wade::client::{Address, Client, GrpcClient, InProcess, Method, Reply, ShmCli
 use wade::domain::Domain;
 use wade::model::Model;
 use wade::service::answer::Answer;
-use wade::service::proto::EvaluateResponse;
-use wade::service::shm::Wait;
 use wade::service::{grpc, shm};
+use wade::wire::proto::EvaluateResponse;
+use wade::wire::shm::Wait;
 
 use super::state::StateArgs;
 use super::{Vehicles, emit, outside, usage_error};

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use wade::client::{Address, AddressError, ClientError, reload};
-use wade::service::proto::ReloadRequest;
+use wade::wire::proto::ReloadRequest;
 
 /// Longest wait for a server that may not be there.
 const TIMEOUT: Duration = Duration::from_secs(10);

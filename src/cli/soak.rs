@@ -12,9 +12,9 @@ use clap::{Args, Subcommand, ValueEnum};
 use wade::client::{Address, Client, ClientError, GrpcClient, InProcess, Method, ShmClient};
 use wade::cores;
 use wade::domain::{Domain, Range};
-use wade::service::shm::Wait;
-use wade::service::wire::State;
 use wade::soak::{self, Ask, Clients, Config, Input, Rate, Report, SendError, Slo};
+use wade::wire::State;
+use wade::wire::shm::Wait;
 
 use super::progress::soak_bar;
 use super::soak_server::{Server, Wanted};

@@ -7,8 +7,8 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use anyhow::{Context, Result, bail};
 use tempfile::TempDir;
 use wade::client::Address;
-use wade::service::shm::Wait;
 use wade::service::{grpc, shm};
+use wade::wire::shm::Wait;
 
 use super::Vehicles;
 use super::soak::Transport;

@@ -3,8 +3,8 @@
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use wade::frame::up_from_roll_pitch;
-use wade::service::grpc::single;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::single;
 
 /// The state of the vehicle, SI units, radians, body frame (x forward, y left, z up).
 #[derive(Debug, Args)]

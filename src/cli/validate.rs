@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::{ArgGroup, Args};
 use wade::model::Model;
+use wade::recordings::{Recordings, generated};
 use wade::trials::Trials;
-use wade::validate::{self, Config, OutFolder, Recordings, Report, Source, Subject, generated};
+use wade::validate::{self, Config, OutFolder, Report, Source, Subject};
 
 use super::{Vehicles, emit};
 

@@ -10,9 +10,9 @@ use super::grpc_link::GrpcLink;
 use super::{ClientError, EffectReply, Reply, SurfaceReply, nobody_at};
 use crate::domain::{Domain, Outside, Quantity, Range};
 use crate::effects::{BoxQuantity, Effect, LeftOut, OutsideBox};
-use crate::service::proto;
-use crate::service::proto::admin_client::AdminClient;
-use crate::service::wire::State;
+use crate::wire::State;
+use crate::wire::proto;
+use crate::wire::proto::admin_client::AdminClient;
 
 /// How single queries are sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

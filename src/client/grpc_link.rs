@@ -9,9 +9,9 @@ use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::grpc::{batch_message, message, shared};
 use super::{ClientError, nobody_at};
-use crate::service::proto;
-use crate::service::proto::hydrodynamics_client::HydrodynamicsClient;
-use crate::service::wire::State;
+use crate::wire::State;
+use crate::wire::proto;
+use crate::wire::proto::hydrodynamics_client::HydrodynamicsClient;
 
 /// A connection, and the stream that was opened on it.
 #[derive(Debug)]

@@ -19,9 +19,9 @@ use tonic::Code;
 use crate::domain::Outside;
 use crate::effects::{Effect, LeftOut, OutsideBox, Session};
 use crate::served::ServedVehicle;
-use crate::service::grpc::{added_mass, single};
-use crate::service::wire::{InvalidState, State};
-use crate::service::{Evaluated, Evaluator};
+use crate::wire::{Evaluated, Evaluator};
+use crate::wire::{InvalidState, State};
+use crate::wire::{added_mass, single};
 
 /// Why a call got no forces.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -7,11 +7,11 @@ use tonic::Code;
 use super::shm_link::{Lost, ShmLink, not_served};
 use super::{ClientError, EffectReply, Reply, SurfaceReply};
 use crate::effects::{Effect, LeftOut};
-use crate::service::shm::{self, Wait};
-use crate::service::shm_layout::{
+use crate::wire::State;
+use crate::wire::shm::layout::{
     Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query, Status, SurfaceAnswer,
 };
-use crate::service::wire::State;
+use crate::wire::shm::{self, Wait};
 
 /// A client of one vehicle, owned by one thread.
 #[derive(Debug)]

@@ -17,12 +17,11 @@ use iceoryx2::service::Service as _;
 use tonic::Code;
 
 use super::ClientError;
-use crate::service::shm::{self, OpenError, ShmError, Wait};
-use crate::service::shm_layout::{
+use crate::wire::shm::layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, Names, Query, SERVER_POLLS, VERSION, wake_name,
 };
-use crate::service::shm_room;
-use crate::service::shm_served::{self, Served};
+use crate::wire::shm::served::{self, Served};
+use crate::wire::shm::{self, OpenError, ShmError, Wait, room};
 
 /// A link may be opened by one thread and used by another.
 type Ipc = ipc_threadsafe::Service;
@@ -76,7 +75,7 @@ impl ShmLink {
             return Err(why_not(names, vehicle));
         }
         // a page without memory behind it would end the program by SIGBUS when it is first written
-        shm_room::check_client().map_err(|error| ClientError::Refused {
+        room::check_client().map_err(|error| ClientError::Refused {
             code: Code::ResourceExhausted,
             message: error.to_string(),
         })?;
@@ -129,7 +128,7 @@ impl ShmLink {
         self.until(deadline, asked, |answer| (answer.flags, take(answer)))
     }
 
-    /// Asks for the forces in the states of a batch: those of `queries` after the first [`MAX_BATCH`](crate::service::shm_layout::MAX_BATCH) are left out.
+    /// Asks for the forces in the states of a batch: those of `queries` after the first [`MAX_BATCH`](crate::wire::shm::layout::MAX_BATCH) are left out.
     pub fn ask_batch(
         &mut self,
         queries: impl Iterator<Item = Query>,
@@ -220,7 +219,7 @@ where
 
 /// The reason why there is no server for a vehicle: what the one of this namespace tells of itself.
 fn why_not(names: &Names, vehicle: &str) -> ClientError {
-    match shm_served::served::<Ipc>(names) {
+    match served::served::<Ipc>(names) {
         Some(Served { layout, .. }) if layout != VERSION => {
             ClientError::Layout { expected: VERSION.into(), found: layout }
         }
@@ -237,7 +236,7 @@ fn why_not(names: &Names, vehicle: &str) -> ClientError {
 
 /// The error of a vehicle that was unloaded while its ports stayed open.
 pub(super) fn not_served(names: &Names, vehicle: &str) -> ClientError {
-    let told = shm_served::served::<Ipc>(names);
+    let told = served::served::<Ipc>(names);
     let mut served = told.map(|served| served.vehicles).unwrap_or_default();
     // the list may be a moment old
     served.retain(|served| served != vehicle);

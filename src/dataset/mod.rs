@@ -3,7 +3,7 @@
 //! Body frame FLU, SI units. A *case* is one run of a solver; a *sample* is the average over one section of its
 //! history, or a mirror image of that. Reading order: `check` (what holds for every data set), `schema`, `file`, `encode`
 //! and `decode` (Parquet), `history` and `sections` (force histories and their averages), `openfoam` and `fluent` (the solvers'
-//! files), `case` and `import` (a folder of cases), `mirror` (augmentation), `split`, `merge`, `analytic`, `summary`, `page`.
+//! files), `case` and `import` (a folder of cases), `label` (loads with the hull's own hydrostatics), `mirror` (augmentation), `split`, `merge`, `analytic`, `summary`, `page`.
 
 pub mod analytic;
 pub mod case;
@@ -14,6 +14,7 @@ mod file;
 pub mod fluent;
 pub mod history;
 pub mod import;
+pub mod label;
 mod lines;
 mod merge;
 pub mod mirror;

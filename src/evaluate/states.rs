@@ -2,8 +2,8 @@
 
 use crate::condition::Condition;
 use crate::dataset::Image;
+use crate::dataset::label::{Label, labels, order};
 use crate::frame::Vec3;
-use crate::train::label::{Label, labels, order};
 use crate::train::samples::Sample;
 use crate::train::{Source, TrainError};
 use crate::vehicle::Vehicle;

@@ -61,7 +61,7 @@ impl NoiseKind {
 
 /// Standard deviation of one sample of a load cell [N, N m]: chosen, 0.5 % of a range of 600 N and 150 N m.
 pub(super) const CELL: [f64; 6] = [3.0, 3.0, 4.0, 0.8, 0.8, 0.8];
-/// Standard deviation of a place solved from four markers of 0.6 mm [m]; see `validate::generated::cameras`.
+/// Standard deviation of a place solved from four markers of 0.6 mm [m]; see `recordings::generated::cameras`.
 const PLACE: f64 = 0.3e-3;
 /// Standard deviation of an attitude solved from them, roll, pitch, yaw [rad].
 const ATTITUDE: [f64; 3] = [2.0e-3, 1.5e-3, 1.2e-3];

@@ -3,7 +3,7 @@
 use super::profile::Profile;
 use super::track::{Motion, Track, of_run};
 use crate::random::Random;
-use crate::validate::generated::{self, Run};
+use crate::recordings::generated::{self, Run};
 use crate::vehicle::Vehicle;
 
 /// One way of moving.

@@ -4,7 +4,7 @@ use super::Wrench6;
 use super::profile::Profile;
 use crate::condition::{Condition, GroundContact};
 use crate::frame::{Vec3, up_from_roll_pitch};
-use crate::validate::generated::{Motion as RunMotion, Run};
+use crate::recordings::generated::{Motion as RunMotion, Run};
 
 /// Density of the water of all generated trials [kg/m3].
 pub(super) const DENSITY: f64 = 1000.0;

@@ -20,7 +20,7 @@ use crate::service::shm::{Opening, ShmServer};
 use crate::service::shm_owner::Owner;
 use crate::service::shm_probe::{Own, Probe};
 use crate::service::shm_remains::{self, Remains, ServiceFiles};
-use crate::service::shm_room;
+use crate::wire::shm::room;
 
 /// How often requests are reported.
 const REPORT: Duration = Duration::from_millis(100);
@@ -85,7 +85,7 @@ impl Worker {
             load(&reloader, vehicle);
         }
         let mut owner = Owner::new(&config.shm.namespace, server).unwrap_or_else(|error| unavailable(&error));
-        shm_room::check(vehicles.len()).unwrap_or_else(|error| unavailable(&error));
+        room::check(vehicles.len()).unwrap_or_else(|error| unavailable(&error));
         let former: Vec<u32> = former.into_iter().chain(owner.former().iter().copied()).collect();
         for process in &former {
             shm_remains::remove_untold_of(*process);

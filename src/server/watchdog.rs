@@ -12,10 +12,10 @@ use tokio::sync::watch;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Status};
 
-use crate::service::grpc;
 use crate::service::health::{Health, Part, State};
-use crate::service::proto::ListVehiclesRequest;
-use crate::service::proto::hydrodynamics_client::HydrodynamicsClient;
+use crate::service::{grpc, stopped};
+use crate::wire::proto::ListVehiclesRequest;
+use crate::wire::proto::hydrodynamics_client::HydrodynamicsClient;
 
 /// How often the server is asked, and how long an answer may take.
 const ASK: Duration = Duration::from_secs(1);
@@ -38,7 +38,7 @@ impl Watchdog {
     pub(super) async fn run(self, stop: watch::Receiver<bool>) {
         tokio::select! {
             () = self.ask_for_ever() => {}
-            () = grpc::stopped(stop) => {}
+            () = stopped(stop) => {}
         }
     }
 

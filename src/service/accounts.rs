@@ -17,6 +17,7 @@ use tokio::sync::Notify;
 
 pub use crate::metrics::Closed;
 use crate::metrics::{Metrics, Resource};
+use crate::wire::Overloaded;
 pub use connection::{Computing, Connection};
 pub use sent::Sent;
 
@@ -84,16 +85,6 @@ impl Limits {
             Resource::bytes => self.bytes,
         }
     }
-}
-
-/// Too much is held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{limit} are already in flight, {}", if *.of_peer { "the share of one client (grpc.peer_share)" } else { "the limit" })]
-pub struct Overloaded {
-    /// The limit.
-    pub limit: usize,
-    /// Whether it is that of one peer.
-    pub of_peer: bool,
 }
 
 /// What one peer holds.

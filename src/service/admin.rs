@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::bundle::{self, BundleError, Fault, Library, LibraryError};
-use crate::engine::{Engine, UnknownVehicle};
+use crate::engine::Engine;
 use crate::metrics::Metrics;
 use crate::model::kernel::Isa;
 use crate::served::ServedVehicle;
+use crate::wire::UnknownVehicle;
 
 /// No bundle to serve.
 #[derive(Debug, thiserror::Error)]

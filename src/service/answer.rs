@@ -5,9 +5,9 @@
 
 use serde::Serialize;
 
-use super::proto;
 use crate::domain::Quantity;
 use crate::effects::{BoxQuantity, Effect, LeftOut};
+use crate::wire::proto;
 
 /// The forces in one state, ready to be written.
 #[derive(Debug, Serialize)]

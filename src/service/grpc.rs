@@ -2,7 +2,6 @@
 
 mod authority;
 mod calls;
-mod convert;
 mod frames;
 mod handlers;
 mod inference;
@@ -10,10 +9,6 @@ mod link;
 mod serving;
 mod stream;
 mod turns;
-
-pub use convert::{added_mass, single};
-pub(super) use convert::{latency, summary, vehicle};
-pub(super) use handlers::{Call, answer_state};
 
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -33,16 +28,17 @@ use tonic_health::server::{HealthReporter, HealthService};
 
 use self::turns::Turnstile;
 use super::accounts::{Accounts, Connection};
-use super::admin::{Jobs, Reloader};
+use super::admin::Jobs;
+use super::call::Shared;
 use super::health::{Health, Part, State};
 use super::intake::{self, Listener};
-use super::proto::admin_server::AdminServer;
-use super::proto::hydrodynamics_server::HydrodynamicsServer;
-use super::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
-use super::wire::Refusal;
-use super::{occupant, proto};
-use crate::engine::Engine;
-use crate::metrics::{Metrics, Resource};
+use super::{occupant, stopped};
+use crate::metrics::Resource;
+use crate::wire::Refusal;
+use crate::wire::proto;
+use crate::wire::proto::admin_server::AdminServer;
+use crate::wire::proto::hydrodynamics_server::HydrodynamicsServer;
+use crate::wire::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
 
 /// Settings of the gRPC server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -222,19 +218,6 @@ const HEALTH_NAMES: [&str; 3] = ["", "wade.v1.Hydrodynamics", "inference.GRPCInf
 /// What a health check may ask about of shared memory.
 const HEALTH_OF_SHARED_MEMORY: &str = "wade.SharedMemory";
 
-/// What the handlers share.
-#[derive(Debug, Clone)]
-pub struct Shared {
-    /// The models.
-    pub engine: Arc<Engine>,
-    /// Where requests are counted.
-    pub metrics: Arc<Metrics>,
-    /// Reads bundles again when an administrator asks.
-    pub reloader: Arc<Reloader>,
-    /// Length of the latency window [s].
-    pub window_s: f64,
-}
-
 /// A server that is bound and whose limits are set: health says NOT_SERVING until [`Server::set_health`].
 #[derive(Debug)]
 pub struct Server {
@@ -404,10 +387,4 @@ fn name_the_size_limit(mut response: http::Response<Body>) -> http::Response<Bod
 /// The status of a message over the size limit.
 pub(super) fn size_limit(status: &Status) -> Status {
     Refusal::MessageTooLong { reason: status.message().to_owned() }.into()
-}
-
-/// Resolves when `stop` turns true.
-pub(crate) async fn stopped(mut stop: watch::Receiver<bool>) {
-    // an error means that the sender is gone, and with it the server
-    let _ = stop.wait_for(|&stop| stop).await;
 }

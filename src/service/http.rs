@@ -24,7 +24,7 @@ use tokio::sync::watch;
 use super::accounts::Accounts;
 use super::health::Health;
 use super::intake::{Listener, listen_on_tcp};
-use super::{grpc, occupant};
+use super::{call, occupant};
 use connections::Routes;
 use rejection::Rejection;
 
@@ -96,7 +96,7 @@ pub struct Shared {
     /// The settings.
     pub config: Config,
     /// What gRPC's handlers share: the models, the metrics.
-    pub grpc: grpc::Shared,
+    pub grpc: call::Shared,
     /// The account of everything that is held.
     pub accounts: Arc<Accounts>,
     /// Which transports answer.

@@ -3,7 +3,6 @@
 #![allow(unsafe_code)]
 
 use std::collections::HashMap;
-use std::mem::MaybeUninit;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
@@ -11,41 +10,27 @@ use std::time::{Duration, Instant};
 
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::identifiers::UniqueClientId;
-use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::node::Node;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::{ListenerKey, Notifier};
 use iceoryx2::port::server::Server;
-use iceoryx2::prelude::{
-    BackpressureStrategy, CallbackProgression, MessagingPattern, SignalHandlingMode, ZeroCopySend, ipc,
-};
-use iceoryx2::request_mut::RequestMut;
-use iceoryx2::request_mut_uninit::RequestMutUninit;
-use iceoryx2::service::Service;
-use iceoryx2::service::port_factory::{event, request_response};
+use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, MessagingPattern, ZeroCopySend, ipc};
+use iceoryx2::service::port_factory::event;
 use serde::{Deserialize, Serialize};
 
 use super::sessions::{CAPACITY, Sessions};
-use super::shm_layout::{
-    Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
-};
 use super::shm_probe::Own;
 use super::shm_remains::{self, Remains, ServiceFiles};
-use super::wire::{InvalidState, Refusal};
-use super::{Evaluator, nanoseconds_since, shm_served};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
 use crate::served::ServedVehicle;
-
-/// How the server waits for requests.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Wait {
-    /// Sleeps until a client wakes it.
-    #[default]
-    Block,
-    /// Polls without pause: the lowest latency, and a core of its own.
-    Spin,
-}
+use crate::wire::shm::layout::{
+    Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
+};
+use crate::wire::shm::{
+    Exchange, MAX_CLIENTS, NAMESPACE, ShmError, Wait, events, in_place, node, open, served as shm_served,
+};
+use crate::wire::{Evaluator, InvalidState, Refusal, nanoseconds_since};
 
 /// Settings of the shared-memory server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -76,12 +61,6 @@ impl Default for Config {
     }
 }
 
-/// The namespace unless configured otherwise.
-pub const NAMESPACE: &str = "wade";
-
-/// Most clients of all vehicles together: each has a place among those that wake and are woken.
-pub const MAX_CLIENTS: usize = 64;
-
 /// How long the server sleeps at most before it looks for a shutdown and for new vehicles.
 const HOUSEKEEPING: Duration = Duration::from_millis(50);
 
@@ -92,35 +71,6 @@ const ROUNDS_PER_YIELD: u32 = 1 << 12;
 
 /// Pause after a wait that failed, so that a lasting failure does not spin.
 const PAUSE: Duration = Duration::from_millis(1);
-
-/// The shared memory could not be set up.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("shared memory: cannot create {what}: {reason}")]
-pub struct ShmError {
-    /// Node, service or port.
-    pub what: String,
-    /// The reason that iceoryx2 gives.
-    pub reason: String,
-}
-
-impl ShmError {
-    pub(crate) fn new(what: impl Into<String>) -> impl FnOnce(&dyn std::fmt::Display) -> Self {
-        let what = what.into();
-        move |reason| Self { what, reason: reason.to_string() }
-    }
-}
-
-/// A node that leaves the signals to their owner.
-pub(crate) fn node<S: Service>() -> Result<Node<S>, ShmError> {
-    let config = shm_remains::config();
-    let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
-    builder.create::<S>().map_err(|error| {
-        let hint = "; its files lie in /tmp/iceoryx2 and /dev/shm and serve the one user who owns them";
-        ShmError::new("a node")(&format!("{error}{hint}"))
-    })
-}
-
-pub(crate) type Exchange<S, Q, A> = request_response::PortFactory<S, Q, (), A, ()>;
 
 /// Opens or creates a request-response service: what a dead client left behind is neither answered
 /// nor waited for.
@@ -153,49 +103,6 @@ where
             tracing::warn!(name, %error, "a living client keeps this service's former limits");
             Ok(open)
         })
-}
-
-/// Opens a service that a server has created.
-pub(crate) fn open<S, Q, A>(node: &Node<S>, name: &str) -> Result<Exchange<S, Q, A>, OpenError>
-where
-    S: Service,
-    Q: ZeroCopySend + std::fmt::Debug + 'static,
-    A: ZeroCopySend + std::fmt::Debug + 'static,
-{
-    use iceoryx2::service::builder::request_response::RequestResponseOpenError as Reason;
-    let failed = |reason: &dyn std::fmt::Display| OpenError::Failed(ShmError::new(name)(reason));
-    let service = name.try_into().map_err(|error| failed(&error))?;
-    node.service_builder(&service).request_response::<Q, A>().open().map_err(|error| match error {
-        Reason::DoesNotExist => OpenError::Absent,
-        Reason::IncompatibleRequestOrResponseType => OpenError::OtherTypes,
-        error => failed(&error),
-    })
-}
-
-/// Why a service could not be opened.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum OpenError {
-    /// Nobody has created it.
-    #[error("it does not exist")]
-    Absent,
-    /// What lies in it has another size or name.
-    #[error("it has other types")]
-    OtherTypes,
-    /// The system refused.
-    #[error(transparent)]
-    Failed(ShmError),
-}
-
-/// Opens or creates an event service.
-pub(crate) fn events<S: Service>(node: &Node<S>, name: &str) -> Result<event::PortFactory<S>, ShmError> {
-    let service = name.try_into().map_err(|error| ShmError::new(name)(&error))?;
-    let builder = node
-        .service_builder(&service)
-        .event()
-        .max_listeners(MAX_CLIENTS + 1)
-        .max_notifiers(MAX_CLIENTS + 1)
-        .max_nodes(96);
-    builder.open_or_create().map_err(|error| ShmError::new(name)(&error))
 }
 
 fn replacing(name: &str, error: &ShmError) {
@@ -578,13 +485,6 @@ impl Desk {
     }
 }
 
-/// A loaned slot as what it is to hold, so that a large message is written where it lies.
-pub(crate) fn in_place<T: Copy + ZeroCopySend>(slot: &mut MaybeUninit<T>) -> &mut T {
-    // SAFETY: callers pass slots of shared memory alone, which was zero when it was made. The shared types hold numbers,
-    // for which whatever a message before this one left is a value too.
-    unsafe { slot.assume_init_mut() }
-}
-
 /// Copies a value out of memory that another process may be changing, so that what was checked is what is used.
 fn copy<T: Copy + ZeroCopySend>(shared: &T) -> T {
     // SAFETY: the reference is valid; the shared types hold numbers alone, for which every bit pattern is a value, and
@@ -598,19 +498,6 @@ fn taken<R, E: std::fmt::Debug>(received: Result<Option<R>, E>) -> Option<R> {
         tracing::debug!(?error, "receiving over shared memory");
         None
     })
-}
-
-/// A request that was written [`in_place`].
-pub(crate) fn written<S, Q, A>(
-    slot: RequestMutUninit<S, MaybeUninit<Q>, (), A, ()>,
-) -> RequestMut<S, Q, (), A, ()>
-where
-    S: Service,
-    Q: Copy + ZeroCopySend + std::fmt::Debug + 'static,
-    A: ZeroCopySend + std::fmt::Debug + 'static,
-{
-    // SAFETY: as in `in_place`: shared memory holds numbers from the start.
-    unsafe { slot.assume_init() }
 }
 
 /// A slot for an answer, if there is one.

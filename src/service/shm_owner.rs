@@ -9,8 +9,7 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg, OFlag};
 
-/// Where the segments lie, and so the lock: whoever sees the one sees the other.
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+use crate::wire::shm::SHARED_MEMORY;
 
 /// Why the namespace is not this process's.
 #[derive(Debug, thiserror::Error)]

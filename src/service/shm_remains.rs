@@ -18,17 +18,8 @@ use iceoryx2::prelude::{CallbackProgression, MessagingPattern, ServiceName, ipc}
 use iceoryx2::service::Service;
 use iceoryx2::service::service_hash::ServiceHash;
 
-use super::shm_layout::Names;
-use super::shm_owner::SHARED_MEMORY;
-
-/// The settings of every node here: what was left in a service is cleared when that service is opened, and the rest of the
-/// machine by [`clear`] alone, not by whoever comes or goes.
-pub(super) fn config() -> Config {
-    let mut config = Config::global_config().clone();
-    config.global.node.cleanup_dead_nodes_on_creation = false;
-    config.global.node.cleanup_dead_nodes_on_destruction = false;
-    config
-}
+use crate::wire::shm::layout::Names;
+use crate::wire::shm::{SHARED_MEMORY, config};
 
 /// Longest time that a living client takes to finish a service that it has begun.
 const FINISHING: Duration = Duration::from_millis(100);

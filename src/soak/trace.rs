@@ -2,8 +2,8 @@
 
 use std::io::Read;
 
-use crate::service::wire::{InvalidState, State};
 use crate::states::{BadValue, Row, unknown_columns};
+use crate::wire::{InvalidState, State};
 
 /// Why a trace cannot be played.
 #[derive(Debug, thiserror::Error)]

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::TrainError;
 use super::anchored::loss::AnchoredLoss;
 use super::loss::LossConfig;
-use super::plan::Table;
 use crate::dataset::split::MOST_PARTS;
+use crate::parameter_table::ParameterTable;
 
 /// How to train; the defaults are the source paper's where it states them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -86,12 +86,12 @@ pub struct Analytic {
     /// Cases a vehicle; as many again astern where the hull is not symmetric front to rear.
     pub cases: usize,
     /// Parameter table of each vehicle, by its name.
-    pub tables: BTreeMap<String, Table>,
+    pub tables: BTreeMap<String, ParameterTable>,
 }
 
 impl Default for Analytic {
     fn default() -> Self {
-        let tables = [("husky", Table::HUSKY), ("warthog", Table::WARTHOG)];
+        let tables = [("husky", ParameterTable::HUSKY), ("warthog", ParameterTable::WARTHOG)];
         Self { cases: 175, tables: tables.map(|(name, table)| (name.to_owned(), table)).into() }
     }
 }

@@ -7,11 +7,7 @@ use super::{Sides, Source, TrainError};
 use crate::condition::Condition;
 use crate::dataset::Sample;
 use crate::domain::{Domain, Range};
-
-/// Room for the tilt [rad], heave [m/s] and turning [rad/s] of a vehicle that is level, planar and straight but for noise.
-pub(super) const TILT: f64 = 0.01;
-pub(super) const HEAVE: f64 = 0.05;
-pub(super) const TURN: f64 = 0.05;
+use crate::parameter_table::{HEAVE, TILT, TURN};
 
 /// The ranges of the states of a vehicle that were learnt from; those of all vehicles where none was of this one.
 pub(super) fn learnt(name: &str, source: &Source, sides: Sides<'_>) -> Result<Domain, TrainError> {

@@ -1,8 +1,8 @@
 //! Learning a network: a data set and its split in, weights and what they are worth out.
 //!
-//! Reading order: `config`, `label` (what is to be learnt), `samples` (features and targets), `variant` (rows and loss of
+//! Reading order: `config`, `samples` (features and targets), `variant` (rows and loss of
 //! each kind of network), `task`, `loss`, `layers` (forward and backward), `adam`, `fit` (epochs), `checkpoint`, `score`
-//! (errors on held-out samples), `report`, `page`; `plan` and `analytic` make the loads by formula. The same seed gives
+//! (errors on held-out samples), `report`, `page`; `analytic` makes the loads by formula. The same seed gives
 //! the same bits on the same kind of processor, with one thread or two (the matrix product is chosen by what the
 //! processor can do).
 
@@ -13,11 +13,9 @@ pub mod checkpoint;
 mod config;
 pub mod domain;
 pub mod fit;
-pub mod label;
 pub mod layers;
 pub mod loss;
 pub(crate) mod page;
-pub mod plan;
 pub mod report;
 pub mod samples;
 pub mod score;
@@ -32,6 +30,7 @@ pub use variant::Variant;
 
 use crate::condition::GroundContact;
 use crate::dataset::Dataset;
+use crate::dataset::label::{self, OtherSurfaces};
 use crate::dataset::mirror::{self, MirrorError};
 use crate::dataset::split::Split;
 use crate::dataset::{self, Image, split};
@@ -78,15 +77,8 @@ pub enum TrainError {
         vehicle: String,
     },
     /// Surfaces of another version of the vehicle.
-    #[error(
-        "vehicle `{vehicle}`: the bundle and the data set do not name the same surfaces; `{surface}` is in one of them"
-    )]
-    Surfaces {
-        /// The vehicle.
-        vehicle: String,
-        /// A surface that only one of them has.
-        surface: String,
-    },
+    #[error(transparent)]
+    Surfaces(#[from] OtherSurfaces),
     /// A state that accelerates: what is learnt has no input for it.
     #[error(
         "case `{case}` accelerates by {acceleration:.2} m/s2, which is not an input of any network here: leave its set out with `wade dataset merge --set`"

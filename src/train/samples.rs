@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::TrainError;
-use super::label::{self, Label};
+use crate::dataset::label::{self, Label};
 use crate::dataset::{self, Dataset};
 use crate::features::{self, DYNAMIC, GLOBAL, STATIC};
 use crate::model::network::OUTPUTS;

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::Thresholds;
 use super::check::Check;
 use super::fit::{OriginFit, through_origin};
-use super::paper::{self, PaperDepth};
 use super::section::{DepthGroup, Section};
+use crate::published::{self, PaperDepth};
 
 /// How R2 is meant, since the source paper does not say.
 pub const R2_DEFINITION: &str = "1 - sum (|Fx| - C v^2)^2 / sum (|Fx| - mean |Fx|)^2: against the mean, although the line \
@@ -103,7 +103,7 @@ pub fn drag_scaling(
         r2: fit.map(|fit| fit.r2),
         r2_about_zero: fit.map(|fit| fit.r2_about_zero),
         c_d: fit.map(|fit| drag_coefficient(fit.slope, group.density_kgpm3, width, group.depth_m)),
-        paper: paper::at(vehicle, group.depth_m),
+        paper: published::at(vehicle, group.depth_m),
     };
     let fitted: Vec<(&DepthGroup<'_>, f64)> =
         groups.iter().zip(&fits).filter_map(|(group, fit)| Some((group, fit.as_ref()?.slope))).collect();
@@ -192,5 +192,28 @@ impl DragScaling {
                 },
             ),
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::fit::line;
+    use super::drag_coefficient;
+    use crate::published::{DEPTHS, F0_R2, WIDTH_M};
+
+    #[test]
+    fn the_published_width_gives_the_paper_s_drag_coefficients_and_the_mesh_s_does_not() {
+        let rounded = |width: f64| {
+            DEPTHS.map(|p| (drag_coefficient(p.c_d_eff, 1000.0, width, p.depth_m) * 100.0).round() / 100.0)
+        };
+        assert_eq!(rounded(WIDTH_M), DEPTHS.map(|p| p.c_d));
+        assert_eq!(rounded(1.391), [0.70, 0.77, 0.89]);
+    }
+
+    #[test]
+    fn the_paper_s_linear_r2_is_that_of_a_line_through_three_points() {
+        let fit = line(&DEPTHS.map(|p| p.depth_m), &DEPTHS.map(|p| p.f0_n)).unwrap();
+        assert!((fit.r2 - F0_R2).abs() < 5e-4, "{}", fit.r2);
     }
 }

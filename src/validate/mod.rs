@@ -3,21 +3,16 @@
 //! No force is measured on a driven vehicle. The model answers for every sample of the planar section of each trial,
 //! and the answers must obey known laws: drag with the square of the speed (test 1), buoyancy plus lift (test 2).
 //!
-//! Reading order: `recording` and `mocap` (motion capture to trials), `generated` (recordings after the paper's table),
-//! `planar` and `section` (where to look, one point a trial), `fit`, `drag` and `vertical` (the tests), `check`, `paper`
-//! (its figures), `report`, `page` with `plot`, `folder` (all of it on disk at once).
+//! Reading order: `planar` and `section` (where to look, one point a trial), `fit`, `drag` and `vertical` (the tests),
+//! `check`, `report`, `page` with `plot`, `folder` (all of it on disk at once).
 
 mod check;
 mod drag;
 mod fit;
 mod folder;
-pub mod generated;
-mod mocap;
 mod page;
-pub mod paper;
 mod planar;
 mod plot;
-mod recording;
 mod report;
 mod section;
 mod vertical;
@@ -27,12 +22,7 @@ use serde::{Deserialize, Serialize};
 pub use check::Check;
 pub use drag::{DragAtDepth, DragScaling, PairConfig, Ratio, drag_coefficient};
 pub use folder::{FolderError, OutFolder};
-pub use mocap::{Kinematics, MocapConfig, Rig, process, trials_from_recordings};
-pub use paper::PaperDepth;
 pub use planar::{NotPlanar, PlanarConfig, planar_section};
-pub use recording::{
-    RECORDINGS_FILE, Recording, RecordingEntry, RecordingError, RecordingFault, Recordings, RecordingsFile,
-};
 pub use report::{Data, Report, Source, Subject};
 pub use section::{LeftOut, Prediction, Section};
 pub use vertical::{F0AgainstDepth, SpeedBin, VerticalAtDepth, VerticalForce, at_rest};
@@ -40,6 +30,7 @@ pub use vertical::{F0AgainstDepth, SpeedBin, VerticalAtDepth, VerticalForce, at_
 use crate::condition::{Condition, GroundContact};
 use crate::forces::Forces;
 use crate::model::{Model, Workspace};
+use crate::recordings::MocapConfig;
 use crate::signal::MAX_ORDER;
 use crate::trials::Trials;
 use crate::vehicle::Vehicle;

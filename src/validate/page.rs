@@ -5,11 +5,11 @@ use std::fmt::Write;
 use plotters::style::RGBColor;
 
 use super::drag::R2_DEFINITION;
-use super::paper::{self, LABEL, PaperDepth};
 use super::plot::{Mark, Series, color, figure};
 use super::report::{Report, Source};
 use super::section::Section;
 use crate::page::{PlotError, document, escape, table};
+use crate::published::{self, LABEL, PaperDepth};
 
 const BLACK: RGBColor = RGBColor(0, 0, 0);
 const BROWN: RGBColor = RGBColor(0xb0, 0x70, 0x00);
@@ -130,7 +130,7 @@ fn drag_table(report: &Report) -> String {
          its C<sub>D,eff</sub> with W = {} m. ± is one standard error. Shaded: {LABEL}.</p>{}\
          <p class=\"small\">R² = {}; the paper does not say which it means.</p>",
         drag.width_m,
-        paper::WIDTH_M,
+        published::WIDTH_M,
         table(&heads, 6, rows),
         escape(R2_DEFINITION),
     )
@@ -155,7 +155,7 @@ fn pair_table(report: &Report) -> String {
         drag.pairs,
         pairs.speed_tolerance_mps,
         pairs.least_speed_mps,
-        paper::PAIRS,
+        published::PAIRS,
         table(&heads, usize::MAX, rows),
     )
 }

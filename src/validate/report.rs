@@ -5,12 +5,12 @@ use serde::Serialize;
 use super::check::Check;
 use super::drag::DragScaling;
 use super::page::page;
-use super::paper;
 use super::section::{LeftOut, Section};
 use super::vertical::VerticalForce;
 use super::{Config, Tests};
 use crate::model::Model;
 use crate::page::PlotError;
+use crate::published;
 use crate::trials::Trials;
 
 /// What a validation found; serializes to `report.json`.
@@ -130,7 +130,7 @@ impl Report {
             checks: tests.checks,
             drag_scaling: tests.drag_scaling,
             vertical_force: tests.vertical_force,
-            paper_label: paper::LABEL,
+            paper_label: published::LABEL,
             sections: tests.sections,
             left_out: tests.left_out,
             config: config.clone(),

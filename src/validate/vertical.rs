@@ -5,10 +5,10 @@ use serde::Serialize;
 use super::Thresholds;
 use super::check::Check;
 use super::fit::{LineFit, line};
-use super::paper::{self, PaperDepth};
 use super::section::{DepthGroup, Section};
 use crate::frame::{Vec3, WaterPlane};
 use crate::geometry::hydrostatics::hydrostatics;
+use crate::published::{self, PaperDepth};
 use crate::vehicle::Vehicle;
 
 /// Steps from dry to the deepest trials in the mesh's curve.
@@ -130,7 +130,7 @@ fn at_depth(group: &DepthGroup<'_>, vehicle: &Vehicle, least: usize) -> Vertical
         r2: fit.map(|fit| fit.r2),
         mesh_wetted_n,
         mesh_dry_n,
-        paper: paper::at(&vehicle.name, group.depth_m),
+        paper: published::at(&vehicle.name, group.depth_m),
     }
 }
 
@@ -157,7 +157,7 @@ fn f0_against_depth(depths: &[VerticalAtDepth], vehicle: &Vehicle) -> Option<F0A
         r2: fit.r2,
         mesh_wetted_r2: r2(|at| at.mesh_wetted_n),
         mesh_dry_r2: r2(|at| at.mesh_dry_n),
-        paper_r2: (vehicle.name == paper::VEHICLE).then_some(paper::F0_R2),
+        paper_r2: (vehicle.name == published::VEHICLE).then_some(published::F0_R2),
     })
 }
 

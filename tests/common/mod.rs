@@ -17,9 +17,9 @@ use wade::model::kernel::Isa;
 use wade::served::ServedVehicle;
 use wade::server::{self, Running};
 use wade::service::health::{Part, State as Up};
-use wade::service::shm::Wait;
-use wade::service::shm_layout::PROVENANCE_LEN;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::shm::Wait;
+use wade::wire::shm::layout::PROVENANCE_LEN;
 
 /// Long enough for a busy machine: no test is about this time.
 pub const PATIENCE: Duration = Duration::from_secs(20);
@@ -247,7 +247,7 @@ impl Numbers {
         let tilted = self.between(0.0, 1.0) < 0.5;
         let (roll, pitch) = (self.between(-0.3, 0.3), self.between(-0.3, 0.3));
         let up = wade::frame::up_from_roll_pitch(roll.into(), pitch.into());
-        let gravity = if tilted { wade::service::grpc::single(&-up.into_inner()) } else { [0.0, 0.0, -1.0] };
+        let gravity = if tilted { wade::wire::single(&-up.into_inner()) } else { [0.0, 0.0, -1.0] };
         State {
             velocity: self.vector(4.0),
             current: self.vector(0.5),

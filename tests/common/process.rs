@@ -6,8 +6,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use wade::client::ShmClient;
-use wade::service::shm_layout::Answer;
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::shm::layout::Answer;
 
 use crate::common::{PATIENCE, vehicles};
 

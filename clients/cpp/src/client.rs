@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use wade::client::Address;
-use wade::service::shm::Wait;
-use wade::service::wire::InvalidState;
+use wade::wire::InvalidState;
+use wade::wire::shm::Wait;
 
 use crate::abi::{WADE_MAX_BATCH, WADE_NEVER, WadeBatch, WadeForces, WadeState, WadeStatus};
 use crate::connection::Connection;

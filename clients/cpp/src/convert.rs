@@ -4,8 +4,8 @@ use std::ffi::c_char;
 use std::time::Instant;
 
 use wade::client::Reply;
-use wade::service::shm_layout::{self, Answer, Status};
-use wade::service::wire::{InvalidState, State};
+use wade::wire::shm::layout::{self, Answer, Status};
+use wade::wire::{InvalidState, State};
 
 use crate::abi::{
     WADE_DRY_CONTACT, WADE_HAS_ADDED_MASS, WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WHEEL_SPEEDS,
@@ -113,11 +113,11 @@ impl From<&Answer> for WadeForces {
     fn from(answer: &Answer) -> Self {
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let (surfaces, effects) = (answer.surfaces(), answer.effects());
-        let has_added_mass = answer.flags & shm_layout::HAS_ADDED_MASS != 0;
+        let has_added_mass = answer.flags & layout::HAS_ADDED_MASS != 0;
         let mut forces = Self {
             compute_ns: answer.compute_ns,
             flags: flag(!answer.is_outside(), WADE_IN_DOMAIN)
-                | flag(answer.flags & shm_layout::SESSION_BEGINS != 0, WADE_SESSION_BEGINS)
+                | flag(answer.flags & layout::SESSION_BEGINS != 0, WADE_SESSION_BEGINS)
                 | flag(has_added_mass, WADE_HAS_ADDED_MASS),
             bundle_version: answer.bundle_version,
             surface_count: surfaces.len().min(WADE_MAX_SURFACES) as u32,

@@ -14,8 +14,8 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use wade::client::Address;
 use wade::effects::Effect;
 use wade::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
-use wade::service::shm::Wait;
-use wade::service::wire::Field;
+use wade::wire::Field;
+use wade::wire::shm::Wait;
 
 use crate::abi::{
     WADE_ABI_VERSION, WadeBatch, WadeForces, WadeOptions, WadeState, WadeStatus, WadeVehicle, WadeWait,

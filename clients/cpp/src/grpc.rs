@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
 use wade::client::{ClientError, GrpcLink, Reply, replies};
-use wade::service::wire::State;
+use wade::wire::State;
 
 use crate::abi::{WADE_SESSION_BEGINS, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};

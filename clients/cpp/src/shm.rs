@@ -6,9 +6,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use wade::client::{Asked, ShmLink};
-use wade::service::shm::Wait;
-use wade::service::shm_layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
-use wade::service::wire::State;
+use wade::wire::State;
+use wade::wire::shm::Wait;
+use wade::wire::shm::layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
 
 use crate::abi::{WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};

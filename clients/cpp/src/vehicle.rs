@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use wade::client::{ClientError, GrpcClient, Method};
 use wade::effects::Effect;
-use wade::service::proto;
+use wade::wire::proto;
 
 use crate::abi::{WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE, WadeRange, WadeSurface, WadeVehicle};
 use crate::convert::write_text;

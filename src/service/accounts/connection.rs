@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use tokio::sync::Notify;
 
-use super::{Accounts, Closed, Held, Overloaded, Peer, Place};
+use super::{Accounts, Closed, Held, Peer, Place};
 use crate::metrics::Resource;
+use crate::wire::Overloaded;
 
 /// One connection.
 #[derive(Debug)]

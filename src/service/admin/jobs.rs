@@ -13,9 +13,9 @@ use rustix::thread::gettid;
 use tokio::sync::oneshot;
 
 use super::Reloader;
-use crate::engine::UnknownVehicle;
-use crate::service::proto::Reloaded;
-use crate::service::wire::Refusal;
+use crate::wire::Refusal;
+use crate::wire::UnknownVehicle;
+use crate::wire::proto::Reloaded;
 
 /// Niceness of the thread: a tenth of the weight of a query's.
 const NICE: i32 = 10;

@@ -18,10 +18,11 @@ use tonic::codegen::http::{Request, Response};
 use tonic::service::Routes;
 
 use super::handlers::Names;
-use super::{name_the_size_limit, stopped};
+use super::name_the_size_limit;
 use crate::metrics::{Metrics, Resource, Transport};
 use crate::service::accounts::{Computing, Connection, Place, Sent};
-use crate::service::wire::Refusal;
+use crate::service::stopped;
+use crate::wire::Refusal;
 
 /// What a method needs.
 #[derive(Debug, Clone, Copy)]

@@ -1,30 +1,21 @@
 //! The calls.
 
-use std::cell::RefCell;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::Shared;
-use super::convert;
 use super::stream::Answers;
-use crate::effects::Session;
 use crate::metrics::Transport;
 use crate::served::ServedVehicle;
 use crate::service::admin::{Job, Jobs};
-use crate::service::proto::admin_server::Admin;
-use crate::service::proto::hydrodynamics_server::Hydrodynamics;
-use crate::service::wire::Refusal;
-use crate::service::{Evaluator, nanoseconds_since, proto};
+use crate::service::call::{self, Answered, Call, EVALUATOR, Shared, answer_state};
+use crate::wire::proto::admin_server::Admin;
+use crate::wire::proto::hydrodynamics_server::Hydrodynamics;
+use crate::wire::{self, Refusal, proto};
 
 /// States of a batch or a stream that are computed before others get their turn: about a millisecond.
 pub(super) const STATES_PER_TURN: usize = 64;
-
-thread_local! {
-    static EVALUATOR: RefCell<Evaluator> = RefCell::default();
-}
 
 /// What the metrics call the calls of one listener.
 #[derive(Debug, Clone, Copy)]
@@ -103,8 +94,7 @@ impl Hydrodynamics for Handlers {
         &self,
         _: Request<proto::ListVehiclesRequest>,
     ) -> Result<Response<proto::ListVehiclesResponse>, Status> {
-        let vehicles =
-            self.shared.engine.vehicles().values().map(|vehicle| convert::summary(vehicle)).collect();
+        let vehicles = self.shared.engine.vehicles().values().map(|vehicle| wire::summary(vehicle)).collect();
         Ok(Response::new(proto::ListVehiclesResponse { vehicles }))
     }
 
@@ -114,14 +104,14 @@ impl Hydrodynamics for Handlers {
     ) -> Result<Response<proto::GetVehicleResponse>, Status> {
         let request = request.get_ref();
         let vehicle = self.shared.engine.vehicle(&request.vehicle).map_err(Refusal::from)?;
-        Ok(Response::new(convert::vehicle(&vehicle, request.include_mesh)))
+        Ok(Response::new(wire::vehicle(&vehicle, request.include_mesh)))
     }
 
     async fn get_latency(
         &self,
         _: Request<proto::GetLatencyRequest>,
     ) -> Result<Response<proto::GetLatencyResponse>, Status> {
-        let latencies = self.shared.metrics.latencies().into_iter().map(convert::latency).collect();
+        let latencies = self.shared.metrics.latencies().into_iter().map(call::latency).collect();
         Ok(Response::new(proto::GetLatencyResponse { latencies, window_s: self.shared.window_s }))
     }
 }
@@ -142,9 +132,9 @@ impl Handlers {
         vehicle: Arc<ServedVehicle>,
         request: &proto::EvaluateBatchRequest,
     ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
-        let states = convert::batch(request, self.max_batch)?;
+        let states = wire::batch(request, self.max_batch)?;
         let with_surfaces = !request.omit_surfaces;
-        let mut response = convert::batch_response(&vehicle, states.len(), with_surfaces);
+        let mut response = wire::batch_response(&vehicle, states.len(), with_surfaces);
         for (turn, states) in states.chunks(STATES_PER_TURN).enumerate() {
             if turn > 0 {
                 tokio::task::yield_now().await;
@@ -156,7 +146,7 @@ impl Handlers {
                     let evaluated = evaluator
                         .evaluate(&vehicle, state, None)
                         .map_err(|invalid| Refusal::Invalid { invalid, index: Some(index) })?;
-                    convert::push(&mut response, &evaluated, index as u32, with_surfaces);
+                    wire::push(&mut response, &evaluated, index as u32, with_surfaces);
                 }
                 Ok::<(), Refusal>(())
             })?;
@@ -165,92 +155,6 @@ impl Handlers {
         outside.dedup();
         let out_of_domain = outside.len() as u64;
         Ok((response, Answered { vehicle, out_of_domain }))
-    }
-}
-
-/// What the metrics need to know of an answer.
-#[derive(Debug)]
-pub(in crate::service) struct Answered {
-    vehicle: Arc<ServedVehicle>,
-    out_of_domain: u64,
-}
-
-/// Answers one state on the thread that read it.
-pub(in crate::service) fn answer_state(
-    vehicle: &Arc<ServedVehicle>,
-    state: Option<&proto::State>,
-    session: Option<&mut Session>,
-) -> Result<(proto::EvaluateResponse, Answered), Refusal> {
-    let state = convert::state(state.ok_or(Refusal::MissingState)?)?;
-    EVALUATOR.with_borrow_mut(|evaluator| {
-        let evaluated = evaluator.evaluate(vehicle, &state, session)?;
-        let response = convert::response(vehicle, &evaluated);
-        let out_of_domain = u64::from(!response.in_domain);
-        Ok((response, Answered { vehicle: Arc::clone(vehicle), out_of_domain }))
-    })
-}
-
-/// One request from its arrival to its answer: deadline, metrics and, where asked for, a line in the log.
-pub(in crate::service) struct Call<'s> {
-    shared: &'s Shared,
-    transport: Transport,
-    arrived: Instant,
-    deadline: Option<Instant>,
-}
-
-impl<'s> Call<'s> {
-    pub(super) fn begin<T>(shared: &'s Shared, transport: Transport, request: &Request<T>) -> Self {
-        let arrived = Instant::now();
-        let timeout = request.metadata().get("grpc-timeout").and_then(|header| header.to_str().ok());
-        let deadline = timeout.and_then(convert::timeout).and_then(|timeout| arrived.checked_add(timeout));
-        Self { shared, transport, arrived, deadline }
-    }
-
-    /// A request that arrives now.
-    pub(in crate::service) fn arriving(
-        shared: &'s Shared,
-        transport: Transport,
-        deadline: Option<Instant>,
-    ) -> Self {
-        Self { shared, transport, arrived: Instant::now(), deadline }
-    }
-
-    /// Brings the deadline forward to this long after the arrival.
-    pub(super) fn limit(&mut self, timeout: Duration) {
-        let limit = self.arrived.checked_add(timeout);
-        self.deadline = [self.deadline, limit].into_iter().flatten().min();
-    }
-
-    pub(super) fn check_deadline(&self, answered: Option<usize>) -> Result<(), Refusal> {
-        match self.deadline {
-            Some(deadline) if Instant::now() >= deadline => Err(Refusal::DeadlineExceeded { answered }),
-            _ => Ok(()),
-        }
-    }
-
-    pub(super) fn end<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<Response<T>, Status> {
-        Ok(Response::new(self.record(outcome)?))
-    }
-
-    /// Records the outcome.
-    pub(in crate::service) fn record<T>(self, outcome: Result<(T, Answered), Refusal>) -> Result<T, Refusal> {
-        match outcome {
-            Ok((response, answered)) => {
-                let vehicle = &answered.vehicle.model().vehicle().name;
-                let elapsed = self.arrived.elapsed();
-                self.shared.metrics.recorder(self.transport, vehicle).record(elapsed, answered.out_of_domain);
-                tracing::debug!(target: "wade::request", transport = self.transport.name(), vehicle, ?elapsed);
-                Ok(response)
-            }
-            Err(refusal) => Err(self.refuse(refusal)),
-        }
-    }
-
-    fn refuse(self, refusal: Refusal) -> Refusal {
-        self.shared.metrics.refuse(self.transport, refusal.reason());
-        let elapsed_ns = nanoseconds_since(self.arrived);
-        tracing::debug!(target: "wade::request", transport = self.transport.name(), %refusal, elapsed_ns);
-        refusal
     }
 }
 

@@ -10,17 +10,18 @@ use std::sync::Arc;
 use tokio_stream::{Stream, StreamExt};
 use tonic::{Request, Response, Status, Streaming};
 
-use super::handlers::{Answered, Call, Handlers};
+use super::handlers::Handlers;
 use crate::metrics::Transport;
 use crate::served::ServedVehicle;
 use crate::service::admin::{Job, Jobs};
-use crate::service::proto::Reloaded;
-use crate::service::proto::inference::grpc_inference_service_server::GrpcInferenceService;
-use crate::service::proto::inference::infer_parameter::ParameterChoice;
-use crate::service::proto::inference::model_metadata_response::TensorMetadata;
-use crate::service::proto::inference::repository_index_response::ModelIndex;
-use crate::service::proto::inference::*;
-use crate::service::wire::{Field, Refusal, TensorFault};
+use crate::service::call::{Answered, Call};
+use crate::wire::proto::Reloaded;
+use crate::wire::proto::inference::grpc_inference_service_server::GrpcInferenceService;
+use crate::wire::proto::inference::infer_parameter::ParameterChoice;
+use crate::wire::proto::inference::model_metadata_response::TensorMetadata;
+use crate::wire::proto::inference::repository_index_response::ModelIndex;
+use crate::wire::proto::inference::*;
+use crate::wire::{Field, Refusal, TensorFault};
 use inputs::{INPUTS, shape, short};
 
 /// The state of a model that can be asked.

@@ -10,11 +10,12 @@ use hyper::server::conn::http2;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use tokio::sync::watch;
 
+use super::Config;
 use super::calls::Calls;
 use super::link::Link;
 use super::turns::Turns;
-use super::{Config, stopped};
 use crate::service::accounts::{Closed, Connection};
+use crate::service::stopped;
 
 /// How often a connection's deadlines are looked at.
 const LOOK: Duration = Duration::from_secs(1);

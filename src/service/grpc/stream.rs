@@ -7,12 +7,13 @@ use std::time::Instant;
 use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
-use super::handlers::{Call, STATES_PER_TURN, answer_state};
-use super::{Shared, size_limit};
+use super::handlers::STATES_PER_TURN;
+use super::size_limit;
 use crate::effects::Session;
 use crate::metrics::Transport;
-use crate::service::proto;
-use crate::service::wire::Refusal;
+use crate::service::call::{Call, Shared, answer_state};
+use crate::wire::Refusal;
+use crate::wire::proto;
 
 /// The answering half of a `Stream` call.
 pub struct Answers {

@@ -25,8 +25,8 @@ use tower::ServiceExt;
 use super::Shared;
 use crate::metrics::Resource;
 use crate::service::accounts::{Closed, Computing, Connection, Sent};
-use crate::service::grpc::stopped;
 use crate::service::intake::{self, Listener, Socket};
+use crate::service::stopped;
 
 /// How often a connection's deadline is looked at.
 const LOOK: Duration = Duration::from_secs(1);

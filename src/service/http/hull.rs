@@ -15,8 +15,7 @@ use super::Shared;
 use super::rejection::Rejection;
 use crate::files::sha256;
 use crate::served::ServedVehicle;
-use crate::service::grpc::single;
-use crate::service::wire::Refusal;
+use crate::wire::{Refusal, single};
 
 /// Most triangles that are sent: about 10 MB of JSON.
 const MAX_TRIANGLES: usize = 200_000;

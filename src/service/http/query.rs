@@ -16,9 +16,8 @@ use super::rejection::Rejection;
 use crate::metrics::{Resource, Transport};
 use crate::service::accounts::{Computing, Connection};
 use crate::service::answer::Answer;
-use crate::service::grpc::{self, Call, answer_state};
-use crate::service::proto;
-use crate::service::wire::Refusal;
+use crate::service::call::{self, Call, answer_state};
+use crate::wire::{self, Refusal, proto};
 
 /// Longest body [bytes]: a query with every field takes about one kilobyte.
 const MAX_BODY: usize = 64 << 10;
@@ -79,17 +78,17 @@ fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Resul
 
 async fn vehicles(State(shared): State<Arc<Shared>>) -> Response {
     let vehicles = shared.grpc.engine.vehicles();
-    let vehicles = vehicles.values().map(|vehicle| grpc::summary(vehicle)).collect();
+    let vehicles = vehicles.values().map(|vehicle| wire::summary(vehicle)).collect();
     json::write("wade.v1.ListVehiclesResponse", &proto::ListVehiclesResponse { vehicles })
 }
 
 async fn vehicle(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Rejection> {
     let vehicle = shared.grpc.engine.vehicle(&name).map_err(Refusal::from)?;
-    Ok(json::write("wade.v1.GetVehicleResponse", &grpc::vehicle(&vehicle, false)))
+    Ok(json::write("wade.v1.GetVehicleResponse", &wire::vehicle(&vehicle, false)))
 }
 
 async fn latency(State(shared): State<Arc<Shared>>) -> Response {
-    let latencies = shared.grpc.metrics.latencies().into_iter().map(grpc::latency).collect();
+    let latencies = shared.grpc.metrics.latencies().into_iter().map(call::latency).collect();
     let response = proto::GetLatencyResponse { latencies, window_s: shared.grpc.window_s };
     json::write("wade.v1.GetLatencyResponse", &response)
 }

@@ -6,10 +6,10 @@ use super::inputs::short;
 use crate::domain::Quantity;
 use crate::effects::{BoxQuantity, Effect};
 use crate::served::ServedVehicle;
-use crate::service::proto;
-use crate::service::proto::inference::model_infer_request::InferRequestedOutputTensor;
-use crate::service::proto::inference::{InferTensorContents, model_infer_response::InferOutputTensor};
-use crate::service::wire::TensorFault;
+use crate::wire::TensorFault;
+use crate::wire::proto;
+use crate::wire::proto::inference::model_infer_request::InferRequestedOutputTensor;
+use crate::wire::proto::inference::{InferTensorContents, model_infer_response::InferOutputTensor};
 
 /// An output, by the name of the array of the answer to a batch; `in_domain` and `outside` are by state here, and `outside`
 /// and `effects_outside` hold 0 for what is not outside.

@@ -1,17 +1,21 @@
-//! Which states to learn from: a Latin hypercube over the source paper's parameter table.
+//! The ranges of the states of one vehicle: the source paper's parameter table, and a Latin hypercube over it.
 
 use serde::{Deserialize, Serialize};
 
-use super::domain::{HEAVE, TILT, TURN};
 use crate::condition::Condition;
 use crate::domain::{Domain, Range};
 use crate::frame::Vec3;
 use crate::random::Random;
 
+/// Room for the tilt [rad], heave [m/s] and turning [rad/s] of a vehicle that is level, planar and straight but for noise.
+pub(crate) const TILT: f64 = 0.01;
+pub(crate) const HEAVE: f64 = 0.05;
+pub(crate) const TURN: f64 = 0.05;
+
 /// The parameter table of one vehicle; level, planar motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Table {
+pub struct ParameterTable {
     /// Speed through the water [m/s].
     pub speed_mps: Range,
     /// Flow angle [degrees]: 90 head-on, 0 from the side.
@@ -22,7 +26,7 @@ pub struct Table {
     pub depth_m: Range,
 }
 
-impl Table {
+impl ParameterTable {
     /// The paper's table for the Husky.
     pub const HUSKY: Self = Self::paper(Range { min: 0.2, max: 1.0 }, Range { min: 0.06, max: 0.20 });
     /// The paper's table for the Warthog.
@@ -79,7 +83,7 @@ mod tests {
     use super::*;
 
     fn plan(seed: u64) -> Vec<Condition> {
-        Table::HUSKY.latin_hypercube(175, &mut Random::new(seed))
+        ParameterTable::HUSKY.latin_hypercube(175, &mut Random::new(seed))
     }
 
     #[test]
@@ -91,10 +95,10 @@ mod tests {
             strata.sort_unstable();
             assert_eq!(strata, (0..175).collect::<Vec<_>>());
         };
-        check(Table::HUSKY.speed_mps, &|c| c.velocity.norm());
-        check(Table::HUSKY.angle_deg, &|c| c.velocity.x.atan2(c.velocity.y).to_degrees());
-        check(Table::HUSKY.density_kgpm3, &|c| c.density);
-        check(Table::HUSKY.depth_m, &|c| c.depth);
+        check(ParameterTable::HUSKY.speed_mps, &|c| c.velocity.norm());
+        check(ParameterTable::HUSKY.angle_deg, &|c| c.velocity.x.atan2(c.velocity.y).to_degrees());
+        check(ParameterTable::HUSKY.density_kgpm3, &|c| c.density);
+        check(ParameterTable::HUSKY.depth_m, &|c| c.depth);
     }
 
     #[test]
@@ -105,7 +109,7 @@ mod tests {
 
     #[test]
     fn every_case_is_inside_the_domain() {
-        let domain = Table::HUSKY.domain();
+        let domain = ParameterTable::HUSKY.domain();
         assert!(plan(1).iter().all(|case| domain.outside(case).is_inside()));
     }
 }

@@ -1,17 +1,15 @@
 //! Between the pages of shared memory and what is behind them: a query to a checked kind of state, an evaluation to an answer.
 
-use super::Evaluated;
-use super::grpc::{added_mass, single};
-use super::shm_layout::{
+use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE, HAS_DAMPING,
     HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, IMPLICIT_ADDED_MASS,
     MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, Query, Status, SurfaceAnswer,
 };
-use super::wire::{Field, InvalidState, Problem, State};
 use crate::domain::{Outside, Quantity};
 use crate::effects::{BoxQuantity, OutsideBox};
 use crate::served::ServedVehicle;
 use crate::vehicle::MAX_SURFACES;
+use crate::wire::{Evaluated, Field, InvalidState, Problem, State, added_mass, single};
 
 /// Flags of a query that are known.
 const QUERY_FLAGS: u64 = DRY_CONTACT

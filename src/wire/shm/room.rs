@@ -9,7 +9,7 @@ use nix::sys::resource::{Resource, getrlimit};
 use nix::sys::statvfs::statvfs;
 use nix::unistd::{AccessFlags, access};
 
-use super::shm_owner::SHARED_MEMORY;
+use super::SHARED_MEMORY;
 
 /// Room that the services take whatever is served [bytes], and that each vehicle takes once it has answered a batch: one of
 /// 256 states has 1.3 MB.
@@ -27,7 +27,7 @@ const DESCRIPTORS_OF_VEHICLE: u64 = 32;
 
 /// Why there is no point in opening shared memory.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum RoomError {
+pub enum RoomError {
     /// The file system is full.
     #[error(
         "{SHARED_MEMORY} has {available} kB free, and {vehicles} vehicles need {needed} kB: free some, enlarge it \
@@ -65,7 +65,7 @@ pub(crate) enum RoomError {
 }
 
 /// Checks that there are a folder, memory and descriptors for this many vehicles.
-pub(crate) fn check(vehicles: usize) -> Result<(), RoomError> {
+pub fn check(vehicles: usize) -> Result<(), RoomError> {
     let folder = PathBuf::from(Config::global_config().global.root_path().to_string());
     if let Ok(metadata) = std::fs::metadata(&folder)
         && access(&folder, AccessFlags::W_OK | AccessFlags::X_OK).is_err()
@@ -88,7 +88,7 @@ pub(crate) fn check(vehicles: usize) -> Result<(), RoomError> {
 }
 
 /// Checks that there are memory and descriptors for one more client, in the client's process.
-pub(crate) fn check_client() -> Result<(), RoomError> {
+pub fn check_client() -> Result<(), RoomError> {
     let available = available()?;
     if available < ROOM_OF_CLIENT {
         return Err(RoomError::ClientMemory { available: available >> 10 });

@@ -80,26 +80,3 @@ pub fn at(vehicle: &str, depth: f64) -> Option<PaperDepth> {
     let near = |paper: &&PaperDepth| (paper.depth_m - depth).abs() < SAME_DEPTH;
     DEPTHS.iter().find(near).filter(|_| vehicle == VEHICLE).copied()
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::super::drag::drag_coefficient;
-    use super::super::fit::line;
-    use super::*;
-
-    #[test]
-    fn the_published_width_gives_the_paper_s_drag_coefficients_and_the_mesh_s_does_not() {
-        let rounded = |width: f64| {
-            DEPTHS.map(|p| (drag_coefficient(p.c_d_eff, 1000.0, width, p.depth_m) * 100.0).round() / 100.0)
-        };
-        assert_eq!(rounded(WIDTH_M), DEPTHS.map(|p| p.c_d));
-        assert_eq!(rounded(1.391), [0.70, 0.77, 0.89]);
-    }
-
-    #[test]
-    fn the_paper_s_linear_r2_is_that_of_a_line_through_three_points() {
-        let fit = line(&DEPTHS.map(|p| p.depth_m), &DEPTHS.map(|p| p.f0_n)).unwrap();
-        assert!((fit.r2 - F0_R2).abs() < 5e-4, "{}", fit.r2);
-    }
-}

@@ -6,8 +6,8 @@ use iceoryx2::prelude::{AttributeSpecifier, Config, MessagingPattern};
 use iceoryx2::service::Service;
 use iceoryx2::service::port_factory::event;
 
-use super::shm::ShmError;
-use super::shm_layout::{Names, SERVED_LAYOUT, SERVED_VEHICLES, VERSION};
+use super::ShmError;
+use super::layout::{Names, SERVED_LAYOUT, SERVED_VEHICLES, VERSION};
 
 /// iceoryx2 gives a service eight attributes, of which the layout takes one.
 const MAX_LISTS: usize = 7;
@@ -16,7 +16,7 @@ const MAX_LIST_LEN: usize = 256;
 
 /// What a server tells of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Served {
+pub struct Served {
     /// Version of its layout.
     pub layout: String,
     /// The vehicles that it serves.
@@ -25,7 +25,7 @@ pub(crate) struct Served {
 
 /// Tells clients of these vehicles for as long as what it returns lives. Attributes are fixed, so that another set of vehicles
 /// takes another service, and the one before has to be dropped first.
-pub(crate) fn tell<S: Service>(
+pub fn tell<S: Service>(
     node: &Node<S>,
     names: &Names,
     vehicles: &[String],
@@ -49,7 +49,7 @@ pub(crate) fn tell<S: Service>(
 }
 
 /// What the server of a namespace tells; none where none that lives tells anything.
-pub(crate) fn served<S: Service>(names: &Names) -> Option<Served> {
+pub fn served<S: Service>(names: &Names) -> Option<Served> {
     let service = names.served().as_str().try_into().ok()?;
     let details = S::details(&service, Config::global_config(), MessagingPattern::Event).ok()??;
     let nodes = details.dynamic_details?.nodes;
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn more_names_than_one_attribute_holds_are_told() {
         let names = Names::new(&format!("told-{}", std::process::id()));
-        let node = super::super::shm::node::<ipc::Service>().unwrap();
+        let node = super::super::node::<ipc::Service>().unwrap();
         assert_eq!(served::<ipc::Service>(&names), None);
         // 40 names of 40 letters: 6 fit into 256 with their spaces
         let vehicles: Vec<String> = (0..40).map(|i| format!("{i:040}")).collect();

@@ -1,21 +1,18 @@
 //! The generated types to and from ours, by hand.
 
-use std::time::Duration;
-
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::domain::{Domain, Outside, Quantity};
 use crate::effects::{self, BoxQuantity, EffectLoads, EffectsFile, OutsideBox};
 use crate::forces::Forces;
 use crate::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
-use crate::metrics;
 use crate::served::ServedVehicle;
-use crate::service::Evaluated;
-use crate::service::proto;
-use crate::service::wire::{Field, InvalidState, Problem, Refusal, State, UNIT_TOLERANCE, scalar};
 use crate::vehicle::{Surface, SurfaceKind};
 
-use proto::state::Attitude;
+use super::evaluator::Evaluated;
+use super::proto::{self, state::Attitude};
+use super::refusal::Refusal;
+use super::state::{Field, InvalidState, Problem, State, UNIT_TOLERANCE, scalar};
 
 /// The state of a single request.
 pub fn state(message: &proto::State) -> Result<State, InvalidState> {
@@ -379,44 +376,6 @@ fn ranges(domain: &Domain) -> Vec<proto::Range> {
     Quantity::ALL.into_iter().filter_map(range).collect()
 }
 
-/// A row of the latency table.
-pub fn latency(row: metrics::Latency) -> proto::Latency {
-    let percentiles = |p: metrics::Percentiles| {
-        Some(proto::Percentiles {
-            count: p.count,
-            p50_us: p.p50_us,
-            p95_us: p.p95_us,
-            p99_us: p.p99_us,
-            p99_9_us: p.p99_9_us,
-            max_us: p.max_us,
-        })
-    };
-    proto::Latency {
-        transport: row.transport.name().into(),
-        vehicle: row.vehicle,
-        since_start: percentiles(row.since_start),
-        window: percentiles(row.window),
-    }
-}
-
-/// The time that a `grpc-timeout` header leaves: up to eight digits and a unit.
-pub fn timeout(header: &str) -> Option<Duration> {
-    let (digits, unit) = header.split_at_checked(header.len().checked_sub(1)?)?;
-    if digits.len() > 8 || !digits.bytes().all(|b| b.is_ascii_digit()) {
-        return None;
-    }
-    let value: u64 = digits.parse().ok()?;
-    Some(match unit {
-        "H" => Duration::from_secs(value * 3600),
-        "M" => Duration::from_secs(value * 60),
-        "S" => Duration::from_secs(value),
-        "m" => Duration::from_millis(value),
-        "u" => Duration::from_micros(value),
-        "n" => Duration::from_nanos(value),
-        _ => return None,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -454,15 +413,6 @@ mod tests {
         let heading = of(Attitude::WorldFromBody(proto::Quaternion { w, x, y, z })).expect("known");
         assert!((heading - 2.0).abs() < 1e-6);
         assert_eq!(of(Attitude::RollPitch(proto::RollPitch { roll_rad: 0.1, pitch_rad: 0.0 })), None);
-    }
-
-    #[test]
-    fn timeouts_have_a_value_and_a_unit() {
-        assert_eq!(timeout("250m"), Some(Duration::from_millis(250)));
-        assert_eq!(timeout("1n"), Some(Duration::from_nanos(1)));
-        for bad in ["", "5", "m", "-1m", "123456789S", "5x", "µ"] {
-            assert_eq!(timeout(bad), None, "{bad:?}");
-        }
     }
 
     #[test]

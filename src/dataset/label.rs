@@ -1,7 +1,6 @@
 //! What a network is to say of a sample: the load of the data set with the vehicle's own hydrostatics.
 
-use super::TrainError;
-use crate::dataset::Sample;
+use super::Sample;
 use crate::frame::Vec3;
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
@@ -47,10 +46,22 @@ fn beyond<'a>(
     })
 }
 
+/// Surfaces of another version of the vehicle.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "vehicle `{vehicle}`: the bundle and the data set do not name the same surfaces; `{surface}` is in one of them"
+)]
+pub struct OtherSurfaces {
+    /// The vehicle.
+    pub vehicle: String,
+    /// A surface that only one of them has.
+    pub surface: String,
+}
+
 /// Where each of the vehicle's surfaces stands among those of a data set.
-pub fn order(vehicle: &Vehicle, surfaces: &[String]) -> Result<Vec<usize>, TrainError> {
+pub fn order(vehicle: &Vehicle, surfaces: &[String]) -> Result<Vec<usize>, OtherSurfaces> {
     let unknown =
-        |surface: &String| TrainError::Surfaces { vehicle: vehicle.name.clone(), surface: surface.clone() };
+        |surface: &String| OtherSurfaces { vehicle: vehicle.name.clone(), surface: surface.clone() };
     if let Some(extra) = surfaces.iter().find(|surface| vehicle.surface_index(surface).is_none()) {
         return Err(unknown(extra));
     }

@@ -1,0 +1,11 @@
+//! Motion-capture recordings: the form on disk (`recording`), how they become trials (`mocap`), and recordings that are
+//! generated after the source paper's table of trials (`generated`).
+
+pub mod generated;
+mod mocap;
+mod recording;
+
+pub use mocap::{Kinematics, MocapConfig, Rig, process, trials_from_recordings};
+pub use recording::{
+    RECORDINGS_FILE, Recording, RecordingEntry, RecordingError, RecordingFault, Recordings, RecordingsFile,
+};

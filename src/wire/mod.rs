@@ -1,0 +1,16 @@
+//! The contract between servers and clients: the messages of `proto/`, the layout and the names of shared memory, the
+//! checks on a state, the reasons for which a request is refused, and the casts between these and the values of the library.
+
+mod convert;
+mod evaluator;
+pub mod proto;
+mod refusal;
+pub mod shm;
+mod state;
+mod tensor_fault;
+
+pub use convert::{added_mass, batch, batch_response, push, response, single, state, summary, vehicle};
+pub use evaluator::{Evaluated, Evaluator, nanoseconds_since};
+pub use refusal::{Overloaded, Refusal, UnknownVehicle};
+pub use state::{Field, InvalidState, Problem, State, UNIT_TOLERANCE, limit};
+pub use tensor_fault::TensorFault;
