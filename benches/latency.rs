@@ -15,14 +15,15 @@ use std::time::Duration;
 
 use common::{Row, Subject, Table};
 use tempfile::TempDir;
-use wade::client::{Client, GrpcClient, Method, ShmClient};
+use tonic::transport::Endpoint;
 use wade::config::Config;
 use wade::cores;
 use wade::server::{self, Running};
-use wade::wire::State;
-use wade::wire::proto;
-use wade::wire::proto::hydrodynamics_client::HydrodynamicsClient;
-use wade::wire::shm::Wait;
+use wade_client::{Client, GrpcClient, Method, ShmClient};
+use wade_wire::State;
+use wade_wire::proto;
+use wade_wire::proto::hydrodynamics_client::HydrodynamicsClient;
+use wade_wire::shm::Wait;
 
 const TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -74,8 +75,9 @@ impl Served {
     /// A unary call that computes nothing.
     fn list_vehicles(&self) -> impl FnMut() + use<> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
-        let client = runtime.block_on(HydrodynamicsClient::connect(self.url()));
-        let mut client = client.expect("the server is there");
+        let endpoint = Endpoint::from_shared(self.url()).expect("a URL");
+        let channel = runtime.block_on(endpoint.connect()).expect("the server is there");
+        let mut client = HydrodynamicsClient::new(channel);
         move || {
             let answer = runtime.block_on(client.list_vehicles(proto::ListVehiclesRequest {}));
             black_box(answer.expect("answered"));

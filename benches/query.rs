@@ -5,27 +5,27 @@
 //! `cargo bench --bench query [-- --out benches/results]` prints a table, and writes it as CSV with machine and commit.
 #![allow(unsafe_code, reason = "the peak of the core is measured behind a CPU check")]
 
+#[path = "../tests/common/bundles.rs"]
+mod bundles;
 mod common;
-#[path = "../tests/common/paper.rs"]
-mod paper_weights;
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use common::{Row, Subject, Table};
-use wade::bundle;
-use wade::condition::Condition;
-use wade::effects::{
+use wade_core::bundle;
+use wade_core::condition::Condition;
+use wade_core::effects::{
     ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind,
     ParameterValue, Session, Validity,
 };
-use wade::forces::Forces;
-use wade::frame::{Vec3, WaterPlane, up_from_roll_pitch};
-use wade::geometry::hydrostatics::hydrostatics;
-use wade::model::kernel::Isa;
-use wade::model::network::WIDTH;
-use wade::model::{Model, Workspace};
+use wade_core::forces::Forces;
+use wade_core::frame::{Vec3, WaterPlane, up_from_roll_pitch};
+use wade_core::geometry::hydrostatics::hydrostatics;
+use wade_core::model::kernel::Isa;
+use wade_core::model::network::WIDTH;
+use wade_core::model::{Model, Workspace};
 
 fn vehicles() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles")
@@ -48,7 +48,7 @@ fn paper(vehicle: &str, isa: Isa) -> Model {
         let entry = entry.expect("readable");
         std::fs::copy(entry.path(), bundle.join(entry.file_name())).expect("copied");
     }
-    paper_weights::put_into(&bundle);
+    bundles::paper::put_into(&bundle);
     load(&bundle, isa)
 }
 

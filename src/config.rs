@@ -11,7 +11,7 @@ use crate::service::{grpc, health, http, shm};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Folder of the vehicle bundles; empty: the first that exists of the usual ones. See [`crate::bundle::Library`].
+    /// Folder of the vehicle bundles; empty: the first that exists of the usual ones. See [`wade_core::bundle::Library`].
     pub vehicles: PathBuf,
     /// CPUs that the server may use; empty: all.
     pub cpus: Vec<usize>,
@@ -150,12 +150,7 @@ impl Config {
         let frames = grpc.control_frames_per_s;
         range((1.0..=1e6).contains(&frames), "grpc.control_frames_per_s", &frames, "1 to 1000000")?;
         let clients = self.shm.max_clients;
-        range(
-            (1..=crate::wire::shm::MAX_CLIENTS).contains(&clients),
-            "shm.max_clients",
-            &clients,
-            "1 to 64",
-        )?;
+        range((1..=wade_wire::shm::MAX_CLIENTS).contains(&clients), "shm.max_clients", &clients, "1 to 64")?;
         let namespace = &self.shm.namespace;
         let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
         let named = (1..=64).contains(&namespace.len()) && namespace.bytes().all(plain);

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use arc_swap::ArcSwap;
 
-use crate::served::ServedVehicle;
-use crate::wire::UnknownVehicle;
+use wade_core::served::ServedVehicle;
+use wade_wire::UnknownVehicle;
 
 /// Longest name that an error repeats; no bundle's name is longer.
 const MAX_NAME: usize = 64;

@@ -23,13 +23,13 @@ use watchdog::Watchdog;
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::metrics::Metrics;
-use crate::model::kernel::Isa;
 use crate::service::accounts::Accounts;
 use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
 use crate::service::health::{Health, Part, State};
 use crate::service::http::{self, HttpError};
 use crate::service::{call, stopped};
+use wade_core::model::kernel::Isa;
 
 /// Longest time for answers over HTTP that are under way when everything else has ended.
 const HTTP_DRAIN: Duration = Duration::from_secs(1);

@@ -2,9 +2,9 @@
 
 use serde::Deserialize;
 
-use crate::frame::up_from_roll_pitch;
-use crate::wire::State;
-use crate::wire::single;
+use wade_core::frame::up_from_roll_pitch;
+use wade_wire::State;
+use wade_wire::single;
 
 /// Columns that describe a state.
 const STATE: [&str; 25] = [

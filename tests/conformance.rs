@@ -5,8 +5,8 @@ mod common;
 use std::sync::Arc;
 
 use common::{Numbers, Served, VEHICLES, comparable, served_vehicle};
-use wade::client::{InProcess, Reply};
-use wade::wire::State;
+use wade_client::{InProcess, Reply};
+use wade_wire::State;
 
 fn states(count: usize) -> Vec<State> {
     let mut numbers = Numbers::new(42);

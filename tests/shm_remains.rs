@@ -7,18 +7,15 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-#[path = "common/process.rs"]
-mod process;
-
 use common::PATIENCE;
+use common::process::{Process, state, until_answered};
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::{AttributeSpecifier, MessagingPattern, Service as _, ipc};
-use process::{Process, state, until_answered};
 use tempfile::TempDir;
-use wade::client::{ClientError, ShmClient};
-use wade::wire::shm::Wait;
-use wade::wire::shm::layout::{Names, SERVED_LAYOUT, SERVED_VEHICLES};
+use wade_client::{ClientError, ShmClient};
+use wade_wire::shm::Wait;
+use wade_wire::shm::layout::{Names, SERVED_LAYOUT, SERVED_VEHICLES};
 
 /// From here on this process and its children have an iceoryx2 of their own, in which nobody else cleans up.
 struct OwnIceoryx {

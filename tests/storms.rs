@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 use attack::{Attack, Flood, Target, Wire};
 use tempfile::TempDir;
-use wade::client::{GrpcClient, Method};
-use wade::wire::State;
+use wade_client::{GrpcClient, Method};
+use wade_wire::State;
 
 /// No test is about this time.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 use tempfile::TempDir;
-use wade::effects::Effect;
+use wade_core::digest::sha256;
+use wade_core::effects::Effect;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -60,7 +60,7 @@ fn the_folder_is_labeled_and_does_not_name_what_it_hides() {
 #[test]
 fn three_commands_name_the_effect_and_serve_it() {
     let weights = std::fs::read(root().join("vehicles/husky/network.safetensors")).expect("readable");
-    let weights: String = Sha256::digest(&weights).iter().map(|byte| format!("{byte:02x}")).collect();
+    let weights = sha256(&weights);
     assert!(
         text(&trials().join("trials.toml")).contains(&weights),
         "the Husky has other weights than the trials were generated from: run tests/make_trials.py"

@@ -8,18 +8,18 @@ use anyhow::{Context, Result, bail};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade::cfd::case::Settings;
-use wade::cfd::collect::{self, Collected};
-use wade::cfd::openfoam::OpenFoam;
-use wade::cfd::plan::{self, Campaign, Plan, Set};
-use wade::cfd::report;
-use wade::cfd::run::{Event, Machine, Work};
-use wade::cfd::slurm;
-use wade::cfd::trials;
-use wade::dataset;
-use wade::geometry::hydrostatics::float_depth;
-use wade::train;
-use wade::trials::write;
+use wade_core::geometry::hydrostatics::float_depth;
+use wade_learn::cfd::case::Settings;
+use wade_learn::cfd::collect::{self, Collected};
+use wade_learn::cfd::openfoam::OpenFoam;
+use wade_learn::cfd::plan::{self, Campaign, Plan, Set};
+use wade_learn::cfd::report;
+use wade_learn::cfd::run::{Event, Machine, Work};
+use wade_learn::cfd::slurm;
+use wade_learn::cfd::trials;
+use wade_learn::dataset;
+use wade_learn::train;
+use wade_learn::trials::write;
 
 use super::Vehicles;
 
@@ -198,7 +198,7 @@ impl PlanCommand {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn begin(&self, vehicle: &wade::vehicle::Vehicle) -> Result<Plan> {
+    fn begin(&self, vehicle: &wade_core::vehicle::Vehicle) -> Result<Plan> {
         let table = match &self.table {
             Some(path) => read_toml(path)?,
             None => *train::Config::default().analytic.tables.get(&self.vehicle).with_context(|| {
@@ -506,6 +506,6 @@ mod tests {
             toml::Table::try_from(value).expect("a table")
         }
         assert_eq!(toml::from_str(SETTINGS), Ok(table(&Settings::default())));
-        assert_eq!(toml::from_str(TABLE), Ok(table(&wade::parameter_table::ParameterTable::WARTHOG)));
+        assert_eq!(toml::from_str(TABLE), Ok(table(&wade_learn::parameter_table::ParameterTable::WARTHOG)));
     }
 }

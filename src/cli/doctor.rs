@@ -9,14 +9,14 @@ use anyhow::Result;
 use clap::Args;
 use nix::sys::statvfs::statvfs;
 use serde::Serialize;
-use wade::cfd::openfoam::OpenFoam;
-use wade::client::{Address, Client, ClientError, GrpcClient, Method, ShmClient};
 use wade::config::Config;
 use wade::cores;
-use wade::model::kernel::Isa;
 use wade::service::occupant::{self, Occupant};
-use wade::wire::State;
-use wade::wire::shm::Wait;
+use wade_client::{Address, Client, ClientError, GrpcClient, Method, ShmClient};
+use wade_core::model::kernel::Isa;
+use wade_learn::cfd::openfoam::OpenFoam;
+use wade_wire::State;
+use wade_wire::shm::Wait;
 
 use super::{PROGRAM, Vehicles, emit};
 

@@ -6,15 +6,15 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use serde_json::json;
-use wade::bundle::{self, Library};
-use wade::effects::{Body, EffectsFile};
-use wade::files::write_whole;
-use wade::forces::Forces;
-use wade::frame::Vec3;
-use wade::gap::{self, Config, GapError, NotApplicable, Predicted, Report, effects_file};
-use wade::model::kernel::Isa;
-use wade::model::{Model, Workspace};
-use wade::trials::{SimIs, Trials};
+use wade_core::bundle::{self, Library};
+use wade_core::effects::{Body, EffectsFile};
+use wade_core::forces::Forces;
+use wade_core::frame::Vec3;
+use wade_core::model::kernel::Isa;
+use wade_core::model::{Model, Workspace};
+use wade_gap::{Config, GapError, NotApplicable, Predicted, Report, effects_file};
+use wade_learn::files::write_whole;
+use wade_learn::trials::{SimIs, Trials};
 
 use super::gap_bench::GapBench;
 use super::running::Running;
@@ -222,7 +222,7 @@ impl Source {
         let report = if has_bundle {
             let model = library.model(vehicle, Isa::available()[0])?;
             let body = Body::of_vehicle(model.vehicle());
-            gap::run(&trials, &body, &mut predictor(&model), &config)
+            wade_gap::run(&trials, &body, &mut predictor(&model), &config)
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
             let nothing = || format!("there is no vehicle `{vehicle}` ({})", library.origin());
@@ -230,8 +230,8 @@ impl Source {
                 let (trial, vehicle) = (trial.name.clone(), vehicle.clone());
                 return Err(GapError::NoPrediction { trial, vehicle }).with_context(nothing);
             }
-            let body = gap::body_of(&trials).with_context(nothing)?;
-            gap::run(&trials, &body, &mut |_| Predicted::default(), &config)
+            let body = wade_gap::body_of(&trials).with_context(nothing)?;
+            wade_gap::run(&trials, &body, &mut |_| Predicted::default(), &config)
         };
         match &report {
             Ok(report) => report.remarks.iter().for_each(|remark| eprintln!("{remark}")),
@@ -379,7 +379,7 @@ fn check_loss(
 
 /// The model's answers with its uncertainty. Of its moments the model states none; the error of a force is taken to act a quarter
 /// of the hull from its middle, along each axis.
-fn predictor(model: &Model) -> impl FnMut(&wade::condition::Condition) -> Predicted {
+fn predictor(model: &Model) -> impl FnMut(&wade_core::condition::Condition) -> Predicted {
     let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
     let dimensions = model.vehicle().dimensions;
     move |condition| {
@@ -433,14 +433,14 @@ fn regions(report: &Report) -> String {
     if report.regions.is_empty() {
         return "The gap stands out in no region.\n".into();
     }
-    let line = |region: &gap::Region| {
+    let line = |region: &wade_gap::Region| {
         format!(
             "where {}: {:.0} % of the gap in {:.0} % of the samples, {} trials; on {}\n",
             region.place,
             100.0 * region.share_of_gap,
             100.0 * region.share_of_samples,
             region.trials,
-            gap::in_shares(&region.surfaces)
+            wade_gap::in_shares(&region.surfaces)
         )
     };
     report.regions.iter().map(line).collect()

@@ -8,18 +8,18 @@ use anyhow::{Context, Result};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade::gap::{self, Config, GapError, Predicted};
-use wade::gap_bench::answer::Answer;
-use wade::gap_bench::baselines::Method;
-use wade::gap_bench::case::{Case, Family, cases};
-use wade::gap_bench::generate::generate;
-use wade::gap_bench::real::{falling_balls, kvlcc2, rm2_rotor};
-use wade::gap_bench::score::{Row, rows, table};
-use wade::gap_bench::{
+use wade_core::vehicle::shipped;
+use wade_gap::{Config, GapError, Predicted};
+use wade_gap_bench::answer::Answer;
+use wade_gap_bench::baselines::Method;
+use wade_gap_bench::case::{Case, Family, cases};
+use wade_gap_bench::generate::generate;
+use wade_gap_bench::real::{falling_balls, kvlcc2, rm2_rotor};
+use wade_gap_bench::score::{Row, rows, table};
+use wade_gap_bench::{
     Hull, Outcome, Prediction, Progress, Schedule, Simulator, Tool, ToolError, command_tool, folder, run,
 };
-use wade::trials::Trials;
-use wade::vehicle::shipped;
+use wade_learn::trials::Trials;
 
 use super::emit;
 
@@ -262,9 +262,9 @@ impl Bench {
 /// The workflow, on trials in memory.
 fn workflow(trials: &Trials) -> Result<Answer, ToolError> {
     let refused = |error: GapError| ToolError::Refused(Box::new(error));
-    let body = gap::body_of(trials).map_err(refused)?;
+    let body = wade_gap::body_of(trials).map_err(refused)?;
     let report =
-        gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).map_err(refused)?;
+        wade_gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).map_err(refused)?;
     Ok(Answer::from_report(&serde_json::to_value(report)?)?)
 }
 

@@ -7,11 +7,11 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::prelude::*;
-use wade::bundle::Library;
 use wade::config::{Config, Log};
 use wade::server::Running;
 use wade::service::health::{Part, State};
-use wade::wire::shm::Wait;
+use wade_core::bundle::Library;
+use wade_wire::shm::Wait;
 
 use super::log_limit::Limit;
 

@@ -29,11 +29,11 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
-use wade::bundle::{Bundle, Library};
-use wade::files::StagedFile;
-use wade::model::Model;
-use wade::model::kernel::Isa;
-use wade::served::ServedVehicle;
+use wade_core::bundle::{Bundle, Library};
+use wade_core::model::Model;
+use wade_core::model::kernel::Isa;
+use wade_core::served::ServedVehicle;
+use wade_learn::files::StagedFile;
 
 /// This program, its version and commit, as reports name it.
 const PROGRAM: &str = concat!("wade ", env!("CARGO_PKG_VERSION"), " (", env!("WADE_COMMIT"), ")");
@@ -158,7 +158,7 @@ fn path_or_nothing(text: &str) -> Result<PathBuf, std::convert::Infallible> {
 
 /// Refuses a folder for reports that holds a bundle: a file of either would pass for one of the other.
 fn check_report_folder(folder: &Path) -> Result<()> {
-    if folder.join(wade::bundle::VEHICLE_FILE).exists() {
+    if folder.join(wade_core::bundle::VEHICLE_FILE).exists() {
         bail!("{} holds a vehicle bundle: name another folder for the report", folder.display());
     }
     Ok(())

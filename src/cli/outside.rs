@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use wade::domain::{Domain, Outside, Quantity};
-use wade::effects::{BoxQuantity, OutsideBox};
-use wade::model::Anchored;
+use wade_core::domain::{Domain, Outside, Quantity};
+use wade_core::effects::{BoxQuantity, OutsideBox};
+use wade_core::model::Anchored;
 
 use super::state::StateArgs;
 

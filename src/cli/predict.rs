@@ -5,14 +5,14 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use wade::domain::{Domain, Outside};
-use wade::effects::Session;
-use wade::files::StagedFile;
-use wade::frame::Vec3;
-use wade::model::Model;
 use wade::states::{Row, unknown_columns};
-use wade::wire::State;
-use wade::wire::{Evaluated, Evaluator};
+use wade_core::domain::{Domain, Outside};
+use wade_core::effects::Session;
+use wade_core::frame::Vec3;
+use wade_core::model::Model;
+use wade_learn::files::StagedFile;
+use wade_wire::State;
+use wade_wire::{Evaluated, Evaluator};
 
 use super::{Vehicles, outside};
 

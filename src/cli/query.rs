@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use wade::client::{Address, Client, GrpcClient, InProcess, Method, Reply, ShmClient};
-use wade::domain::Domain;
-use wade::model::Model;
 use wade::service::answer::Answer;
-use wade::service::{grpc, shm};
-use wade::wire::proto::EvaluateResponse;
-use wade::wire::shm::Wait;
+use wade::service::grpc;
+use wade_client::{Address, Client, GrpcClient, InProcess, Method, Reply, ShmClient};
+use wade_core::domain::Domain;
+use wade_core::model::Model;
+use wade_wire::proto::EvaluateResponse;
+use wade_wire::shm::{NAMESPACE, Wait};
 
 use super::state::StateArgs;
 use super::{Vehicles, emit, outside, usage_error};
@@ -132,7 +132,7 @@ impl Query {
             (None, Some(Transport::Grpc)) => Some(Address::Tcp(usual.listen)),
             (None, Some(Transport::Uds)) => Some(Address::Unix(usual.unix_socket)),
             (None, Some(Transport::Shm)) => {
-                Some(Address::Shm(self.namespace.clone().unwrap_or_else(|| shm::NAMESPACE.to_owned())))
+                Some(Address::Shm(self.namespace.clone().unwrap_or_else(|| NAMESPACE.to_owned())))
             }
         }
     }

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use clap::Args;
-use wade::client::{Address, AddressError, ClientError, reload};
-use wade::wire::proto::ReloadRequest;
+use wade_client::{Address, AddressError, ClientError, reload};
+use wade_wire::proto::ReloadRequest;
 
 /// Longest wait for a server that may not be there.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -33,7 +33,7 @@ impl Running {
     /// Has the server read the bundle in this folder again, if it serves from there. Whatever becomes of that is no failure
     /// of the command: its own work is done.
     pub fn reload(&self, vehicle: &str, bundle: &Path) {
-        let folder = wade::bundle::canonical(bundle);
+        let folder = wade_core::bundle::canonical(bundle);
         let request = ReloadRequest { vehicle: vehicle.to_owned(), bundle: folder.display().to_string() };
         let server = &self.server;
         match reload(&server.url().unwrap_or_default(), request, TIMEOUT) {

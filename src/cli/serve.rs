@@ -13,7 +13,7 @@ use wade::config::Config;
 use wade::cores;
 use wade::server::{self, Running};
 use wade::service::admin::Reload;
-use wade::wire::shm::Wait;
+use wade_wire::shm::Wait;
 
 use super::log;
 

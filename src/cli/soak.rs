@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
-use wade::client::{Address, Client, ClientError, GrpcClient, InProcess, Method, ShmClient};
 use wade::cores;
-use wade::domain::{Domain, Range};
 use wade::soak::{self, Ask, Clients, Config, Input, Rate, Report, SendError, Slo};
-use wade::wire::State;
-use wade::wire::shm::Wait;
+use wade_client::{Address, Client, ClientError, GrpcClient, InProcess, Method, ShmClient};
+use wade_core::domain::{Domain, Range};
+use wade_wire::State;
+use wade_wire::shm::Wait;
 
 use super::progress::soak_bar;
 use super::soak_server::{Server, Wanted};

@@ -6,9 +6,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 
 use anyhow::{Context, Result, bail};
 use tempfile::TempDir;
-use wade::client::Address;
 use wade::service::{grpc, shm};
-use wade::wire::shm::Wait;
+use wade_client::Address;
+use wade_wire::shm::Wait;
 
 use super::Vehicles;
 use super::soak::Transport;

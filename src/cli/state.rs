@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use wade::frame::up_from_roll_pitch;
-use wade::wire::State;
-use wade::wire::single;
+use wade_core::frame::up_from_roll_pitch;
+use wade_wire::State;
+use wade_wire::single;
 
 /// The state of the vehicle, SI units, radians, body frame (x forward, y left, z up).
 #[derive(Debug, Args)]

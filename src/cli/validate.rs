@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{ArgGroup, Args};
-use wade::model::Model;
-use wade::recordings::{Recordings, generated};
-use wade::trials::Trials;
-use wade::validate::{self, Config, OutFolder, Report, Source, Subject};
+use wade_core::model::Model;
+use wade_learn::recordings::{Recordings, generated, trials_from_recordings};
+use wade_learn::trials::Trials;
+use wade_learn::validate::{self, Config, OutFolder, Report, Source, Subject};
 
 use super::{Vehicles, emit};
 
@@ -125,7 +125,7 @@ impl Validate {
         let source = if self.generated.is_some() { Source::Generated } else { Source::Mocap };
         let recordings = self.mocap.clone().unwrap_or_else(|| folder.recordings());
         let recordings = Recordings::read(&recordings)?;
-        validate::trials_from_recordings(&recordings, model.vehicle(), &config.mocap, &folder.trials())?;
+        trials_from_recordings(&recordings, model.vehicle(), &config.mocap, &folder.trials())?;
         let trials = Trials::read(&folder.trials()).map_err(|error| {
             // the folder that the error names is gone when the user reads it
             let file = error.path.file_name().unwrap_or_default().to_string_lossy().into_owned();

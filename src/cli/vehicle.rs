@@ -9,18 +9,18 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use wade::bundle::{self, Bundle, Kept};
-use wade::condition::FRESH_WATER;
-use wade::domain::Quantity;
-use wade::effects::ActiveEffect;
-use wade::files::StagedFile;
-use wade::frame::WaterPlane;
-use wade::geometry::distance::SignedDistanceGrid;
-use wade::geometry::hydrostatics::hydrostatics;
-use wade::geometry::mesh::Mesh;
-use wade::vehicle::build::build_reporting;
-use wade::vehicle::shipped;
-use wade::vehicle::spec::VehicleSpec;
+use wade_core::bundle::{self, Bundle, Kept};
+use wade_core::condition::FRESH_WATER;
+use wade_core::domain::Quantity;
+use wade_core::effects::ActiveEffect;
+use wade_core::frame::WaterPlane;
+use wade_core::geometry::distance::SignedDistanceGrid;
+use wade_core::geometry::hydrostatics::hydrostatics;
+use wade_core::geometry::mesh::Mesh;
+use wade_core::vehicle::build::build_reporting;
+use wade_core::vehicle::shipped;
+use wade_core::vehicle::spec::VehicleSpec;
+use wade_learn::files::StagedFile;
 
 use super::running::Running;
 use super::{Vehicles, emit};
@@ -260,7 +260,7 @@ fn weights_text(version: &Kept) -> String {
 
 /// What stands in the column of a version's date.
 fn date_of(version: &Kept) -> String {
-    version.written_unix_s.map_or_else(|| "released".to_owned(), wade::files::utc_date)
+    version.written_unix_s.map_or_else(|| "released".to_owned(), wade_learn::files::utc_date)
 }
 
 fn versions(name: &str, current: &Kept, others: &[Kept], as_json: bool) -> Result<()> {
@@ -422,7 +422,7 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     ));
     line(format!("{:<18} {:<7} {:>8}  centroid [m]            normal", "surface", "kind", "area m2"));
     for s in &vehicle.surfaces {
-        let vector = |v: &wade::frame::Vec3| format!("{:7.3} {:7.3} {:7.3}", v.x, v.y, v.z);
+        let vector = |v: &wade_core::frame::Vec3| format!("{:7.3} {:7.3} {:7.3}", v.x, v.y, v.z);
         let kind = format!("{:?}", s.kind).to_lowercase();
         line(format!(
             "{:<18} {kind:<7} {:>8.4}  {} {}",

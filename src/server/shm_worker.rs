@@ -14,13 +14,13 @@ use super::shm_link::{Counted, Order, Report, Start};
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Transport};
-use crate::model::kernel::Isa;
 use crate::service::admin::Reloader;
 use crate::service::shm::{Opening, ShmServer};
 use crate::service::shm_owner::Owner;
 use crate::service::shm_probe::{Own, Probe};
 use crate::service::shm_remains::{self, Remains, ServiceFiles};
-use crate::wire::shm::room;
+use wade_core::model::kernel::Isa;
+use wade_wire::shm::room;
 
 /// How often requests are reported.
 const REPORT: Duration = Duration::from_millis(100);

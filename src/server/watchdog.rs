@@ -14,8 +14,8 @@ use tonic::{Code, Status};
 
 use crate::service::health::{Health, Part, State};
 use crate::service::{grpc, stopped};
-use crate::wire::proto::ListVehiclesRequest;
-use crate::wire::proto::hydrodynamics_client::HydrodynamicsClient;
+use wade_wire::proto::ListVehiclesRequest;
+use wade_wire::proto::hydrodynamics_client::HydrodynamicsClient;
 
 /// How often the server is asked, and how long an answer may take.
 const ASK: Duration = Duration::from_secs(1);

@@ -17,9 +17,9 @@ use tokio::sync::Notify;
 
 pub use crate::metrics::Closed;
 use crate::metrics::{Metrics, Resource};
-use crate::wire::Overloaded;
 pub use connection::{Computing, Connection};
 pub use sent::Sent;
+use wade_wire::Overloaded;
 
 /// A connection whose calls have made no progress for this long may be closed for the sake of others.
 const PATIENCE_UNDER_PRESSURE: Duration = Duration::from_secs(1);

@@ -7,12 +7,12 @@ pub use jobs::{Job, Jobs};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::bundle::{self, BundleError, Fault, Library, LibraryError};
 use crate::engine::Engine;
 use crate::metrics::Metrics;
-use crate::model::kernel::Isa;
-use crate::served::ServedVehicle;
-use crate::wire::UnknownVehicle;
+use wade_core::bundle::{self, BundleError, Fault, Library, LibraryError};
+use wade_core::model::kernel::Isa;
+use wade_core::served::ServedVehicle;
+use wade_wire::UnknownVehicle;
 
 /// No bundle to serve.
 #[derive(Debug, thiserror::Error)]

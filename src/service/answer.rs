@@ -5,9 +5,9 @@
 
 use serde::Serialize;
 
-use crate::domain::Quantity;
-use crate::effects::{BoxQuantity, Effect, LeftOut};
-use crate::wire::proto;
+use wade_core::domain::Quantity;
+use wade_core::effects::{BoxQuantity, Effect, LeftOut};
+use wade_wire::proto;
 
 /// The forces in one state, ready to be written.
 #[derive(Debug, Serialize)]

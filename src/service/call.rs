@@ -8,11 +8,11 @@ use std::time::{Duration, Instant};
 use tonic::{Request, Response, Status};
 
 use super::admin::Reloader;
-use crate::effects::Session;
 use crate::engine::Engine;
 use crate::metrics::{self, Metrics, Transport};
-use crate::served::ServedVehicle;
-use crate::wire::{self, Evaluator, Refusal, nanoseconds_since, proto};
+use wade_core::effects::Session;
+use wade_core::served::ServedVehicle;
+use wade_wire::{Evaluator, Refusal, nanoseconds_since, proto};
 
 thread_local! {
     pub(super) static EVALUATOR: RefCell<Evaluator> = RefCell::default();
@@ -44,10 +44,10 @@ pub(super) fn answer_state(
     state: Option<&proto::State>,
     session: Option<&mut Session>,
 ) -> Result<(proto::EvaluateResponse, Answered), Refusal> {
-    let state = wire::state(state.ok_or(Refusal::MissingState)?)?;
+    let state = wade_wire::state(state.ok_or(Refusal::MissingState)?)?;
     EVALUATOR.with_borrow_mut(|evaluator| {
         let evaluated = evaluator.evaluate(vehicle, &state, session)?;
-        let response = wire::response(vehicle, &evaluated);
+        let response = wade_wire::response(vehicle, &evaluated);
         let out_of_domain = u64::from(!response.in_domain);
         Ok((response, Answered { vehicle: Arc::clone(vehicle), out_of_domain }))
     })

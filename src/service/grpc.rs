@@ -34,11 +34,11 @@ use super::health::{Health, Part, State};
 use super::intake::{self, Listener};
 use super::{occupant, stopped};
 use crate::metrics::Resource;
-use crate::wire::Refusal;
-use crate::wire::proto;
-use crate::wire::proto::admin_server::AdminServer;
-use crate::wire::proto::hydrodynamics_server::HydrodynamicsServer;
-use crate::wire::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
+use wade_wire::Refusal;
+use wade_wire::proto;
+use wade_wire::proto::admin_server::AdminServer;
+use wade_wire::proto::hydrodynamics_server::HydrodynamicsServer;
+use wade_wire::proto::inference::grpc_inference_service_server::GrpcInferenceServiceServer;
 
 /// Settings of the gRPC server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::hash::Hash;
 
-use crate::effects::Session;
+use wade_core::effects::Session;
 
 /// Runs that are surely known.
 pub const CAPACITY: usize = 4096;

@@ -23,14 +23,14 @@ use super::shm_probe::Own;
 use super::shm_remains::{self, Remains, ServiceFiles};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
-use crate::served::ServedVehicle;
-use crate::wire::shm::layout::{
+use wade_core::served::ServedVehicle;
+use wade_wire::shm::layout::{
     Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
 };
-use crate::wire::shm::{
+use wade_wire::shm::{
     Exchange, MAX_CLIENTS, NAMESPACE, ShmError, Wait, events, in_place, node, open, served as shm_served,
 };
-use crate::wire::{Evaluator, InvalidState, Refusal, nanoseconds_since};
+use wade_wire::{Evaluator, InvalidState, Refusal, nanoseconds_since};
 
 /// Settings of the shared-memory server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg, OFlag};
 
-use crate::wire::shm::SHARED_MEMORY;
+use wade_wire::shm::SHARED_MEMORY;
 
 /// Why the namespace is not this process's.
 #[derive(Debug, thiserror::Error)]

@@ -10,9 +10,9 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::ipc;
 use iceoryx2::service::port_factory::client::ClientCreateError;
 
-use crate::wire::State;
-use crate::wire::shm::layout::{Answer, Names, Query};
-use crate::wire::shm::{self, ShmError};
+use wade_wire::State;
+use wade_wire::shm::layout::{Answer, Names, Query};
+use wade_wire::shm::{self, ShmError};
 
 /// How often an answer is looked for.
 const LOOK: Duration = Duration::from_millis(1);

@@ -18,8 +18,8 @@ use iceoryx2::prelude::{CallbackProgression, MessagingPattern, ServiceName, ipc}
 use iceoryx2::service::Service;
 use iceoryx2::service::service_hash::ServiceHash;
 
-use crate::wire::shm::layout::Names;
-use crate::wire::shm::{SHARED_MEMORY, config};
+use wade_wire::shm::layout::Names;
+use wade_wire::shm::{SHARED_MEMORY, config};
 
 /// Longest time that a living client takes to finish a service that it has begun.
 const FINISHING: Duration = Duration::from_millis(100);

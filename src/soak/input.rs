@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::trace::{Trace, TraceError};
-use crate::wire::State;
+use wade_wire::State;
 
 /// The range of states that a vehicle's model was trained on, each as lowest and highest.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -19,7 +19,7 @@ use super::{
     report::Report,
     schedule::Rate,
 };
-use crate::wire::State;
+use wade_wire::State;
 
 /// From the call to the first intended start: time for the control's thread to start.
 const LEAD: Duration = Duration::from_millis(20);

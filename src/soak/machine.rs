@@ -37,7 +37,7 @@ impl Machine {
 /// A time as RFC 3339 in UTC, to the second.
 pub(super) fn rfc3339(time: SystemTime) -> String {
     let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let (year, month, day) = crate::files::civil(seconds / 86_400);
+    let (year, month, day) = wade_learn::files::civil(seconds / 86_400);
     let (hour, minute, second) = (seconds / 3600 % 24, seconds / 60 % 60, seconds % 60);
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
 }

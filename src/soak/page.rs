@@ -8,8 +8,8 @@ use super::{
     record::{Interval, Percentiles},
     report::{Figures, Outcome, Report, sentence},
 };
-use crate::page::plot::{BLUE, GRAY, GREEN, ORANGE, PURPLE, RED, tick};
-use crate::page::{PlotError, document, escape};
+use wade_learn::page::plot::{BLUE, GRAY, GREEN, ORANGE, PURPLE, RED, tick};
+use wade_learn::page::{PlotError, document, escape};
 
 /// The page.
 pub(super) fn page(report: &Report) -> Result<String, PlotError> {

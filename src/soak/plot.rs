@@ -3,7 +3,7 @@
 use hdrhistogram::{Counter, Histogram};
 use plotters::prelude::*;
 
-use crate::page::PlotError;
+use wade_learn::page::PlotError;
 
 /// A named line through points of x and microseconds.
 pub(super) struct Line {

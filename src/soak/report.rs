@@ -24,8 +24,8 @@ pub use super::{
     record::Percentiles,
     slo::{Figures, Outcome},
 };
-use crate::files::write_whole;
-use crate::page::PlotError;
+use wade_learn::files::write_whole;
+use wade_learn::page::PlotError;
 
 /// What a soak found; serialises to `soak.json`.
 #[derive(Debug, Serialize)]

@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::plot::time;
 use super::record::Percentiles;
 use super::report::{Figures, Report, WriteError};
-use crate::files::write_whole;
-use crate::page::plot::{Series, curves};
-use crate::page::{document, table};
+use wade_learn::files::write_whole;
+use wade_learn::page::plot::{Series, curves};
+use wade_learn::page::{document, table};
 
 /// Share of the rate that was asked for which must be answered.
 const LEAST_ANSWERED: f64 = 0.99;
@@ -105,7 +105,7 @@ impl Steps {
             let at = step.target_rate_hz;
             step.reasons
                 .iter()
-                .map(move |reason| format!("<li>{at:.0} Hz: {}</li>", crate::page::escape(reason)))
+                .map(move |reason| format!("<li>{at:.0} Hz: {}</li>", wade_learn::page::escape(reason)))
         });
         let body = format!(
             "<div class=\"verdict\"><b>{}</b><ul>{}</ul></div>{}{figure}",

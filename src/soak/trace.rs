@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use crate::states::{BadValue, Row, unknown_columns};
-use crate::wire::{InvalidState, State};
+use wade_wire::{InvalidState, State};
 
 /// Why a trace cannot be played.
 #[derive(Debug, thiserror::Error)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// Weights of the paper's form, of the same data and held-out cases as the shipped ones.
 pub fn network() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/paper/network.safetensors")
+    super::root().join("tests/fixtures/paper/network.safetensors")
 }
 
 /// Puts the paper's network in the place of the weights of a bundle, which is a copy of a shipped one.
@@ -14,7 +14,7 @@ pub fn put_into(bundle: &Path) {
     let bytes = std::fs::read(network()).expect("the fixture is there");
     let sums = std::fs::read_to_string(bundle.join("SHA256SUMS")).expect("readable");
     let line = |line: &str| match line.ends_with("  network.safetensors") {
-        true => format!("{}  network.safetensors\n", wade::files::sha256(&bytes)),
+        true => format!("{}  network.safetensors\n", wade_core::digest::sha256(&bytes)),
         false => format!("{line}\n"),
     };
     std::fs::write(bundle.join("SHA256SUMS"), sums.lines().map(line).collect::<String>()).expect("written");

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use wade::client::ShmClient;
-use wade::wire::State;
-use wade::wire::shm::layout::Answer;
+use wade_client::ShmClient;
+use wade_wire::State;
+use wade_wire::shm::layout::Answer;
 
 use crate::common::{PATIENCE, vehicles};
 

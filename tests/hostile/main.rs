@@ -357,11 +357,11 @@ fn python(machine: &Machine) -> Option<Child> {
 
 /// Clients live through restarts of their server by SIGTERM.
 fn terminated_under_clients(machine: &Machine) {
-    use wade::client::ShmClient;
-    use wade::wire::shm::Wait;
+    use wade_client::ShmClient;
+    use wade_wire::shm::Wait;
     let mut clients = [Wait::Block, Wait::Spin]
         .map(|wait| ShmClient::new("husky", wait, Duration::from_millis(200)).in_namespace(NAMESPACE));
-    let state = wade::wire::State { depth: 0.15, ..Default::default() };
+    let state = wade_wire::State { depth: 0.15, ..Default::default() };
     let mut python = python(machine);
     for _ in 0..3 {
         let mut server = machine.start();

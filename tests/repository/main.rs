@@ -1,11 +1,13 @@
 //! Promise: the repository is what its documents say: licences, documents, their links, their language, the raw results
 //! behind their figures.
 
+mod layers;
 mod licenses;
 mod links;
 mod prose;
 mod readme;
 mod results;
+mod tree;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

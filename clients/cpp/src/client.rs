@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use wade::client::Address;
-use wade::wire::InvalidState;
-use wade::wire::shm::Wait;
+use wade_client::Address;
+use wade_wire::InvalidState;
+use wade_wire::shm::Wait;
 
 use crate::abi::{WADE_MAX_BATCH, WADE_NEVER, WadeBatch, WadeForces, WadeState, WadeStatus};
 use crate::connection::Connection;

@@ -5,7 +5,7 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use tonic::Code;
-use wade::client::ClientError;
+use wade_client::ClientError;
 
 use crate::abi::WadeStatus;
 use crate::bounded::lock;

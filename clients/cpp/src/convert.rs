@@ -3,9 +3,9 @@
 use std::ffi::c_char;
 use std::time::Instant;
 
-use wade::client::Reply;
-use wade::wire::shm::layout::{self, Answer, Status};
-use wade::wire::{InvalidState, State};
+use wade_client::Reply;
+use wade_wire::shm::layout::{self, Answer, Status};
+use wade_wire::{InvalidState, State};
 
 use crate::abi::{
     WADE_DRY_CONTACT, WADE_HAS_ADDED_MASS, WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WHEEL_SPEEDS,

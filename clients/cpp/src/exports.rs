@@ -11,11 +11,11 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion};
-use wade::client::Address;
-use wade::effects::Effect;
-use wade::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
-use wade::wire::Field;
-use wade::wire::shm::Wait;
+use wade_client::Address;
+use wade_core::effects::Effect;
+use wade_core::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
+use wade_wire::Field;
+use wade_wire::shm::Wait;
 
 use crate::abi::{
     WADE_ABI_VERSION, WadeBatch, WadeForces, WadeOptions, WadeState, WadeStatus, WadeVehicle, WadeWait,

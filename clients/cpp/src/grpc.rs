@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
-use wade::client::{ClientError, GrpcLink, Reply, replies};
-use wade::wire::State;
+use wade_client::{ClientError, GrpcLink, Reply, replies};
+use wade_wire::State;
 
 use crate::abi::{WADE_SESSION_BEGINS, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};

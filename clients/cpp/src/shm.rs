@@ -5,10 +5,10 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use wade::client::{Asked, ShmLink};
-use wade::wire::State;
-use wade::wire::shm::Wait;
-use wade::wire::shm::layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
+use wade_client::{Asked, ShmLink};
+use wade_wire::State;
+use wade_wire::shm::Wait;
+use wade_wire::shm::layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
 
 use crate::abi::{WadeForces, WadeState, WadeStatus};
 use crate::bounded::{lock, lock_until};

@@ -3,9 +3,9 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use wade::client::{ClientError, GrpcClient, Method};
-use wade::effects::Effect;
-use wade::wire::proto;
+use wade_client::{ClientError, GrpcClient, Method};
+use wade_core::effects::Effect;
+use wade_wire::proto;
 
 use crate::abi::{WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE, WadeRange, WadeSurface, WadeVehicle};
 use crate::convert::write_text;

@@ -8,7 +8,7 @@ use tokio::sync::Notify;
 
 use super::{Accounts, Closed, Held, Peer, Place};
 use crate::metrics::Resource;
-use crate::wire::Overloaded;
+use wade_wire::Overloaded;
 
 /// One connection.
 #[derive(Debug)]

@@ -13,9 +13,9 @@ use rustix::thread::gettid;
 use tokio::sync::oneshot;
 
 use super::Reloader;
-use crate::wire::Refusal;
-use crate::wire::UnknownVehicle;
-use crate::wire::proto::Reloaded;
+use wade_wire::Refusal;
+use wade_wire::UnknownVehicle;
+use wade_wire::proto::Reloaded;
 
 /// Niceness of the thread: a tenth of the weight of a query's.
 const NICE: i32 = 10;

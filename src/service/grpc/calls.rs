@@ -22,7 +22,7 @@ use super::name_the_size_limit;
 use crate::metrics::{Metrics, Resource, Transport};
 use crate::service::accounts::{Computing, Connection, Place, Sent};
 use crate::service::stopped;
-use crate::wire::Refusal;
+use wade_wire::Refusal;
 
 /// What a method needs.
 #[derive(Debug, Clone, Copy)]

@@ -7,12 +7,12 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::stream::Answers;
 use crate::metrics::Transport;
-use crate::served::ServedVehicle;
 use crate::service::admin::{Job, Jobs};
 use crate::service::call::{self, Answered, Call, EVALUATOR, Shared, answer_state};
-use crate::wire::proto::admin_server::Admin;
-use crate::wire::proto::hydrodynamics_server::Hydrodynamics;
-use crate::wire::{self, Refusal, proto};
+use wade_core::served::ServedVehicle;
+use wade_wire::proto::admin_server::Admin;
+use wade_wire::proto::hydrodynamics_server::Hydrodynamics;
+use wade_wire::{Refusal, proto};
 
 /// States of a batch or a stream that are computed before others get their turn: about a millisecond.
 pub(super) const STATES_PER_TURN: usize = 64;
@@ -94,7 +94,8 @@ impl Hydrodynamics for Handlers {
         &self,
         _: Request<proto::ListVehiclesRequest>,
     ) -> Result<Response<proto::ListVehiclesResponse>, Status> {
-        let vehicles = self.shared.engine.vehicles().values().map(|vehicle| wire::summary(vehicle)).collect();
+        let vehicles =
+            self.shared.engine.vehicles().values().map(|vehicle| wade_wire::summary(vehicle)).collect();
         Ok(Response::new(proto::ListVehiclesResponse { vehicles }))
     }
 
@@ -104,7 +105,7 @@ impl Hydrodynamics for Handlers {
     ) -> Result<Response<proto::GetVehicleResponse>, Status> {
         let request = request.get_ref();
         let vehicle = self.shared.engine.vehicle(&request.vehicle).map_err(Refusal::from)?;
-        Ok(Response::new(wire::vehicle(&vehicle, request.include_mesh)))
+        Ok(Response::new(wade_wire::vehicle(&vehicle, request.include_mesh)))
     }
 
     async fn get_latency(
@@ -132,9 +133,9 @@ impl Handlers {
         vehicle: Arc<ServedVehicle>,
         request: &proto::EvaluateBatchRequest,
     ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
-        let states = wire::batch(request, self.max_batch)?;
+        let states = wade_wire::batch(request, self.max_batch)?;
         let with_surfaces = !request.omit_surfaces;
-        let mut response = wire::batch_response(&vehicle, states.len(), with_surfaces);
+        let mut response = wade_wire::batch_response(&vehicle, states.len(), with_surfaces);
         for (turn, states) in states.chunks(STATES_PER_TURN).enumerate() {
             if turn > 0 {
                 tokio::task::yield_now().await;
@@ -146,7 +147,7 @@ impl Handlers {
                     let evaluated = evaluator
                         .evaluate(&vehicle, state, None)
                         .map_err(|invalid| Refusal::Invalid { invalid, index: Some(index) })?;
-                    wire::push(&mut response, &evaluated, index as u32, with_surfaces);
+                    wade_wire::push(&mut response, &evaluated, index as u32, with_surfaces);
                 }
                 Ok::<(), Refusal>(())
             })?;

@@ -12,17 +12,17 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::handlers::Handlers;
 use crate::metrics::Transport;
-use crate::served::ServedVehicle;
 use crate::service::admin::{Job, Jobs};
 use crate::service::call::{Answered, Call};
-use crate::wire::proto::Reloaded;
-use crate::wire::proto::inference::grpc_inference_service_server::GrpcInferenceService;
-use crate::wire::proto::inference::infer_parameter::ParameterChoice;
-use crate::wire::proto::inference::model_metadata_response::TensorMetadata;
-use crate::wire::proto::inference::repository_index_response::ModelIndex;
-use crate::wire::proto::inference::*;
-use crate::wire::{Field, Refusal, TensorFault};
 use inputs::{INPUTS, shape, short};
+use wade_core::served::ServedVehicle;
+use wade_wire::proto::Reloaded;
+use wade_wire::proto::inference::grpc_inference_service_server::GrpcInferenceService;
+use wade_wire::proto::inference::infer_parameter::ParameterChoice;
+use wade_wire::proto::inference::model_metadata_response::TensorMetadata;
+use wade_wire::proto::inference::repository_index_response::ModelIndex;
+use wade_wire::proto::inference::*;
+use wade_wire::{Field, Refusal, TensorFault};
 
 /// The state of a model that can be asked.
 const READY: &str = "READY";

@@ -9,11 +9,11 @@ use tonic::{Code, Status, Streaming};
 
 use super::handlers::STATES_PER_TURN;
 use super::size_limit;
-use crate::effects::Session;
 use crate::metrics::Transport;
 use crate::service::call::{Call, Shared, answer_state};
-use crate::wire::Refusal;
-use crate::wire::proto;
+use wade_core::effects::Session;
+use wade_wire::Refusal;
+use wade_wire::proto;
 
 /// The answering half of a `Stream` call.
 pub struct Answers {

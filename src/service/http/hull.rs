@@ -13,9 +13,9 @@ use serde::Serialize;
 
 use super::Shared;
 use super::rejection::Rejection;
-use crate::files::sha256;
-use crate::served::ServedVehicle;
-use crate::wire::{Refusal, single};
+use wade_core::digest::sha256;
+use wade_core::served::ServedVehicle;
+use wade_wire::{Refusal, single};
 
 /// Most triangles that are sent: about 10 MB of JSON.
 const MAX_TRIANGLES: usize = 200_000;

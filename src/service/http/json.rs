@@ -11,7 +11,7 @@ use prost_reflect::{
 use serde_json::{Map, Value};
 
 use super::rejection::Rejection;
-use crate::wire::proto;
+use wade_wire::proto;
 
 static POOL: LazyLock<DescriptorPool> =
     LazyLock::new(|| DescriptorPool::decode(proto::DESCRIPTORS).expect("the build wrote the descriptors"));

@@ -17,7 +17,7 @@ use crate::metrics::{Resource, Transport};
 use crate::service::accounts::{Computing, Connection};
 use crate::service::answer::Answer;
 use crate::service::call::{self, Call, answer_state};
-use crate::wire::{self, Refusal, proto};
+use wade_wire::{Refusal, proto};
 
 /// Longest body [bytes]: a query with every field takes about one kilobyte.
 const MAX_BODY: usize = 64 << 10;
@@ -78,13 +78,13 @@ fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Resul
 
 async fn vehicles(State(shared): State<Arc<Shared>>) -> Response {
     let vehicles = shared.grpc.engine.vehicles();
-    let vehicles = vehicles.values().map(|vehicle| wire::summary(vehicle)).collect();
+    let vehicles = vehicles.values().map(|vehicle| wade_wire::summary(vehicle)).collect();
     json::write("wade.v1.ListVehiclesResponse", &proto::ListVehiclesResponse { vehicles })
 }
 
 async fn vehicle(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Rejection> {
     let vehicle = shared.grpc.engine.vehicle(&name).map_err(Refusal::from)?;
-    Ok(json::write("wade.v1.GetVehicleResponse", &wire::vehicle(&vehicle, false)))
+    Ok(json::write("wade.v1.GetVehicleResponse", &wade_wire::vehicle(&vehicle, false)))
 }
 
 async fn latency(State(shared): State<Arc<Shared>>) -> Response {

@@ -5,7 +5,7 @@ use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
 use tonic::Code;
 
-use crate::wire::Refusal;
+use wade_wire::Refusal;
 
 /// Why a request got no answer.
 #[derive(Debug, thiserror::Error)]

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use crate::wire::proto;
-use crate::wire::proto::inference::infer_parameter::ParameterChoice;
-use crate::wire::proto::inference::model_infer_request::InferInputTensor;
-use crate::wire::proto::inference::{InferParameter, ModelInferRequest};
-use crate::wire::{Field, InvalidState, Problem, Refusal, TensorFault};
+use wade_wire::proto;
+use wade_wire::proto::inference::infer_parameter::ParameterChoice;
+use wade_wire::proto::inference::model_infer_request::InferInputTensor;
+use wade_wire::proto::inference::{InferParameter, ModelInferRequest};
+use wade_wire::{Field, InvalidState, Problem, Refusal, TensorFault};
 
 /// The inputs with their values a state, by the names of the arrays of a batch. All are FP32.
 pub const INPUTS: [(Field, usize); 11] = [

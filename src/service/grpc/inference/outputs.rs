@@ -3,13 +3,13 @@
 use std::mem::take;
 
 use super::inputs::short;
-use crate::domain::Quantity;
-use crate::effects::{BoxQuantity, Effect};
-use crate::served::ServedVehicle;
-use crate::wire::TensorFault;
-use crate::wire::proto;
-use crate::wire::proto::inference::model_infer_request::InferRequestedOutputTensor;
-use crate::wire::proto::inference::{InferTensorContents, model_infer_response::InferOutputTensor};
+use wade_core::domain::Quantity;
+use wade_core::effects::{BoxQuantity, Effect};
+use wade_core::served::ServedVehicle;
+use wade_wire::TensorFault;
+use wade_wire::proto;
+use wade_wire::proto::inference::model_infer_request::InferRequestedOutputTensor;
+use wade_wire::proto::inference::{InferTensorContents, model_infer_response::InferOutputTensor};
 
 /// An output, by the name of the array of the answer to a batch; `in_domain` and `outside` are by state here, and `outside`
 /// and `effects_outside` hold 0 for what is not outside.

@@ -1,0 +1,162 @@
+//! The shared-memory client: polls or sleeps for its answer, and finds a server again that was killed and restarted.
+
+use std::time::{Duration, Instant};
+
+use tonic::Code;
+
+use super::shm_link::{Lost, ShmLink, not_served};
+use super::{ClientError, EffectReply, Reply, SurfaceReply};
+use wade_core::effects::{Effect, LeftOut};
+use wade_wire::State;
+use wade_wire::shm::layout::{
+    Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query, Status, SurfaceAnswer,
+};
+use wade_wire::shm::{self, Wait};
+
+/// A client of one vehicle, owned by one thread.
+#[derive(Debug)]
+pub struct ShmClient {
+    names: Names,
+    vehicle: String,
+    wait: Wait,
+    timeout: Duration,
+    session: u64,
+    link: Option<ShmLink>,
+}
+
+impl ShmClient {
+    /// A client that connects with its first call. `timeout` bounds each call [s].
+    pub fn new(vehicle: &str, wait: Wait, timeout: Duration) -> Self {
+        let names = Names::new(shm::NAMESPACE);
+        Self { names, vehicle: vehicle.to_owned(), wait, timeout, session: 0, link: None }
+    }
+
+    /// Takes the states from now on for a run of this number, one after the other, so that effects remember; 0 for none.
+    pub fn in_session(self, session: u64) -> Self {
+        Self { session, ..self }
+    }
+
+    /// Asks the server of another namespace than the default.
+    pub fn in_namespace(self, namespace: &str) -> Self {
+        Self { names: Names::new(namespace), ..self }
+    }
+
+    /// The forces in one state.
+    pub fn evaluate(&mut self, state: &State) -> Result<Answer, ClientError> {
+        let query = Query { session: self.session, ..Query::from(state) };
+        let answer = self.exchange(|link, deadline| {
+            let asked = link.ask(query)?;
+            link.answer(&asked, deadline, Answer::copied)
+        })?;
+        match answer.refusal() {
+            Some(invalid) => Err(invalid.into()),
+            None if answer.status == Status::Ok as u32 => Ok(answer),
+            None => Err(self.refused(answer.status)),
+        }
+    }
+
+    /// The forces in each state of a batch.
+    pub fn evaluate_batch(&mut self, states: &[State]) -> Result<Vec<Answer>, ClientError> {
+        self.exchange_batch(states, |answer| {
+            answer.answers[..states.len()].iter().map(Answer::copied).collect()
+        })
+    }
+
+    /// The server's own time for a batch [ns].
+    pub fn compute_batch(&mut self, states: &[State]) -> Result<u64, ClientError> {
+        self.exchange_batch(states, |answer| answer.compute_ns)
+    }
+
+    fn exchange_batch<T>(
+        &mut self,
+        states: &[State],
+        take: impl Fn(&BatchAnswer) -> T,
+    ) -> Result<T, ClientError> {
+        let len = states.len();
+        if len > MAX_BATCH {
+            return Err(ClientError::BatchTooLong { len, limit: MAX_BATCH });
+        }
+        let session = self.session;
+        let queries = states.iter().map(|state| Query { session, ..Query::from(state) });
+        let (status, refusal, taken) = self.exchange(|link, deadline| {
+            let asked = link.ask_batch(queries)?;
+            link.answer_batch(&asked, deadline, |answer| (answer.status, answer.refusal(), take(answer)))
+        })?;
+        match refusal {
+            _ if status == Status::Ok as u32 => Ok(taken),
+            Some((invalid, _)) => Err(invalid.into()),
+            None if status == Status::InvalidBatch as u32 => Err(ClientError::Refused {
+                code: Code::InvalidArgument,
+                message: "the batch is empty or too long, or has a flag that the server does not know".into(),
+            }),
+            None => Err(self.refused(status)),
+        }
+    }
+
+    /// The error of a status that names no field.
+    fn refused(&self, status: u32) -> ClientError {
+        if status == Status::NotServed as u32 {
+            return not_served(&self.names, &self.vehicle);
+        }
+        // a code that a newer server of the same layout may send
+        ClientError::Refused {
+            code: Code::Unknown,
+            message: format!("status {status}; is the client up to date?"),
+        }
+    }
+
+    /// One call on a link that is opened where there is none and given up where nobody answers.
+    fn exchange<T>(
+        &mut self,
+        call: impl FnOnce(&mut ShmLink, Instant) -> Result<Option<T>, Lost>,
+    ) -> Result<T, ClientError> {
+        let deadline = Instant::now() + self.timeout;
+        let link = match &mut self.link {
+            Some(link) => link,
+            None => self.link.insert(ShmLink::open(&self.names, &self.vehicle, self.wait)?),
+        };
+        let result = match call(link, deadline) {
+            Ok(Some(taken)) => return Ok(taken),
+            Ok(None) => Err(ClientError::Timeout(self.timeout)),
+            Err(lost) => Err(ClientError::NoServer { at: "shared memory".into(), reason: lost.to_string() }),
+        };
+        self.link = None;
+        result
+    }
+}
+
+impl From<&Answer> for Reply {
+    fn from(answer: &Answer) -> Self {
+        let surface = |load: &SurfaceAnswer| SurfaceReply {
+            force: load.force_n,
+            point: load.point_m,
+            wetted_fraction: load.wetted_fraction,
+        };
+        let effect = |load: &EffectAnswer| {
+            Some(EffectReply {
+                effect: Effect::from_code(load.effect)?,
+                force: load.force_n,
+                moment: load.moment_nm,
+                left_out: LeftOut::from_code(load.left_out),
+            })
+        };
+        Self {
+            version: answer.bundle_version,
+            provenance: answer.provenance().to_owned(),
+            surfaces: answer.surfaces().iter().map(surface).collect(),
+            force: answer.force_n,
+            moment: answer.moment_nm,
+            about: answer.about_m,
+            uncertainty: answer.force_deviation_n,
+            outside: answer.outside(),
+            effects: answer.effects().iter().filter_map(effect).collect(),
+            effect_surface_forces: match answer.effect_count {
+                0 => Vec::new(),
+                _ => answer.surfaces().iter().map(|load| load.effect_force_n).collect(),
+            },
+            effects_outside: answer.effects_outside(),
+            added_mass: (answer.flags & HAS_ADDED_MASS != 0).then_some(answer.added_mass),
+            compute_ns: answer.compute_ns,
+        }
+    }
+}

@@ -1,0 +1,422 @@
+//! Promise: the effects of a bundle are served by the functions that they were fitted with, and each does what it says.
+#![allow(clippy::unwrap_used)]
+
+use crate::common::{Numbers, VEHICLES, effect, effects_file, every_effect, model, served_with};
+use nalgebra::Vector6;
+use wade_core::condition::Condition;
+use wade_core::effects::{
+    self, BaseDrag, Body, Circumstances, Effect, EffectLoad, Immersion, Input, LeftOut, Memory, Session,
+};
+use wade_core::forces::Forces;
+use wade_core::frame::{Vec3, up_from_roll_pitch};
+use wade_core::geometry::hydrostatics::hydrostatics;
+use wade_core::model::Workspace;
+use wade_core::served::{Loads, ServedVehicle};
+use wade_core::wrench::Wrench;
+
+fn evaluate(served: &ServedVehicle, condition: &Condition, told: &Circumstances) -> Loads {
+    let mut loads = Loads::default();
+    served.evaluate(condition, told, None, &mut Workspace::new(), &mut loads);
+    loads
+}
+
+fn only(vehicle: &str, name: Effect, value: f64) -> ServedVehicle {
+    served_with(vehicle, effects_file(vehicle, vec![effect(name, value)]))
+}
+
+fn load(loads: &Loads, name: Effect) -> EffectLoad {
+    *loads.effects.loads.iter().find(|load| load.effect == name).unwrap()
+}
+
+/// A wading, turning, accelerating, tilted vehicle.
+fn busy() -> Condition {
+    let velocity = Vec3::new(0.7, -0.2, 0.05);
+    Condition {
+        angular_velocity: Vec3::new(0.1, -0.05, 0.4),
+        acceleration: Vec3::new(0.8, 0.3, -0.2),
+        angular_acceleration: Vec3::new(0.2, -0.1, 0.6),
+        up: up_from_roll_pitch(0.03, -0.05),
+        ..Condition::level(velocity, 0.17)
+    }
+}
+
+fn told() -> Circumstances {
+    Circumstances {
+        heading: Some(0.6),
+        depth_rate: Some(0.2),
+        wheel_speeds: Some([3.0, 4.0, 5.0, 6.0]),
+        ..Circumstances::default()
+    }
+}
+
+fn close(a: &Vec3, b: &Vec3, tolerance: f64) -> bool {
+    (a - b).norm() <= tolerance * (1.0 + a.norm().max(b.norm()))
+}
+
+#[test]
+fn surfaces_and_effects_sum_to_the_wrench() {
+    for vehicle in VEHICLES {
+        let served = served_with(vehicle, every_effect(vehicle));
+        let center = served.model().vehicle().center_of_mass;
+        let mut session = Session::default();
+        let mut numbers = Numbers::new(3);
+        let (mut workspace, mut loads) = (Workspace::new(), Loads::default());
+        for _ in 0..50 {
+            let drawn = numbers.drawn();
+            let (condition, told) = (drawn.condition(), drawn.circumstances());
+            served.evaluate(&condition, &told, Some(&mut session), &mut workspace, &mut loads);
+            let mut sum = Wrench::default();
+            for surface in &loads.forces.surfaces {
+                sum += Wrench::from_force_at(surface.force, &surface.point, &center);
+            }
+            for load in &loads.effects.loads {
+                sum += load.wrench;
+            }
+            assert!(close(&sum.force, &loads.forces.wrench.force, 1e-12), "{vehicle} {condition:?}");
+            assert!(close(&sum.moment, &loads.forces.wrench.moment, 1e-12), "{vehicle} {condition:?}");
+        }
+    }
+}
+
+#[test]
+fn an_effect_that_acts_on_surfaces_says_on_which() {
+    for name in [Effect::DragCoefficientError, Effect::LinearDamping, Effect::Rotation, Effect::BedMotion] {
+        let loads = evaluate(&only("warthog", name, 0.3), &busy(), &told());
+        let sum: Vec3 = loads.effects.surface_forces.iter().sum();
+        assert!(sum.norm() > 0.1 && close(&sum, &load(&loads, name).wrench.force, 1e-12), "{}", name.name());
+    }
+    // the hull as a whole
+    let loads = evaluate(&only("warthog", Effect::Squat, 0.3), &busy(), &told());
+    assert!(loads.effects.surface_forces.iter().all(|force| *force == Vec3::zeros()));
+}
+
+#[test]
+fn a_hull_that_turns_and_drifts_with_a_current_feels_no_more_inertia_than_one_that_turns_in_still_water() {
+    let turning =
+        Condition { angular_velocity: Vec3::new(0.0, 0.0, 0.8), ..Condition::level(Vec3::zeros(), 0.17) };
+    // straight over ground and unaccelerated, at the velocity of the water
+    let drifting = Condition { ground_velocity: Vec3::new(0.9, -0.4, 0.0), ..turning };
+    let in_turn = |name: Effect, condition: &Condition| {
+        let served = only("warthog", name, 0.3);
+        let mut session = Session::default();
+        let (mut loads, mut last) = (Loads::default(), Wrench::default());
+        for _ in 0..3 {
+            let told = Circumstances { time_step: 0.1, ..told() };
+            served.evaluate(condition, &told, Some(&mut session), &mut Workspace::new(), &mut loads);
+            last = load(&loads, name).wrench;
+        }
+        last
+    };
+    for name in [Effect::AddedMass, Effect::WaveMemory] {
+        assert_eq!(in_turn(name, &drifting), in_turn(name, &turning), "{}", name.name());
+    }
+}
+
+#[test]
+fn without_effects_the_answer_is_the_model_s_own() {
+    let bare = ServedVehicle::new(model("husky"), None);
+    let mut forces = Forces::default();
+    bare.model().evaluate(&busy(), &mut Workspace::new(), &mut forces);
+    let loads = evaluate(&bare, &busy(), &told());
+    assert_eq!(loads.forces, forces);
+    assert!(loads.effects.loads.is_empty() && loads.effects.added_mass.is_none());
+}
+
+/// What fitting sees: the load of each coefficient at 1 along a motion, times its value.
+fn as_fitted(served: &ServedVehicle, motion: &[(Condition, f64)], told: &Circumstances) -> Vec<Vec<Wrench>> {
+    let body = Body::of_vehicle(served.model().vehicle());
+    let file = served.effects().unwrap();
+    let mut memories = vec![Memory::default(); file.effects.len()];
+    let mut immersion = Immersion::default();
+    let mut forces = Forces::default();
+    let mut along = Vec::new();
+    for (sample, (condition, step)) in motion.iter().enumerate() {
+        served.model().evaluate(condition, &mut Workspace::new(), &mut forces);
+        body.immerse(condition, &mut immersion);
+        let at = file.effects.iter().zip(&mut memories).map(|(effect, memory)| {
+            let input = Input {
+                body: &body,
+                condition,
+                immersion: &immersion,
+                predicted: forces.wrench,
+                base_drag: BaseDrag::from(effect.base_drag),
+                yaw: told.heading.unwrap(),
+                wetting_rate: told.depth_rate.unwrap(),
+                channel_width: effect.channel_width,
+                wheel_speeds: told.wheel_speeds.unwrap().map(Some),
+            };
+            let since = if sample > 0 { *step } else { 0.0 };
+            effects::advance(effect.name, &effect.shape, memory, &input, since);
+            let mut sum = Wrench::default();
+            effects::basis(effect.name, &effect.shape, memory, &input, |coefficient, _, load| {
+                sum += load * effect.parameters[effect.name.coefficients()[coefficient].name].value;
+            });
+            sum
+        });
+        along.push(at.collect());
+    }
+    along
+}
+
+#[test]
+fn what_is_served_along_a_run_is_what_was_fitted() {
+    for vehicle in VEHICLES {
+        let served = served_with(vehicle, every_effect(vehicle));
+        let motion: Vec<(Condition, f64)> = (0..80)
+            .map(|i| {
+                let t = 0.05 * f64::from(i);
+                let velocity = Vec3::new(0.5 + 0.4 * t.sin(), 0.1 * t.cos(), 0.0);
+                let state = Condition {
+                    acceleration: Vec3::new(0.4 * t.cos(), -0.1 * t.sin(), 0.0),
+                    angular_velocity: Vec3::new(0.0, 0.02, 0.3 * t.sin()),
+                    up: up_from_roll_pitch(0.02 * t.sin(), 0.04 * t.cos()),
+                    ..Condition::level(velocity, 0.1 + 0.05 * t.sin().abs())
+                };
+                (state, if i == 0 { 0.0 } else { 0.05 })
+            })
+            .collect();
+        let expected = as_fitted(&served, &motion, &told());
+        let (mut session, mut workspace, mut loads) =
+            (Session::default(), Workspace::new(), Loads::default());
+        let mut remembered = 0.0;
+        for ((condition, time_step), expected) in motion.iter().zip(expected) {
+            let told = Circumstances { time_step: *time_step, ..told() };
+            served.evaluate(condition, &told, Some(&mut session), &mut workspace, &mut loads);
+            for (load, expected) in loads.effects.loads.iter().zip(&expected) {
+                assert_eq!(load.wrench, *expected, "{vehicle} {}", load.effect.name());
+                assert_eq!(load.left_out, None);
+            }
+            remembered += load(&loads, Effect::WaveMemory).wrench.force.norm()
+                + load(&loads, Effect::HullFlooding).wrench.force.norm();
+        }
+        assert!(remembered > 1.0, "the run has a memory");
+    }
+}
+
+#[test]
+fn added_mass_pulls_back_by_its_mass_times_the_acceleration() {
+    let served = only("husky", Effect::AddedMass, 0.5);
+    let vehicle = served.model().vehicle();
+    let still = Condition { acceleration: Vec3::new(1.2, 0.0, 0.0), ..Condition::level(Vec3::zeros(), 0.15) };
+    let plane = still.water_plane(vehicle.z0);
+    let volume = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &vehicle.center_of_mass).displaced_volume;
+    let loads = evaluate(&served, &still, &Circumstances::default());
+    let force = load(&loads, Effect::AddedMass).wrench.force;
+    let expected = -0.5 * 1000.0 * volume * 1.2;
+    // the volume is looked up in a table
+    assert!((force.x / expected - 1.0).abs() < 0.08 && force.y == 0.0, "{force} {expected}");
+    let matrix = loads.effects.added_mass.unwrap();
+    assert!((matrix[(0, 0)] * 1.2 + force.x).abs() < 1e-9);
+}
+
+#[test]
+fn the_matrix_times_the_acceleration_is_the_force_that_an_implicit_integration_is_spared() {
+    for vehicle in VEHICLES {
+        let served = only(vehicle, Effect::AddedMass, 0.7);
+        let state = busy();
+        let explicit = evaluate(&served, &state, &told());
+        let implicit = evaluate(&served, &state, &Circumstances { implicit_added_mass: true, ..told() });
+        let matrix = explicit.effects.added_mass.unwrap();
+        assert_eq!(Some(matrix), implicit.effects.added_mass);
+        assert!((matrix - matrix.transpose()).norm() < 1e-9 * matrix.norm());
+        // rates of the body components of the velocity of the center of mass
+        let center = served.model().vehicle().center_of_mass;
+        let linear = state.acceleration - state.angular_velocity.cross(&state.velocity)
+            + state.angular_acceleration.cross(&center);
+        let angular = state.angular_acceleration;
+        let rate = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
+        let expected = -(matrix * rate);
+        let (with, without) = (explicit.forces.wrench, implicit.forces.wrench);
+        let (force, moment) = (with.force - without.force, with.moment - without.moment);
+        assert!(close(&force, &Vec3::new(expected[0], expected[1], expected[2]), 1e-9), "{force} {expected}");
+        assert!(
+            close(&moment, &Vec3::new(expected[3], expected[4], expected[5]), 1e-9),
+            "{moment} {expected}"
+        );
+        // what turns with the hull stays: a steady turn needs a force
+        assert!(load(&implicit, Effect::AddedMass).wrench.force.norm() > 0.1);
+    }
+}
+
+#[test]
+fn a_current_acts_as_the_velocity_that_it_takes_off() {
+    let drag = |velocity: Vec3, current: f64| {
+        let loads =
+            evaluate(&only("warthog", Effect::Current, current), &Condition::level(velocity, 0.25), &told());
+        load(&loads, Effect::Current).wrench.force
+    };
+    // parked, heading along the current of 0.3 m/s east and 0.3 m/s north: pushed ahead
+    let heading = std::f64::consts::FRAC_PI_4;
+    let ahead = Circumstances { heading: Some(heading), ..Circumstances::default() };
+    let served = only("warthog", Effect::Current, 0.3);
+    let parked = evaluate(&served, &Condition::level(Vec3::zeros(), 0.25), &ahead);
+    let pushed = load(&parked, Effect::Current).wrench.force;
+    let speed = 0.3 * 2_f64.sqrt();
+    let body = Body::of_vehicle(served.model().vehicle());
+    let mut immersion = Immersion::default();
+    body.immerse(&Condition::level(Vec3::zeros(), 0.25), &mut immersion);
+    let area: f64 =
+        body.panels.iter().zip(&immersion.panels).map(|(p, w)| p.facing_minus.x * w.fraction).sum();
+    let expected = 0.5 * 1000.0 * 1.1 * area * speed * speed;
+    assert!(
+        (pushed.x / expected - 1.0).abs() < 1e-9 && pushed.y.abs() < 1e-9 * expected,
+        "{pushed} {expected}"
+    );
+    // a vehicle that goes with the water at its speed has no drag left: the effect takes off what the model answers, and what
+    // the stated coefficient says in the share that a slow flow leaves it, 0.09^2 / (v^4 + 0.09^2)
+    let with = Condition::level(Vec3::new(speed, 0.0, 0.0), 0.25);
+    let loads = evaluate(&served, &with, &ahead);
+    let fore: f64 =
+        body.panels.iter().zip(&immersion.panels).map(|(p, w)| p.facing_plus.x * w.fraction).sum();
+    let stated = 0.5 * 1000.0 * 1.1 * fore * speed * speed;
+    let mut bare = Forces::default();
+    served.model().evaluate(&with, &mut Workspace::new(), &mut bare);
+    let trust = speed.powi(4) / (speed.powi(4) + 0.09_f64.powi(2));
+    let own = trust * -bare.wrench.force.x + (1.0 - trust) * stated;
+    let taken = load(&loads, Effect::Current).wrench.force.x;
+    assert!((taken / own - 1.0).abs() < 1e-6, "{taken} {own} {stated}");
+    assert_eq!(drag(Vec3::new(1.0, 0.2, 0.0), 0.0), Vec3::zeros());
+    // the world turns with the heading: east seen from a vehicle that looks east is ahead
+    let east = |heading: f64| {
+        let mut one = effect(Effect::Current, 0.0);
+        one.parameters.get_mut("east").unwrap().value = 0.4;
+        one.shape = [0.4, 0.0, 0.0];
+        let served = served_with("warthog", effects_file("warthog", vec![one]));
+        let told = Circumstances { heading: Some(heading), ..Circumstances::default() };
+        load(&evaluate(&served, &Condition::level(Vec3::zeros(), 0.25), &told), Effect::Current).wrench.force
+    };
+    assert!(east(0.0).x > 1.0 && east(0.0).y.abs() < 1e-9);
+    // and from one that looks north it comes from the left
+    let north = east(std::f64::consts::FRAC_PI_2);
+    assert!(north.y < -1.0 && north.x.abs() < 1e-9, "{north}");
+}
+
+#[test]
+fn a_density_error_scales_the_model() {
+    let served = only("husky", Effect::DensityError, 0.12);
+    let mut forces = Forces::default();
+    served.model().evaluate(&busy(), &mut Workspace::new(), &mut forces);
+    let loads = evaluate(&served, &busy(), &told());
+    assert!(close(&loads.forces.wrench.force, &(forces.wrench.force * 1.12), 1e-12));
+    assert!(close(&loads.forces.wrench.moment, &(forces.wrench.moment * 1.12), 1e-12));
+    assert_eq!(loads.forces.surfaces, forces.surfaces, "surfaces keep the model's loads");
+}
+
+#[test]
+fn a_channel_multiplies_the_drag_by_continuity_and_more_where_the_surface_falls() {
+    let (width, depth, faded_at) = (4.0, 0.17, 0.8);
+    let mut blockage = effect(Effect::ChannelBlockage, 1.0);
+    blockage.shape = [faded_at, 0.0, 0.0];
+    blockage.parameters.get_mut("faded_at").unwrap().value = faded_at;
+    let served = served_with("husky", effects_file("husky", vec![blockage]));
+    let vehicle = served.model().vehicle();
+    // share of the channel's section that the hull's mean section takes
+    let plane = Condition::level(Vec3::zeros(), depth).water_plane(vehicle.z0);
+    let hydrostatics = hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &vehicle.center_of_mass);
+    let share = hydrostatics.displaced_volume / (vehicle.dimensions.length * width * depth);
+    let by_continuity = (1.0 - share).powi(-2) - 1.0;
+    let more = |froude: f64| {
+        let speed = froude * (wade_core::frame::GRAVITY * depth).sqrt();
+        let loads = evaluate(&served, &Condition::level(Vec3::new(speed, 0.0, 0.0), depth), &told());
+        let drag: f64 = loads.forces.surfaces.iter().map(|load| load.force.x).sum();
+        load(&loads, Effect::ChannelBlockage).wrench.force.x / drag / by_continuity
+    };
+    // slow flow has a level surface, and so has that above the end of the fade
+    assert!((more(0.02) - 1.0).abs() < 0.03, "{}", more(0.02));
+    assert!((more(0.85) - 1.0).abs() < 0.03, "{}", more(0.85));
+    assert!(more(0.4) > 1.1 && more(0.6) > more(0.4), "{} {}", more(0.4), more(0.6));
+}
+
+#[test]
+fn a_water_level_offset_lifts_by_the_waterplane() {
+    let served = only("warthog", Effect::WaterLevelOffset, 0.01);
+    let vehicle = served.model().vehicle();
+    let state = Condition::level(Vec3::zeros(), 0.2);
+    let lift = |depth: f64| {
+        let plane = Condition { depth, ..state }.water_plane(vehicle.z0);
+        hydrostatics(&vehicle.hull.mesh, &plane, 1000.0, &vehicle.center_of_mass).wrench.force.z
+    };
+    let expected = lift(0.205) - lift(0.195);
+    let found = load(&evaluate(&served, &state, &told()), Effect::WaterLevelOffset).wrench.force.z;
+    assert!((found / expected - 1.0).abs() < 0.15, "{found} {expected}");
+}
+
+#[test]
+fn above_its_box_an_effect_is_that_of_the_edge_and_the_answer_says_so() {
+    let mut file = every_effect("husky");
+    file.validity.speed_mps = [0.2, 0.5];
+    file.validity.depth_m = [0.05, 0.12];
+    let served = served_with("husky", file);
+    let at = |speed: f64, depth: f64| {
+        evaluate(&served, &Condition::level(Vec3::new(speed, 0.0, 0.0), depth), &told())
+    };
+    let (edge, fast, deep) = (at(0.5, 0.12), at(2.0, 0.12), at(0.5, 0.19));
+    assert_eq!(edge.effects.outside, [0.0; 5]);
+    assert_eq!(fast.effects.outside, [0.0, 1.5, 0.0, 0.0, 0.0]);
+    assert!((deep.effects.outside[0] - 0.07).abs() < 1e-12);
+    for (load, other) in edge.effects.loads.iter().zip(fast.effects.loads.iter().chain(&deep.effects.loads)) {
+        // the model's own wrench, which a density error scales, is that of the state
+        if load.effect != Effect::DensityError {
+            assert!(close(&load.wrench.force, &other.wrench.force, 1e-12), "{}", load.effect.name());
+        }
+    }
+    assert!(fast.forces.surfaces != edge.forces.surfaces, "the model itself is not moved");
+}
+
+#[test]
+fn what_cannot_be_told_is_left_out_and_named() {
+    let served = served_with("husky", every_effect("husky"));
+    let state = Condition::level(Vec3::new(0.5, 0.0, 0.0), 0.15);
+    let why = |condition: &Condition, told: &Circumstances, session: Option<&mut Session>| {
+        let mut loads = Loads::default();
+        served.evaluate(condition, told, session, &mut Workspace::new(), &mut loads);
+        let left = loads.effects.loads.iter().filter_map(|load| Some((load.effect.name(), load.left_out?)));
+        let left: Vec<_> = left.collect();
+        let zero = loads.effects.loads.iter().filter(|load| load.left_out.is_some());
+        zero.for_each(|load| assert_eq!(load.wrench, Wrench::default()));
+        left
+    };
+    let nothing = why(&state, &Circumstances::default(), None);
+    assert_eq!(
+        nothing,
+        [
+            ("current", LeftOut::NoHeading),
+            ("hull_flooding", LeftOut::NoSession),
+            ("water_entry_slamming", LeftOut::NoDepthRate),
+            ("wave_memory", LeftOut::NoSession),
+            ("wheel_paddle_thrust", LeftOut::NoWheelSpeeds),
+        ]
+    );
+    assert_eq!(why(&state, &told(), Some(&mut Session::default())), []);
+    let stated = Condition { ground_velocity: Vec3::zeros(), ..state };
+    assert_eq!(why(&stated, &told(), Some(&mut Session::default())), [("current", LeftOut::CurrentStated)]);
+    // in a session the depth says how fast it changes, from its second state on
+    let mut session = Session::default();
+    let silent = Circumstances { depth_rate: None, time_step: 0.1, ..told() };
+    assert_eq!(why(&state, &silent, Some(&mut session)), [("water_entry_slamming", LeftOut::NoDepthRate)]);
+    assert_eq!(why(&Condition { depth: 0.17, ..state }, &silent, Some(&mut session)), []);
+    let mut loads = Loads::default();
+    served.evaluate(&state, &silent, Some(&mut session), &mut Workspace::new(), &mut loads);
+    assert_eq!(load(&loads, Effect::WaterEntrySlamming).wrench.force.z, 0.0, "it comes out of the water");
+}
+
+#[test]
+fn a_hull_floods_along_a_session_and_a_step_of_no_time_changes_nothing() {
+    let served = only("husky", Effect::HullFlooding, 0.4);
+    let state = Condition::level(Vec3::zeros(), 0.16);
+    let mut session = Session::default();
+    let mut lost = |time_step: f64| {
+        let mut loads = Loads::default();
+        let told = Circumstances { time_step, ..Circumstances::default() };
+        served.evaluate(&state, &told, Some(&mut session), &mut Workspace::new(), &mut loads);
+        -load(&loads, Effect::HullFlooding).wrench.force.z
+    };
+    assert_eq!(lost(0.0), 0.0, "dry at first");
+    // Torricelli: full after sqrt(h) / (r sqrt(g / 2)) seconds, three quarters at half that time
+    let full = 0.16_f64.sqrt() / (0.01 * (0.5 * 9.81_f64).sqrt());
+    let half = lost(0.5 * full);
+    assert_eq!(lost(0.0), half);
+    let whole = lost(full);
+    assert!((half / whole - 0.75).abs() < 1e-9, "{half} {whole}");
+    assert!(whole > 1.0);
+}

@@ -1,0 +1,96 @@
+//! Promise: the fast path answers as the plain-loop reference does, on every instruction set of this CPU.
+
+use crate::common::{Numbers, VEHICLES, model_on, paper_on};
+use wade_core::condition::Condition;
+use wade_core::features;
+use wade_core::forces::Forces;
+use wade_core::frame::{GRAVITY, Vec3};
+use wade_core::model::kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, WetSurface};
+use wade_core::model::{Form, Model, Workspace};
+
+/// Size of the terms that a surface's force is a sum of, by which its rounding is measured [N].
+fn size_of_terms(model: &Model, condition: &Condition, surface: usize) -> f64 {
+    match &model.weights().form {
+        Form::Paper(form) => condition.density * f64::from(form.scaling.target_std[2]),
+        Form::Anchored(_) => {
+            let (speed, depth) = (condition.velocity.norm(), condition.depth);
+            condition.density * (speed.powi(2) + GRAVITY * depth) * model.vehicle().surfaces[surface].area
+        }
+    }
+}
+
+#[test]
+fn every_instruction_set_agrees_with_the_reference() {
+    for isa in Isa::available() {
+        for model in VEHICLES.into_iter().flat_map(|vehicle| [model_on(vehicle, isa), paper_on(vehicle, isa)])
+        {
+            let name = format!("{} {} {}", isa.name(), model.vehicle().name, model.weights().form.name());
+            let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+            let mut numbers = Numbers::new(7);
+            let mut wet = 0;
+            for _ in 0..200 {
+                let mut condition = numbers.condition();
+                condition.ground_contact = model.weights().ground_contact().unwrap_or_default();
+                model.evaluate(&condition, &mut workspace, &mut forces);
+                let both = forces.surfaces.iter().zip(model.reference(&condition));
+                for (surface, (load, expected)) in both.enumerate() {
+                    let scale = size_of_terms(&model, &condition, surface);
+                    let error = (load.force - expected).norm() / (expected.norm() + scale);
+                    assert!(error < 1e-5, "{name}: {} against {expected}", load.force);
+                    wet += usize::from(load.wetted_fraction > 0.0);
+                }
+            }
+            assert!(wet > 500, "the states wet enough surfaces to compare: {wet}");
+        }
+    }
+}
+
+#[test]
+fn a_row_has_the_same_bits_alone_and_in_any_company() {
+    let model = paper_on("husky", Isa::available()[0]);
+    let (vehicle, weights) = (model.vehicle(), model.weights());
+    for isa in Isa::available() {
+        let kernel = Kernel::new(&weights.network, (features::STATIC, features::DYNAMIC), isa);
+        let fixed = vehicle
+            .surfaces
+            .iter()
+            .map(|surface| features::surface_static(surface, &vehicle.dimensions).map(|x| x as f32));
+        let statics = kernel.static_rows(&fixed.collect::<Vec<_>>());
+        let mut buffers = Buffers::new(vehicle.surfaces.len());
+        let mut numbers = Numbers::new(13);
+        for _ in 0..20 {
+            let global = [(); features::GLOBAL].map(|()| numbers.between(-2.0, 2.0));
+            let wet: Vec<WetSurface> = (0..vehicle.surfaces.len())
+                .map(|surface| WetSurface {
+                    surface,
+                    dynamic: [(); MAX_DYNAMIC].map(|()| numbers.between(0.0, 1.0)),
+                })
+                .collect();
+            let together = kernel.forward(&global, &statics, &wet, &mut buffers).to_vec();
+            for (alone, expected) in wet.iter().zip(&together) {
+                let output = kernel.forward(&global, &statics, &[*alone], &mut buffers)[0];
+                assert_eq!(output, *expected, "{}", isa.name());
+            }
+            for company in wet.chunks(4).chain(wet.chunks(7)) {
+                let outputs = kernel.forward(&global, &statics, company, &mut buffers).to_vec();
+                let expected: Vec<_> = company.iter().map(|wet| together[wet.surface]).collect();
+                assert_eq!(outputs, expected, "{}", isa.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_query_leaves_nothing_behind_in_its_workspace() {
+    for isa in Isa::available() {
+        let model = model_on("husky", isa);
+        let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+        let deep = Condition::level(Vec3::new(0.5, 0.1, 0.0), 0.19);
+        model.evaluate(&deep, &mut workspace, &mut forces);
+        let first = forces.clone();
+        model.evaluate(&Condition::level(Vec3::new(0.5, 0.1, 0.0), 0.05), &mut workspace, &mut forces);
+        assert_ne!(forces, first);
+        model.evaluate(&deep, &mut workspace, &mut forces);
+        assert_eq!(forces, first, "{}", isa.name());
+    }
+}

@@ -1,0 +1,20 @@
+//! What the core promises, a module a promise.
+
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../../tests/common/bundles.rs"]
+mod common;
+
+mod analytic_loads;
+mod anchor;
+mod bundle;
+mod bundle_files;
+mod effects_bundle;
+mod effects_served;
+mod hydrostatics;
+mod kernel;
+mod mesh;
+mod model;
+mod shipped;
+mod submergence;
+mod symmetry;

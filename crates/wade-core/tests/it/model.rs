@@ -1,0 +1,107 @@
+//! Promise: the net wrench is the sum of the surfaces, dry surfaces are exactly zero, and the conventions hold.
+
+use crate::common::{Numbers, VEHICLES, model};
+use wade_core::condition::{Condition, GroundContact};
+use wade_core::domain::Quantity;
+use wade_core::forces::Forces;
+use wade_core::frame::{GRAVITY, Vec3};
+use wade_core::model::{Model, Workspace};
+
+fn evaluate(model: &Model, condition: &Condition) -> Forces {
+    let mut forces = Forces::default();
+    model.evaluate(condition, &mut Workspace::new(), &mut forces);
+    forces
+}
+
+#[test]
+fn a_vehicle_above_the_water_feels_nothing() {
+    for vehicle in VEHICLES {
+        let forces = evaluate(&model(vehicle), &Condition::level(Vec3::new(1.0, 0.0, 0.0), 0.0));
+        for load in &forces.surfaces {
+            assert_eq!((load.force, load.wetted_fraction), (Vec3::zeros(), 0.0));
+        }
+        assert_eq!(forces.wrench, wade_core::wrench::Wrench::default());
+    }
+}
+
+#[test]
+fn dry_surfaces_are_exactly_zero_and_wet_ones_are_not() {
+    let mut numbers = Numbers::new(3);
+    for vehicle in VEHICLES {
+        let model = model(vehicle);
+        let mut counts = [0, 0];
+        for _ in 0..100 {
+            let mut condition = numbers.condition();
+            condition.ground_contact = model.weights().ground_contact().unwrap_or_default();
+            for load in evaluate(&model, &condition).surfaces {
+                let wet = load.wetted_fraction > 0.0;
+                counts[usize::from(wet)] += 1;
+                assert_eq!(load.force != Vec3::zeros(), wet);
+            }
+        }
+        assert!(counts[0] > 50 && counts[1] > 50, "both kinds were seen: {counts:?}");
+    }
+}
+
+#[test]
+fn the_net_wrench_is_that_of_the_surfaces_about_the_center_of_mass() {
+    let mut numbers = Numbers::new(5);
+    for vehicle in VEHICLES {
+        let model = model(vehicle);
+        let about = model.vehicle().center_of_mass;
+        for _ in 0..50 {
+            let forces = evaluate(&model, &numbers.condition());
+            let force: Vec3 = forces.surfaces.iter().map(|load| load.force).sum();
+            let moment: Vec3 =
+                forces.surfaces.iter().map(|load| (load.point - about).cross(&load.force)).sum();
+            assert!((forces.wrench.force - force).norm() <= 1e-9 * (1.0 + force.norm()));
+            assert!((forces.wrench.moment - moment).norm() <= 1e-9 * (1.0 + moment.norm()));
+        }
+    }
+}
+
+#[test]
+fn points_of_application_lie_in_the_wet_part() {
+    let condition = Condition::level(Vec3::new(0.5, 0.0, 0.0), 0.12);
+    for vehicle in VEHICLES {
+        let model = model(vehicle);
+        let water = model.vehicle().z0 + condition.depth;
+        for load in evaluate(&model, &condition).surfaces.iter().filter(|load| load.wetted_fraction > 0.0) {
+            assert!(load.point.z <= water && load.point.z >= model.vehicle().z0);
+        }
+    }
+}
+
+#[test]
+fn dry_tires_lack_the_water_pressure_under_their_patches() {
+    for vehicle in VEHICLES {
+        let model = model(vehicle);
+        let wetted = Condition::level(Vec3::new(0.5, 0.0, 0.0), 0.15);
+        let dry = Condition { ground_contact: GroundContact::Dry, ..wetted };
+        let difference = evaluate(&model, &wetted).wrench.force - evaluate(&model, &dry).wrench.force;
+        let area: f64 = model.vehicle().contacts.iter().map(|patch| patch.area).sum();
+        let pressure = wetted.density * GRAVITY * wetted.depth;
+        assert!((difference - Vec3::z() * (pressure * area)).norm() < 1e-6 * pressure * area, "{difference}");
+    }
+}
+
+#[test]
+fn states_beyond_the_training_domain_are_answered_and_marked() {
+    let model = model("husky");
+    let inside = Condition::level(Vec3::new(0.5, 0.0, 0.0), 0.15);
+    assert!(evaluate(&model, &inside).outside.is_inside());
+    let outside = Condition { depth: 0.30, ..inside };
+    let forces = evaluate(&model, &outside);
+    let (quantity, excess) = forces.outside.iter().next().expect("the depth is outside");
+    assert_eq!(quantity, Quantity::Depth);
+    let deepest = model.domain().range(Quantity::Depth).expect("a range").max;
+    assert!((excess - (0.30 - deepest)).abs() < 1e-9 && (deepest - 0.20).abs() < 0.01, "{excess}");
+    assert!(forces.wrench.force.z > 0.0);
+}
+
+#[test]
+fn a_wheel_that_only_just_touches_the_water_feels_nothing_below_either_convention() {
+    let condition = Condition { ground_contact: GroundContact::Dry, ..Condition::level(Vec3::zeros(), 1e-9) };
+    let forces = evaluate(&model("husky"), &condition);
+    assert!(forces.surfaces.iter().all(|load| load.wetted_fraction > 0.0 || load.force == Vec3::zeros()));
+}

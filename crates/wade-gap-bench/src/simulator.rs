@@ -1,0 +1,68 @@
+//! The prediction that the hidden effects are missing from.
+
+use super::track::DENSITY;
+use super::{Hull, State, Wrench6};
+use wade_core::condition::Condition;
+use wade_core::frame::Vec3;
+use wade_core::wrench::Wrench;
+
+/// Drag coefficients of the box on its wet front and side: a blunt body's, chosen.
+pub(super) const DRAG: [f64; 2] = [1.2, 1.5];
+
+/// Where the prediction comes from.
+#[derive(Clone, Copy)]
+pub enum Prediction<'a> {
+    /// Hydrostatics of the hull's columns and drag that grows with the square of the speed.
+    Analytic,
+    /// A model, such as a shipped vehicle's; wrench about the center of mass.
+    Model(&'a dyn Fn(&Condition) -> Wrench),
+}
+
+/// A body and what is predicted for it.
+#[derive(Clone, Copy)]
+pub struct Simulator<'a> {
+    /// The body.
+    pub hull: &'a Hull,
+    /// The prediction.
+    pub prediction: Prediction<'a>,
+    /// Name of the vehicle, for `trials.toml`.
+    pub vehicle: &'a str,
+}
+
+impl Simulator<'_> {
+    /// Wrench in still water.
+    pub fn predict(&self, state: &State) -> Wrench6 {
+        self.predict_moving(state, &state.velocity)
+    }
+
+    /// Wrench with another velocity through the water, body frame [m/s].
+    pub fn predict_moving(&self, state: &State, through_water: &Vec3) -> Wrench6 {
+        match self.prediction {
+            Prediction::Analytic => {
+                self.hull.buoyancy(state, DENSITY, |_, _| 0.0) + self.drag(state, through_water)
+            }
+            Prediction::Model(model) => {
+                let wrench = model(&Condition { velocity: *through_water, ..state.condition() });
+                let (f, m) = (wrench.force, wrench.moment);
+                Wrench6::new(f.x, f.y, f.z, m.x, m.y, m.z)
+            }
+        }
+    }
+
+    /// The share of the prediction that is due to the motion: with the velocity less at rest.
+    pub fn drag_share(&self, state: &State) -> Wrench6 {
+        match self.prediction {
+            Prediction::Analytic => self.drag(state, &state.velocity),
+            Prediction::Model(_) => self.predict(state) - self.predict_moving(state, &Vec3::zeros()),
+        }
+    }
+
+    /// `-0.5 rho Cd A v abs(v)` along x and y, at the middle of the wet height.
+    fn drag(&self, state: &State, v: &Vec3) -> Wrench6 {
+        let hull = self.hull;
+        let draft = state.depth.clamp(0.0, hull.height);
+        let force = |cd: f64, across: f64, v: f64| -0.5 * DENSITY * cd * across * draft * v * v.abs();
+        let force = Vec3::new(force(DRAG[0], hull.width, v.x), force(DRAG[1], hull.length, v.y), 0.0);
+        super::hull::wrench(force, Vec3::new(0.0, 0.0, hull.z0 + 0.5 * draft) - hull.center_of_mass)
+    }
+}

@@ -1,0 +1,395 @@
+//! The report of what was found.
+
+use std::collections::BTreeMap;
+
+use sha2::{Digest, Sha256};
+
+use super::candidates::Setting;
+use super::carriers::{carriers, of_region};
+use super::design::Design;
+use super::detect::{self, Excitation};
+use super::effects_file::remarks;
+use super::experiment::separating;
+use super::fit::{Fit, Parameter, fit};
+use super::holdout::{as_naming_saw_it, closures, explained, worse};
+use super::judge::{Judge, Member, Refusal};
+use super::locate::{self, OPEN};
+use super::noise::{Floor, floors_of};
+use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
+use super::sentences::{summary, unexplained};
+use super::series::Series;
+use super::statistics::quantile;
+use super::verdict::Found;
+use super::{Named, plausible};
+use wade_core::condition::Condition;
+use wade_core::digest::hexadecimal;
+use wade_core::effects::{Effect, Kind};
+use wade_learn::trials::{SIMULATED, SimIs, Trials, WHEELS, WRENCH};
+
+fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
+    let mut values = fit.values.iter();
+    members
+        .iter()
+        .map(|member| {
+            let candidate = &design.candidates[member.candidate];
+            let coefficients = member
+                .columns
+                .iter()
+                .map(|&(_, coefficient)| (coefficient, values.next().copied().unwrap_or(0.0)))
+                .collect();
+            Named { effect: candidate.effect, shape: candidate.shape, coefficients }
+        })
+        .collect()
+}
+
+pub(super) fn compose(
+    trials: &Trials,
+    judge: &Judge,
+    mut found: Found,
+    held: Vec<usize>,
+    library: &[Effect],
+) -> Report {
+    let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
+    // nothing that does not fit is applied or shown as if it did
+    let fits = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
+    let fitted = if fits { fit(design, &found.members, all, setting, config) } else { None };
+    let mut named = fitted.as_ref().map_or_else(Vec::new, |fitted| named(design, &found.members, fitted));
+    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
+    let closures_of = |named: &[Named]| closures(named, all, &held, setting, &held_floors, config);
+    let mut held_out = closures_of(&named);
+    let is_fault = found.members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
+    let seen = held_out.get("all").map(|closure| as_naming_saw_it(*closure, &named, all, &held, judge));
+    let grows = held_out.get("all").and_then(|all| all.disproof(0.0, false));
+    let disproof = seen.and_then(|closure| closure.disproof(config.coverage, is_fault)).or(grows);
+    // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows; a fault is
+    // exact or is none
+    let disproof =
+        disproof.filter(|share| fits && (found.verdict == Verdict::Named || is_fault || *share < 0.0));
+    if disproof.is_some() {
+        found.verdict = Verdict::NoCandidateFits;
+        found.left = found.of_gap.clone();
+        named.clear();
+        held_out = closures_of(&named);
+    }
+    let holds = fits && disproof.is_none();
+    let effects = match &fitted {
+        Some(fitted) if holds => named_effects(judge, &found, &named, fitted),
+        _ => Vec::new(),
+    };
+    let gap_excess = |trial: usize| excess(all, design, setting, trial);
+    let (mut regions, regions_tried) = match found.verdict {
+        Verdict::NothingMissing => (Vec::new(), 0),
+        _ => locate::locate(all, &design.trials, gap_excess, found.gated, config),
+    };
+    for region in &mut regions {
+        region.surfaces = of_region(region, &named, all, setting, judge.floors);
+    }
+    let excitation =
+        detect::excitations(design, all, setting, &trials.manifest, &found.residual, &named, config);
+    let not_testable = excitation.iter().filter_map(not_testable).collect();
+    let alternatives: Vec<Vec<&'static str>> = match holds {
+        true => found.alternatives.iter().map(|set| judge.names(set)).collect(),
+        false => Vec::new(),
+    };
+    let separating_experiment = (holds && !found.alternatives.is_empty()).then(|| {
+        let sets = std::iter::once(&found.members).chain(&found.alternatives);
+        let effects = |set: &Vec<Member>| set.iter().map(|m| judge.effect(m)).collect::<Vec<_>>();
+        separating(&sets.map(effects).collect::<Vec<_>>())
+    });
+    let mut said: Vec<String> = trials.remarks().iter().map(ToString::to_string).collect();
+    if trials.manifest.measured.sim_is == SimIs::Control {
+        said.push(
+            "the sim_ columns are a control: the gap is what differs from it, not that of the vehicle's model".into(),
+        );
+    }
+    said.extend(outside(all));
+    if !setting.computed {
+        said.extend(plausible::remarks(all, &setting.components));
+    }
+    said.extend(remarks(&effects));
+    said.extend(unpublished(&effects));
+    let unexplained = unexplained(judge, &found, disproof);
+    let gap = GapReport {
+        held_out,
+        size: detect::sizes(all.iter(), judge.floors, &setting.components, config),
+        shares: shares(judge, &found),
+        floors: setting.components.iter().map(|&c| (WRENCH[c], judge.floors[c])).collect(),
+        worse_regions: worse(&named, all, &held, setting, judge.floors, &regions),
+        held_out_trials: held.iter().map(|&trial| all[trial].name.clone()).collect(),
+        unexplained,
+    };
+    let mut report = Report {
+        verdict: found.verdict,
+        summary: String::new(),
+        vehicle: trials.manifest.vehicle.clone(),
+        generated: trials.manifest.generated.clone(),
+        rejected: rejected(judge, &found, library, holds),
+        effects,
+        alternatives,
+        separating_experiment,
+        not_testable,
+        regions,
+        regions_tried,
+        gap,
+        excitation,
+        validity: validity(all),
+        trials: all.len(),
+        samples: all.iter().map(|s| s.t.len()).sum(),
+        bin_s: config.bin_s,
+        remarks: said,
+        sources: Sources { trials: hash(trials), ..Sources::default() },
+        traces: traces(&named, all, &held, setting, judge.floors),
+    };
+    report.summary = summary(&report, found.gated);
+    report
+}
+
+/// Values of which not even the interval reaches into the band of what is published.
+fn unpublished(effects: &[NamedEffect]) -> Vec<String> {
+    let all = effects.iter().flat_map(|effect| effect.parameters.iter().map(move |of| (effect, of)));
+    let beyond = all.filter_map(|(effect, (name, p))| {
+        let [low, high] = p.literature.filter(|[low, high]| p.interval[0] > *high || p.interval[1] < *low)?;
+        let of = effect.name.replace('_', " ");
+        Some(format!(
+            "{name} of {of} is {:.3} ({:.3} to {:.3}), beyond what is published of it, {low} to {high}: another law may be at work",
+            p.value, p.interval[0], p.interval[1]
+        ))
+    });
+    beyond.collect()
+}
+
+/// The trials in which the model answers for states that it did not learn.
+fn outside(all: &[Series]) -> Option<String> {
+    let share = |series: &Series| {
+        series.outside.iter().filter(|outside| **outside).count() as f64 / series.t.len().max(1) as f64
+    };
+    let mut far: Vec<(&Series, f64)> = all.iter().map(|series| (series, share(series))).collect();
+    far.retain(|(_, share)| *share > 0.5);
+    far.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let (worst, _) = far.first()?;
+    Some(format!(
+        "{} of {} trials, such as {}, are in states outside the training domain: a gap there can be an error of the model, and they are held out only if there are too few other trials",
+        far.len(),
+        all.len(),
+        worst.name
+    ))
+}
+
+fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) -> Vec<NamedEffect> {
+    let design = judge.design;
+    let whole = judge.missing();
+    let mut effects = Vec::new();
+    let counts = || found.members.iter().map(|member| member.columns.len());
+    let starts: Vec<usize> = (0..found.members.len()).map(|index| counts().take(index).sum()).collect();
+    for (index, (member, one)) in found.members.iter().zip(named).enumerate() {
+        let (first, count) = (starts[index], member.columns.len());
+        let with = |other: usize| -> Vec<Vec<f64>> {
+            let (start, width) = (starts[other], found.members[other].columns.len());
+            let row = |i: usize| (0..width).map(|j| fitted.covariance[(first + i, start + j)]).collect();
+            (0..count).map(row).collect()
+        };
+        let others: Vec<Member> =
+            found.members.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, m)| m.clone()).collect();
+        let without = design.solve(&judge.columns(&others)).map_or(found.loss, |(_, loss)| loss);
+        let placebo = judge.placebo_gains(&found.members, member).unwrap_or_default();
+        let specs = one.effect.coefficients();
+        let mut parameters = BTreeMap::new();
+        for (i, &(coefficient, value)) in one.coefficients.iter().enumerate() {
+            let spec = &specs[coefficient];
+            let std = fitted.covariance[(first + i, first + i)].max(0.0).sqrt();
+            let interval = fitted.intervals[first + i];
+            parameters.insert(
+                spec.name,
+                Parameter { value, std, unit: spec.unit, interval, literature: spec.literature },
+            );
+        }
+        // one that is 0 has no place in the law that was found, such as a frequency in a memory that only fades
+        let shape = one.effect.shape_names().iter().enumerate().filter(|(axis, _)| one.shape[*axis] != 0.0);
+        for (axis, &(name, unit)) in shape {
+            let (value, std) = (one.shape[axis], fitted.shape_std[index][axis]);
+            let interval = [value - 1.645 * std, value + 1.645 * std];
+            parameters.insert(name, Parameter { value, std, unit, interval, literature: None });
+        }
+        effects.push(NamedEffect {
+            name: one.effect.name(),
+            kind: one.effect.kind(),
+            parameters,
+            share_of_gap: ((without - found.loss) / whole).clamp(0.0, 1.0),
+            provisional: fitted.provisional[index],
+            placebo: [placebo.0, placebo.1],
+            surfaces: carriers(std::slice::from_ref(one), judge.all, judge.setting, &OPEN),
+            covariance: with(index),
+            covariance_with: (index + 1..named.len()).map(|j| (named[j].effect.name(), with(j))).collect(),
+            coefficients: one.coefficients.iter().map(|&(c, _)| specs[c].name).collect(),
+            effect: one.effect,
+            shape: one.shape,
+            base_drag: judge.setting.base_drag.of(one.effect, &one.shape).into(),
+        });
+    }
+    effects
+}
+
+/// What is not named: effects beside the set that was found, or each by itself where none holds.
+fn rejected(judge: &Judge, found: &Found, library: &[Effect], holds: bool) -> Vec<Rejected> {
+    let whole = judge.missing();
+    // where nothing is missing nothing has a share
+    let share = |gain: f64| if whole > f64::MIN_POSITIVE { (gain / whole).clamp(0.0, 1.0) } else { 0.0 };
+    let of = |&effect: &Effect| {
+        if holds && found.members.iter().any(|member| judge.effect(member) == effect) {
+            return None;
+        }
+        let named: &[Member] = if holds { &found.members } else { &[] };
+        let beside = judge.weighed(named, effect)?;
+        let alone = judge.design.empty_loss() - judge.ranked(&[], effect)?.first()?.0;
+        let why = beside.refused.or((!holds).then_some(Refusal::Incomplete));
+        let (share_of_gap, share_alone) = (share(beside.gain), share(alone));
+        Some(Rejected { name: effect.name(), why, share_of_gap, share_alone })
+    };
+    let mut all: Vec<Rejected> = library.iter().filter_map(of).collect();
+    all.sort_by(|a, b| b.share_alone.total_cmp(&a.share_alone).then(a.name.cmp(b.name)));
+    all
+}
+
+fn not_testable(excitation: &Excitation) -> Option<NotTestable> {
+    let why = excitation.not_testable.clone()?;
+    Some(NotTestable {
+        name: excitation.name,
+        why,
+        minimum_detectable: excitation.minimum_detectable.clone(),
+    })
+}
+
+fn shares(judge: &Judge, found: &Found) -> BTreeMap<&'static str, f64> {
+    let whole = judge.design.empty_loss().max(f64::MIN_POSITIVE);
+    let holds = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
+    let loss = if holds { found.loss } else { judge.design.empty_loss() };
+    let noise = judge.floor_loss.min(loss) / whole;
+    let explained = (1.0 - loss / whole).max(0.0);
+    BTreeMap::from([
+        ("noise", noise),
+        ("explained", explained),
+        ("unexplained", (1.0 - noise - explained).max(0.0)),
+    ])
+}
+
+/// Squared standardised gap of each bin less that of noise and of the zero of a trial.
+fn excess(all: &[Series], design: &Design, setting: &Setting, trial: usize) -> Vec<f64> {
+    let series = &all[trial];
+    let mut sum = vec![0.0; series.bins.len()];
+    for &component in &setting.components {
+        let values = series.binned(|sample| series.gap[sample][component]);
+        let bin = design.noise.bin[component];
+        let expected = 1.0 + (design.noise.offset[trial][component] / bin).powi(2);
+        sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += (value / bin).powi(2) - expected);
+    }
+    sum
+}
+
+fn validity(all: &[Series]) -> BTreeMap<&'static str, [f64; 2]> {
+    type Quantity = fn(&Condition) -> f64;
+    let quantities: [(&'static str, Quantity); 5] = [
+        ("depth_m", |c| c.depth),
+        ("speed_mps", |c| c.velocity.norm()),
+        ("acceleration_mps2", |c| c.acceleration.norm()),
+        ("angular_speed_radps", |c| c.angular_velocity.norm()),
+        ("density_kgpm3", |c| c.density),
+    ];
+    let range = |of: Quantity| {
+        let mut values: Vec<f64> = all.iter().flat_map(|s| s.conditions.iter().map(of)).collect();
+        // single samples of noise do not widen what was tested
+        [quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995)]
+    };
+    // at rest and in steady motion an effect has less to say than anywhere, whatever the noise of rates made of that
+    let from = |name: &str, [low, high]: [f64; 2]| match name {
+        "speed_mps" | "acceleration_mps2" | "angular_speed_radps" => [0.0, high],
+        _ => [low, high],
+    };
+    quantities.into_iter().map(|(name, of)| (name, from(name, range(of)))).collect()
+}
+
+/// Hash over all numbers, whatever the order of the trials; each column with its name and length, so that no number passes for
+/// one of another.
+fn hash(trials: &Trials) -> String {
+    let mut sorted: Vec<_> = trials.trials.iter().collect();
+    sorted.sort_by(|a, b| a.name.cmp(&b.name));
+    let mut digest = Sha256::new();
+    let mut add = |name: &str, count: usize, values: &mut dyn Iterator<Item = f64>| {
+        digest.update(format!("{name} {count}\n"));
+        values.for_each(|value| digest.update(value.to_le_bytes()));
+    };
+    let manifest = trials.manifest.to_toml();
+    add(&manifest, 0, &mut std::iter::empty());
+    for trial in sorted {
+        add(&trial.name, trial.len(), &mut std::iter::empty());
+        let columns = [
+            ("t", &trial.t),
+            ("depth", &trial.depth),
+            ("rho", &trial.density),
+            ("roll", &trial.roll),
+            ("pitch", &trial.pitch),
+            ("yaw", &trial.yaw),
+        ];
+        let wheels = WHEELS.into_iter().zip(&trial.wheel_speeds);
+        let wrenches =
+            WRENCH.into_iter().zip(&trial.measured).chain(SIMULATED.into_iter().zip(&trial.simulated));
+        let optional = wheels.chain(wrenches).filter_map(|(name, column)| Some((name, column.as_ref()?)));
+        let stated = trial.other_forces.iter().chain(&trial.known_loads);
+        let stated = stated.map(|(name, column)| (name.as_str(), column));
+        for (name, column) in columns.into_iter().chain(optional).chain(stated) {
+            add(name, column.len(), &mut column.iter().copied());
+        }
+        for (name, vectors) in [
+            ("v", &trial.velocity),
+            ("c", &trial.current),
+            ("w", &trial.angular_velocity),
+            ("a", &trial.acceleration),
+            ("al", &trial.angular_acceleration),
+        ] {
+            add(name, vectors.len(), &mut vectors.iter().flat_map(|v| v.iter().copied()));
+        }
+    }
+    hexadecimal(&digest.finalize())
+}
+
+/// Bins of the trials with the largest gap in their worst component: of those that took no part, then of the others.
+fn traces(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    setting: &Setting,
+    floors: &[Floor; 6],
+) -> Vec<Trace> {
+    const MOST: usize = 2;
+    let mut worst: Vec<(f64, usize, usize)> = Vec::new();
+    for (trial, series) in all.iter().enumerate() {
+        let size = |&c: &usize| {
+            let squares = series.gap.iter().map(|gap| gap[c].powi(2)).sum::<f64>();
+            ((squares / series.gap.len() as f64).sqrt() / floors[c].with_model().max(1e-12), trial, c)
+        };
+        worst.extend(setting.components.iter().map(size).max_by(|a, b| a.0.total_cmp(&b.0)));
+    }
+    worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let (kept, others): (Vec<_>, Vec<_>) = worst.into_iter().partition(|(_, trial, _)| held.contains(trial));
+    let chosen = kept.into_iter().take(MOST).chain(others.into_iter().take(MOST));
+    chosen.map(|(_, trial, component)| trace(named, &all[trial], trial, component, setting, floors)).collect()
+}
+
+fn trace(
+    named: &[Named],
+    series: &Series,
+    trial: usize,
+    component: usize,
+    setting: &Setting,
+    floors: &[Floor; 6],
+) -> Trace {
+    let added = explained(named, series, trial, setting);
+    let samples = series.bins.iter().map(|bin| bin.len()).max().unwrap_or(1) as f64;
+    Trace {
+        trial: series.name.clone(),
+        component: WRENCH[component],
+        t: series.binned(|i| series.t[i] - series.t[0]),
+        before: series.binned(|i| series.gap[i][component]),
+        after: series.binned(|i| series.gap[i][component] - added[i][component]),
+        noise: floors[component].sample / samples.sqrt(),
+    }
+}

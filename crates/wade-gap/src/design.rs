@@ -1,0 +1,583 @@
+//! The regression: rows are the compared components of every bin, columns the coefficients of the candidates.
+//!
+//! Rows are standardised by the noise of their component. The zero of a trial may differ from run to run, and where a model
+//! states how far it may be off, a trial may have a load of that size that stays, and one that goes with the square of the
+//! speed. Each trial's part along these is taken off in the share that such scatter has in it (the transform of the
+//! random-effects model; Baltagi, Econometric Analysis of Panel Data, section 2.3), so that the rows are about independent.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
+
+use super::Config;
+use super::candidates::{Column, Setting, columns};
+use super::series::Series;
+use super::smoothing::Smoothing;
+use super::split::folds;
+use wade_core::effects::{Effect, Shape};
+
+/// An effect of one shape with the columns of its coefficients.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    pub effect: Effect,
+    pub shape: Shape,
+    /// Column and coefficient.
+    pub columns: Vec<(usize, usize)>,
+}
+
+/// Noise of the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RowNoise {
+    /// Standard deviation of a bin, by component.
+    pub bin: [f64; 6],
+    /// Standard deviation of the zero, by trial and component.
+    pub offset: Vec<[f64; 6]>,
+    /// Standard deviation that the model states of itself, by trial and component; 0 where it states none.
+    pub model: Vec<[f64; 6]>,
+    /// Smoothing of the rows.
+    pub smoothing: Smoothing,
+}
+
+/// Where a row stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Row {
+    pub trial: usize,
+    pub bin: usize,
+    pub component: usize,
+    pub block: usize,
+}
+
+/// Rows of a set of trials.
+#[derive(Debug, Clone)]
+pub(super) struct Rows {
+    pub rows: Vec<Row>,
+    /// Number of blocks.
+    pub blocks: usize,
+    /// Trial of each block.
+    pub block_trial: Vec<usize>,
+    /// Bins of each block, within its trial.
+    pub block_bins: Vec<Range<usize>>,
+    /// Rows of each trial.
+    pub of_trial: Vec<Range<usize>>,
+    /// Rows of a bin: the components.
+    pub width: usize,
+}
+
+impl Rows {
+    /// What a list by trial must be as long as: the trials that are kept back have numbers as well.
+    pub fn past_last_trial(&self) -> usize {
+        self.block_trial.iter().max().map_or(0, |last| last + 1)
+    }
+
+    /// Rows of the trials listed, cut into blocks of about `block_s`.
+    pub fn new(all: &[Series], trials: &[usize], components: &[usize], block_s: f64) -> Self {
+        let mut this = Self {
+            rows: Vec::new(),
+            blocks: 0,
+            block_trial: Vec::new(),
+            block_bins: Vec::new(),
+            of_trial: Vec::new(),
+            width: components.len(),
+        };
+        for &trial in trials {
+            let series = &all[trial];
+            let first = this.rows.len();
+            for run in &series.runs {
+                let time = |bin: usize| series.t[series.bins[bin].start];
+                let length = time(run.end - 1) - time(run.start);
+                let count = (length / block_s).round().max(1.0) as usize;
+                let per_block = run.len().div_ceil(count);
+                let mut start = run.start;
+                while start < run.end {
+                    let end = (start + per_block).min(run.end);
+                    for bin in start..end {
+                        let row = |&component: &usize| Row { trial, bin, component, block: this.blocks };
+                        this.rows.extend(components.iter().map(row));
+                    }
+                    this.block_trial.push(trial);
+                    this.block_bins.push(start..end);
+                    this.blocks += 1;
+                    start = end;
+                }
+            }
+            this.of_trial.push(first..this.rows.len());
+        }
+        this
+    }
+}
+
+/// A value a sample to the rows: bin means, smoothed, standardised, partly centered trial by trial.
+pub(super) fn to_rows(
+    all: &[Series],
+    rows: &Rows,
+    trials: &[usize],
+    components: &[usize],
+    noise: &RowNoise,
+    of: impl Fn(usize) -> Column,
+) -> Vec<f64> {
+    let mut out = Vec::with_capacity(rows.rows.len());
+    for &trial in trials {
+        let series = &all[trial];
+        let column = of(trial);
+        let pace = noise.model[trial].iter().any(|std| *std > 0.0).then(|| pace(series));
+        let by_component: Vec<Vec<f64>> = components
+            .iter()
+            .map(|&component| {
+                let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
+                let bin = noise.bin[component];
+                let model = noise.model[trial][component] / bin;
+                let zero = (noise.offset[trial][component] / bin).hypot(model);
+                values.iter_mut().for_each(|value| *value /= bin);
+                match &pace {
+                    Some(pace) => whiten(&mut values, pace, [zero, model]),
+                    None => center(&mut values, zero),
+                }
+                values
+            })
+            .collect();
+        for bin in 0..series.bins.len() {
+            out.extend(by_component.iter().map(|values| values[bin]));
+        }
+    }
+    out
+}
+
+/// Takes off the mean in the share that a zero of this deviation has in it, beside noise of 1 a value.
+fn center(values: &mut [f64], zero: f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let share = 1.0 - (1.0 + count * zero * zero).sqrt().recip();
+    values.iter_mut().for_each(|value| *value -= share * mean);
+}
+
+/// The same for a constant and a multiple of `pace`, of independent deviations: `(I + U U^T)^(-1/2)` of the values, `U` the
+/// two with their deviations.
+fn whiten(values: &mut [f64], pace: &[f64], [zero, paced]: [f64; 2]) {
+    let along = |value: f64| Vector2::new(zero, paced * value);
+    let gram = pace.iter().map(|&p| along(p) * along(p).transpose()).sum::<Matrix2<f64>>();
+    let projected = values.iter().zip(pace).map(|(value, &p)| along(p) * *value).sum::<Vector2<f64>>();
+    let SymmetricEigen { eigenvectors, eigenvalues } = gram.symmetric_eigen();
+    // (1 - 1 / sqrt(1 + l)) / l, which is 1/2 where l vanishes
+    let share = eigenvalues.map(|l| 1.0 / ((1.0 + l.max(0.0)).sqrt() * (1.0 + (1.0 + l.max(0.0)).sqrt())));
+    let off = eigenvectors * share.component_mul(&(eigenvectors.transpose() * projected));
+    values.iter_mut().zip(pace).for_each(|(value, &p)| *value -= along(p).dot(&off));
+}
+
+/// The square of the speed through the water of each bin, of mean square 1.
+fn pace(series: &Series) -> Vec<f64> {
+    let mut pace = series.binned(|i| series.conditions[i].velocity.norm_squared());
+    let size = (pace.iter().map(|p| p * p).sum::<f64>() / pace.len().max(1) as f64).sqrt();
+    pace.iter_mut().for_each(|p| *p /= size.max(f64::MIN_POSITIVE));
+    pace
+}
+
+/// Sums of products over the rows of one fold.
+#[derive(Debug, Clone)]
+struct Fold {
+    xx: DMatrix<f64>,
+    xy: DVector<f64>,
+    yy: f64,
+}
+
+/// The regression with the sums from which any subset of columns is solved.
+#[derive(Debug, Clone)]
+pub(super) struct Design {
+    pub rows: Rows,
+    pub trials: Vec<usize>,
+    pub noise: RowNoise,
+    pub y: DVector<f64>,
+    pub x: DMatrix<f64>,
+    /// What a column was divided by, so that its mean square is 1.
+    pub scale: Vec<f64>,
+    pub candidates: Vec<Candidate>,
+    pub block_fold: Vec<usize>,
+    /// Bins beyond which the noise of a row has forgotten itself, by component.
+    pub reach: [usize; 6],
+    folds: Vec<Fold>,
+    total: Fold,
+}
+
+/// A cross-validated fit.
+#[derive(Debug, Clone)]
+pub(super) struct Fitted {
+    /// Scaled coefficients on all rows.
+    pub beta: DVector<f64>,
+    /// Sum of squares of the rows.
+    pub loss: f64,
+    /// The same, each fold by the fit to the others.
+    pub cv_loss: f64,
+    /// By fold.
+    pub fold_losses: Vec<f64>,
+    /// Coefficients without each fold.
+    pub fold_betas: Vec<DVector<f64>>,
+}
+
+impl Design {
+    /// Fills the columns of every candidate; columns without any excitation are left out.
+    pub fn new(
+        all: &[Series],
+        trials: Vec<usize>,
+        rows: Rows,
+        setting: &Setting,
+        library: &[(Effect, Shape)],
+        noise: RowNoise,
+        config: &Config,
+    ) -> Self {
+        let gap = |trial: usize| all[trial].gap.clone();
+        let y = DVector::from_vec(to_rows(all, &rows, &trials, &setting.components, &noise, gap));
+        let block_fold = folds(all, &rows, config);
+        let mut this = Self {
+            x: DMatrix::zeros(rows.rows.len(), 0),
+            reach: noise.smoothing.reach(config.bin_s),
+            trials,
+            noise,
+            y,
+            scale: Vec::new(),
+            candidates: Vec::new(),
+            block_fold,
+            folds: Vec::new(),
+            total: Fold { xx: DMatrix::zeros(0, 0), xy: DVector::zeros(0), yy: 0.0 },
+            rows,
+        };
+        let mut values: Vec<f64> = Vec::new();
+        for &(effect, shape) in library {
+            let columns = this.candidate_columns(all, setting, effect, &shape);
+            let mut candidate = Candidate { effect, shape, columns: Vec::new() };
+            for (coefficient, column, scale) in columns {
+                candidate.columns.push((this.scale.len(), coefficient));
+                this.scale.push(scale);
+                values.extend(column);
+            }
+            if !candidate.columns.is_empty() {
+                this.candidates.push(candidate);
+            }
+        }
+        this.x = DMatrix::from_vec(this.y.len(), this.scale.len(), values);
+        this.sum(config.folds);
+        this
+    }
+
+    /// Place of a trial among those of the design.
+    pub fn place(&self, trial: usize) -> usize {
+        self.trials.iter().position(|&t| t == trial).unwrap_or_default()
+    }
+
+    /// Columns of each trial, a value a sample.
+    fn raw_columns(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        effect: Effect,
+        shape: &Shape,
+    ) -> Vec<Vec<Column>> {
+        self.trials.iter().map(|&trial| columns(effect, shape, &all[trial], trial, setting)).collect()
+    }
+
+    fn candidate_columns(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        effect: Effect,
+        shape: &Shape,
+    ) -> Vec<(usize, Vec<f64>, f64)> {
+        let raw = self.raw_columns(all, setting, effect, shape);
+        let mut found = Vec::new();
+        for (coefficient, _) in effect.coefficients().iter().enumerate() {
+            let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
+            let mut column = to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
+            let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();
+            if scale > 1e-9 && scale.is_finite() {
+                column.iter_mut().for_each(|value| *value /= scale);
+                found.push((coefficient, column, scale));
+            }
+        }
+        found
+    }
+
+    /// A value a sample as rows that were not smoothed.
+    pub fn unsmoothed(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        of: &dyn Fn(usize) -> Column,
+    ) -> DVector<f64> {
+        let noise = RowNoise { smoothing: Smoothing::default(), ..self.noise.clone() };
+        DVector::from_vec(to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of))
+    }
+
+    /// Columns that were not smoothed, in the units of those that were.
+    pub fn unsmoothed_columns(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        wanted: &[usize],
+    ) -> Vec<DVector<f64>> {
+        let mut found = vec![DVector::zeros(self.y.len()); wanted.len()];
+        for candidate in &self.candidates {
+            let place = |(column, _): &(usize, usize)| wanted.iter().position(|w| w == column);
+            let own: Vec<_> = candidate.columns.iter().filter_map(|own| Some((place(own)?, *own))).collect();
+            if own.is_empty() {
+                continue;
+            }
+            let raw = self.raw_columns(all, setting, candidate.effect, &candidate.shape);
+            for (place, (column, coefficient)) in own {
+                let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
+                found[place] = self.unsmoothed(all, setting, &of) / self.scale[column];
+            }
+        }
+        found
+    }
+
+    /// Gives a candidate another shape.
+    pub fn reshape(&mut self, all: &[Series], setting: &Setting, candidate: usize, shape: Shape) {
+        let effect = self.candidates[candidate].effect;
+        self.candidates[candidate].shape = shape;
+        let found = self.candidate_columns(all, setting, effect, &shape);
+        let held = self.candidates[candidate].columns.clone();
+        for (column, coefficient) in held {
+            if let Some((_, values, scale)) = found.iter().find(|(c, ..)| *c == coefficient) {
+                self.x.column_mut(column).copy_from_slice(values);
+                self.scale[column] = *scale;
+                self.resum(column);
+            }
+        }
+    }
+
+    /// Loss of some columns beside a candidate of another shape, of which the coefficients listed are in use.
+    pub fn loss_with(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        candidate: usize,
+        shape: &Shape,
+        coefficients: &[usize],
+        others: &[usize],
+    ) -> f64 {
+        let found = self.candidate_columns(all, setting, self.candidates[candidate].effect, shape);
+        let own: Vec<DVector<f64>> = found
+            .into_iter()
+            .filter(|(coefficient, ..)| coefficients.contains(coefficient))
+            .map(|(_, column, _)| DVector::from_vec(column))
+            .collect();
+        let Some((beta, loss)) = self.solve(others) else { return f64::INFINITY };
+        loss - self.gain(&own, others, &self.residual(others, &beta))
+    }
+
+    /// Gain of columns that are no part of the design beside a base of which `residual` is what it leaves.
+    pub fn gain(&self, columns: &[DVector<f64>], base: &[usize], residual: &DVector<f64>) -> f64 {
+        let inverse = self.inverse(base).filter(|_| !base.is_empty());
+        let clean: Vec<DVector<f64>> = columns
+            .iter()
+            .map(|column| {
+                let mut column = column.clone();
+                if let Some(inverse) = &inverse {
+                    let cross = base.iter().map(|&c| self.x.column(c).dot(&column));
+                    let weights = inverse * DVector::from_iterator(base.len(), cross);
+                    base.iter()
+                        .enumerate()
+                        .for_each(|(i, &c)| column.axpy(-weights[i], &self.x.column(c), 1.0));
+                }
+                column
+            })
+            .collect();
+        let count = clean.len();
+        let ridge = 1e-9 * clean.iter().map(DVector::norm_squared).fold(0.0, f64::max);
+        let xx =
+            DMatrix::from_fn(count, count, |i, j| clean[i].dot(&clean[j]) + if i == j { ridge } else { 0.0 });
+        let xy = DVector::from_iterator(count, clean.iter().map(|column| column.dot(residual)));
+        xx.cholesky().map_or(0.0, |factor| xy.dot(&factor.solve(&xy)))
+    }
+
+    /// Change of the rows with the logarithm of a nonlinear parameter, for columns with their scaled coefficients.
+    pub fn shape_derivative(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        candidate: usize,
+        axis: usize,
+        columns: &[(usize, usize, f64)],
+    ) -> DVector<f64> {
+        const STEP: f64 = 0.02;
+        let Candidate { effect, mut shape, .. } = self.candidates[candidate];
+        shape[axis] *= 1.0 + STEP;
+        let moved = self.candidate_columns(all, setting, effect, &shape);
+        let mut change = DVector::zeros(self.y.len());
+        for &(column, coefficient, beta) in columns {
+            if let Some((_, values, scale)) = moved.iter().find(|(c, ..)| *c == coefficient) {
+                let factor = beta * scale / self.scale[column] / STEP;
+                change.axpy(factor, &DVector::from_column_slice(values), 1.0);
+                change.axpy(-beta / STEP, &self.x.column(column), 1.0);
+            }
+        }
+        change
+    }
+
+    fn fold_of(&self, row: usize) -> usize {
+        self.block_fold[self.rows.rows[row].block]
+    }
+
+    fn sum(&mut self, folds: usize) {
+        let count = self.scale.len();
+        let mut by_fold: Vec<Vec<usize>> = vec![Vec::new(); folds];
+        (0..self.y.len()).for_each(|row| by_fold[self.fold_of(row)].push(row));
+        self.folds = by_fold
+            .iter()
+            .map(|rows| {
+                let x = DMatrix::from_fn(rows.len(), count, |i, j| self.x[(rows[i], j)]);
+                let y = DVector::from_fn(rows.len(), |i, _| self.y[rows[i]]);
+                Fold { xx: x.tr_mul(&x), xy: x.tr_mul(&y), yy: y.norm_squared() }
+            })
+            .collect();
+        self.total();
+    }
+
+    fn total(&mut self) {
+        let count = self.scale.len();
+        let zero = Fold { xx: DMatrix::zeros(count, count), xy: DVector::zeros(count), yy: 0.0 };
+        self.total = self.folds.iter().fold(zero, |sum, fold| Fold {
+            xx: sum.xx + &fold.xx,
+            xy: sum.xy + &fold.xy,
+            yy: sum.yy + fold.yy,
+        });
+    }
+
+    fn resum(&mut self, column: usize) {
+        for fold in 0..self.folds.len() {
+            let rows: Vec<usize> = (0..self.y.len()).filter(|&row| self.fold_of(row) == fold).collect();
+            for other in 0..self.scale.len() {
+                let product: f64 = rows.iter().map(|&row| self.x[(row, column)] * self.x[(row, other)]).sum();
+                self.folds[fold].xx[(column, other)] = product;
+                self.folds[fold].xx[(other, column)] = product;
+            }
+            self.folds[fold].xy[column] = rows.iter().map(|&row| self.x[(row, column)] * self.y[row]).sum();
+        }
+        self.total();
+    }
+
+    /// Sum of squares of the gap.
+    pub fn empty_loss(&self) -> f64 {
+        self.total.yy
+    }
+
+    /// Least squares on all rows: scaled coefficients and the sum of squares left.
+    pub fn solve(&self, columns: &[usize]) -> Option<(DVector<f64>, f64)> {
+        solve(&self.total, None, columns)
+    }
+
+    /// Least squares with a cross-validated loss.
+    pub fn fit(&self, columns: &[usize]) -> Option<Fitted> {
+        let (beta, loss) = self.solve(columns)?;
+        let mut fitted = Fitted { beta, loss, cv_loss: 0.0, fold_losses: Vec::new(), fold_betas: Vec::new() };
+        for fold in &self.folds {
+            let (beta, _) = solve(&self.total, Some(fold), columns)?;
+            let loss = fold_loss(fold, columns, &beta);
+            fitted.cv_loss += loss;
+            fitted.fold_losses.push(loss);
+            fitted.fold_betas.push(beta);
+        }
+        Some(fitted)
+    }
+
+    /// What is left of the gap, row by row.
+    pub fn residual(&self, columns: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+        let mut residual = self.y.clone();
+        for (index, &column) in columns.iter().enumerate() {
+            residual.axpy(-beta[index], &self.x.column(column), 1.0);
+        }
+        residual
+    }
+
+    /// Inverse of the normal matrix of some columns.
+    pub fn inverse(&self, columns: &[usize]) -> Option<DMatrix<f64>> {
+        let xx = |i: usize, j: usize| self.total.xx[(columns[i], columns[j])];
+        ridged(columns.len(), xx).cholesky().map(|factor| factor.inverse())
+    }
+
+    /// Squared sine of the angle between a column and the space of others: 0 where it says nothing new.
+    pub fn novelty(&self, column: usize, others: &[usize]) -> f64 {
+        let xx = &self.total.xx;
+        let length = xx[(column, column)];
+        if others.is_empty() || length == 0.0 {
+            return f64::from(u8::from(length > 0.0));
+        }
+        let count = others.len();
+        let ridge = |i: usize, j: usize| if i == j { 1.0 + 1e-9 } else { 1.0 };
+        let inner = DMatrix::from_fn(count, count, |i, j| xx[(others[i], others[j])] * ridge(i, j));
+        let cross = DVector::from_fn(count, |i, _| xx[(others[i], column)]);
+        let Some(factor) = inner.cholesky() else { return 0.0 };
+        (1.0 - cross.dot(&factor.solve(&cross)) / length).max(0.0)
+    }
+}
+
+fn solve(total: &Fold, without: Option<&Fold>, columns: &[usize]) -> Option<(DVector<f64>, f64)> {
+    let count = columns.len();
+    let xx = |i: usize, j: usize| {
+        let (a, b) = (columns[i], columns[j]);
+        total.xx[(a, b)] - without.map_or(0.0, |fold| fold.xx[(a, b)])
+    };
+    let xy = |i: usize| total.xy[columns[i]] - without.map_or(0.0, |fold| fold.xy[columns[i]]);
+    let yy = total.yy - without.map_or(0.0, |fold| fold.yy);
+    if count == 0 {
+        return Some((DVector::zeros(0), yy));
+    }
+    let right = DVector::from_fn(count, |i, _| xy(i));
+    let beta = ridged(count, xx).cholesky()?.solve(&right);
+    let loss = yy - 2.0 * beta.dot(&right)
+        + (0..count).map(|i| (0..count).map(|j| beta[i] * beta[j] * xx(i, j)).sum::<f64>()).sum::<f64>();
+    Some((beta, loss))
+}
+
+/// A normal matrix with a ridge: a column that a fold alone excites has no length without it, and of two that are the same
+/// rounding must not decide whether there is a solution.
+fn ridged(count: usize, xx: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+    let ridge = 1e-7 * (0..count).map(|i| xx(i, i)).fold(0.0, f64::max);
+    DMatrix::from_fn(count, count, |i, j| xx(i, j) + if i == j { ridge } else { 0.0 })
+}
+
+fn fold_loss(fold: &Fold, columns: &[usize], beta: &DVector<f64>) -> f64 {
+    let mut sum = fold.yy;
+    for (i, &a) in columns.iter().enumerate() {
+        sum -= 2.0 * beta[i] * fold.xy[a];
+        for (j, &b) in columns.iter().enumerate() {
+            sum += beta[i] * beta[j] * fold.xx[(a, b)];
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn columns_that_are_the_same_have_an_inverse_whatever_rounding_does() {
+        for size in [1.0, 0.3, 1e4 / 3.0] {
+            assert!(ridged(2, |_, _| size).cholesky().is_some());
+            assert!(ridged(3, |i, j| size * (1.0 + i as f64) * (1.0 + j as f64)).cholesky().is_some());
+        }
+    }
+
+    #[test]
+    fn whitens_by_the_inverse_root_of_the_covariance_and_alone_the_zero_is_the_mean() {
+        let pace: Vec<f64> = (0..12).map(|i| 0.3 + 0.1 * f64::from(i)).collect();
+        let values: Vec<f64> = (0..12).map(|i| f64::from(i * i % 7) - 2.0).collect();
+        let (zero, paced) = (1.7, 0.6);
+        let covariance = DMatrix::from_fn(12, 12, |i, j| {
+            zero * zero + paced * paced * pace[i] * pace[j] + f64::from(u8::from(i == j))
+        });
+        let eigen = covariance.symmetric_eigen();
+        let root = &eigen.eigenvectors
+            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| l.sqrt().recip()))
+            * eigen.eigenvectors.transpose();
+        let expected = root * DVector::from_vec(values.clone());
+        let mut found = values.clone();
+        whiten(&mut found, &pace, [zero, paced]);
+        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected}");
+        let (mut centered, mut found) = (values.clone(), values);
+        center(&mut centered, zero);
+        whiten(&mut found, &pace, [zero, 0.0]);
+        assert!(found.iter().zip(&centered).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+}

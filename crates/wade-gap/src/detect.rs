@@ -1,0 +1,280 @@
+//! Is there a gap, and how small an effect would these trials have shown?
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+use serde::Serialize;
+
+use super::candidates::{Column, Setting, columns, unavailable};
+use super::design::Design;
+use super::rates::mean_square;
+use super::robust::errors;
+use super::series::Series;
+use super::smoothing::bins;
+use super::statistics::{median, quantile, white_variance};
+use super::{Config, Named, noise::Floor};
+use wade_core::effects::Effect;
+use wade_learn::random::Random;
+use wade_learn::trials::{Manifest, WRENCH};
+
+/// Deviates that an effect must have to be named nine times of ten: the bar, and 1.28 for the power.
+const POWER: f64 = 1.28;
+/// Below this share of signal in its columns an effect is not excited: the rest is noise of the kinematics.
+const LEAST_SIGNAL: f64 = 0.3;
+/// Share of a rate that hangs together, below which it is noise.
+const COHERENT: f64 = 0.1;
+/// A trial excites an effect when its mean square is this share of that of the trial that does so most.
+const EXCITED: f64 = 0.1;
+
+/// The gap of one component against its floor, root mean squares [N or N m].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GapSize {
+    /// Of all samples.
+    pub rms: f64,
+    /// 90 % interval, by a bootstrap over trials.
+    pub interval: [f64; 2],
+    /// What noise alone would show.
+    pub noise_floor: f64,
+    /// True where the interval lies above the floor.
+    pub above_floor: bool,
+}
+
+/// The gap of each component in some trials.
+pub(super) fn sizes<'a>(
+    trials: impl Iterator<Item = &'a Series> + Clone,
+    floors: &[Floor; 6],
+    components: &[usize],
+    config: &Config,
+) -> BTreeMap<&'static str, GapSize> {
+    let of = |&component: &usize| {
+        let squares: Vec<(f64, f64)> = trials
+            .clone()
+            .map(|s| (s.gap.iter().map(|gap| gap[component].powi(2)).sum(), s.gap.len() as f64))
+            .collect();
+        let mut random = Random::new(config.seed ^ 0xde7ec7);
+        let rms = |draw: &[(f64, f64)]| {
+            let (sum, count) = draw.iter().fold((0.0, 0.0), |(s, c), (a, b)| (s + a, c + b));
+            (sum / f64::max(count, 1.0)).sqrt()
+        };
+        let mut draws: Vec<f64> = (0..config.bootstrap)
+            .map(|_| {
+                let pick = || squares[(random.unit() * squares.len() as f64) as usize];
+                rms(&std::iter::repeat_with(pick).take(squares.len()).collect::<Vec<_>>())
+            })
+            .collect();
+        let interval = [quantile(&mut draws.clone(), 0.05), quantile(&mut draws, 0.95)];
+        let noise_floor = floors[component].with_model();
+        let size =
+            GapSize { rms: rms(&squares), interval, noise_floor, above_floor: interval[0] > noise_floor };
+        (WRENCH[component], size)
+    };
+    components.iter().map(of).collect()
+}
+
+/// What the trials say about one effect of the library, whether it is there or not.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Excitation {
+    /// Effect.
+    pub name: &'static str,
+    /// Trials that excite it.
+    pub trials: usize,
+    /// The smallest coefficient that these trials would have shown, by name.
+    pub minimum_detectable: BTreeMap<&'static str, Detectable>,
+    /// The same as a force or moment, root mean square over all samples [N or N m].
+    pub minimum_load: Option<f64>,
+    /// Why it could not have been found; none where it could.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_testable: Option<String>,
+}
+
+/// A smallest coefficient.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Detectable {
+    /// Size.
+    pub value: f64,
+    /// Unit; 1 where it has none.
+    pub unit: &'static str,
+}
+
+/// The excitation of every effect; `residual` is what the named effects leave of the rows. What was named was excited.
+pub(super) fn excitations(
+    design: &Design,
+    all: &[Series],
+    setting: &Setting,
+    manifest: &Manifest,
+    residual: &DVector<f64>,
+    named: &[Named],
+    config: &Config,
+) -> Vec<Excitation> {
+    let bar = super::statistics::deviate_of(config.significance) + POWER;
+    let of = |&effect: &Effect| {
+        let mut found = of_effect(effect, design, all, setting, manifest, residual, bar);
+        found.not_testable.take_if(|_| named.iter().any(|named| named.effect == effect));
+        found
+    };
+    config.library.iter().map(of).collect()
+}
+
+fn of_effect(
+    effect: Effect,
+    design: &Design,
+    all: &[Series],
+    setting: &Setting,
+    manifest: &Manifest,
+    residual: &DVector<f64>,
+    bar: f64,
+) -> Excitation {
+    let mut found = Excitation {
+        name: effect.name(),
+        trials: 0,
+        minimum_detectable: BTreeMap::new(),
+        minimum_load: None,
+        not_testable: unavailable(effect, setting, manifest, all),
+    };
+    if found.not_testable.is_some() {
+        return found;
+    }
+    let forms: Vec<usize> =
+        (0..design.candidates.len()).filter(|&i| design.candidates[i].effect == effect).collect();
+    let Some(&form) = forms.get(forms.len() / 2) else {
+        found.not_testable = Some(not_excited(effect).into());
+        return found;
+    };
+    let candidate = &design.candidates[form];
+    let raw: Vec<Vec<Column>> =
+        all.iter().enumerate().map(|(rank, s)| columns(effect, &candidate.shape, s, rank, setting)).collect();
+    let coherent = is_coherent(effect, all, &setting.components);
+    let changes = if effect == Effect::SensorDelay { change_signal(all, &setting.components) } else { 1.0 };
+    let mut plausible = false;
+    let mut excited = false;
+    for &(column, coefficient) in &candidate.columns {
+        let (signal, trials) = signal(&raw, coefficient, all, setting, design);
+        let smooth = if coherent { signal.min(changes).max(0.0) } else { 0.0 };
+        found.trials = found.trials.max(if smooth > LEAST_SIGNAL { trials } else { 0 });
+        excited |= smooth > LEAST_SIGNAL;
+        let Some(error) = errors(design, &[column], residual).map(|errors| errors[0]) else { continue };
+        let floor = white_error(design, column);
+        let detectable = bar * error.std.max(floor) / design.scale[column] / smooth.max(0.01);
+        let coefficient = &effect.coefficients()[coefficient];
+        plausible |= smooth > LEAST_SIGNAL && detectable < largest_plausible(effect, coefficient);
+        found
+            .minimum_detectable
+            .insert(coefficient.name, Detectable { value: detectable, unit: coefficient.unit });
+        let load = bar * error.std.max(floor) * mean_bin(design, setting);
+        found.minimum_load = Some(found.minimum_load.map_or(load, |other| other.min(load)));
+    }
+    if !excited {
+        found.not_testable = Some(not_excited(effect).into());
+    } else if !plausible {
+        found.not_testable =
+            Some("excited too little: even the largest plausible value would drown in the noise".into());
+    }
+    found
+}
+
+/// Standard error that rows of unit variance would give.
+fn white_error(design: &Design, column: usize) -> f64 {
+    design.x.column(column).norm_squared().max(1e-12).sqrt().recip()
+}
+
+fn mean_bin(design: &Design, setting: &Setting) -> f64 {
+    let mut sizes: Vec<f64> = setting.components.iter().map(|&c| design.noise.bin[c]).collect();
+    median(&mut sizes)
+}
+
+/// Length of the running means after which a column is looked at trial by trial [s].
+const EVEN: f64 = 0.25;
+
+/// Share of signal, not noise of the kinematics, in the bins of a column, and the number of trials that excite it.
+fn signal(
+    raw: &[Vec<Column>],
+    coefficient: usize,
+    all: &[Series],
+    setting: &Setting,
+    design: &Design,
+) -> (f64, usize) {
+    let (mut noise, mut total) = (0.0, 0.0);
+    let mut by_trial = vec![0.0; all.len()];
+    for (trial, series) in all.iter().enumerate() {
+        for &component in &setting.components {
+            let value = |sample: usize| raw[trial][coefficient][sample][component];
+            let (values, smooth) = (series.binned(value), bins(series, EVEN, value));
+            let weight = design.noise.bin[component].powi(-2);
+            for run in series.runs.iter().filter(|run| run.len() >= 6) {
+                let values = &values[run.clone()];
+                if !setting.computed {
+                    noise += weight * white_variance(values) * values.len() as f64;
+                }
+                total += weight * values.iter().map(|v| v * v).sum::<f64>();
+                by_trial[trial] += weight * mean_square(&smooth[run.clone()]);
+            }
+        }
+    }
+    let most = by_trial.iter().copied().fold(0.0, f64::max);
+    let trials = by_trial.iter().filter(|e| **e > EXCITED * most && **e > 0.0).count();
+    (if total > 0.0 { 1.0 - noise / total } else { 0.0 }, trials)
+}
+
+/// True where a rate that an effect lives on hangs together for longer than the filter that made it: what is left of the
+/// noise of a motion after differentiating it does not, however smooth it looks.
+fn is_coherent(effect: Effect, all: &[Series], components: &[usize]) -> bool {
+    let share = |index: usize| {
+        let sums = all.iter().map(|series| series.coherence[index]);
+        let (power, covariance) = sums.fold((0.0, 0.0), |(p, c), s| (p + s.power, c + s.covariance));
+        if power > 0.0 { covariance / power } else { 0.0 }
+    };
+    let felt = |rates: [usize; 3], with: [[usize; 2]; 3]| {
+        let seen = |with: &[usize; 2]| with.iter().any(|c| components.contains(c));
+        rates.into_iter().zip(with).filter(|(_, with)| seen(with)).any(|(rate, _)| share(rate) > COHERENT)
+    };
+    match effect {
+        // pitch comes with surge, roll with sway; inertia has that of turning as well
+        Effect::AddedMass | Effect::MassError | Effect::WaveMemory => {
+            felt([0, 1, 2], [[0, 4], [1, 3], [2, 2]])
+                || effect == Effect::AddedMass && felt([3, 4, 5], [[3, 3], [4, 4], [5, 5]])
+        }
+        Effect::WaterEntrySlamming => share(6) > COHERENT,
+        Effect::Rotation => felt([7, 8, 9], [[3, 3], [2, 4], [1, 5]]),
+        _ => true,
+    }
+}
+
+/// Share of signal in the changes of the prediction, on which a delay lives.
+fn change_signal(all: &[Series], components: &[usize]) -> f64 {
+    let (mut noise, mut power) = (0.0, 0.0);
+    for (series, &c) in all.iter().flat_map(|s| components.iter().map(move |c| (s, c))) {
+        let values = series.binned(|i| series.predicted[i][c]);
+        let white = white_variance(&values).max(1e-12);
+        let changes = values.windows(4).map(|w| (w[3] - w[0]).powi(2));
+        // the difference of two bins has twice their noise
+        noise += 2.0 * values.len() as f64;
+        power += changes.sum::<f64>() / white;
+    }
+    if power > 0.0 { 1.0 - noise / power } else { 0.0 }
+}
+
+/// Above this a coefficient is no longer an error that somebody makes.
+fn largest_plausible(effect: Effect, coefficient: &wade_core::effects::Coefficient) -> f64 {
+    match (effect, coefficient.literature) {
+        (_, Some(band)) => band[1].max(-band[0]),
+        (Effect::Current, _) => 1.0,
+        (Effect::WaterLevelOffset, _) => 0.05,
+        (Effect::DensityError, _) => 0.2,
+        (Effect::SensorDelay, _) => 0.5,
+        (Effect::SensorGain, _) => 0.5,
+        _ => coefficient.bounds[1],
+    }
+}
+
+fn not_excited(effect: Effect) -> &'static str {
+    match effect {
+        Effect::AddedMass => "no trial accelerates beyond the noise of its accelerations",
+        Effect::Rotation => "no trial turns",
+        Effect::WaterEntrySlamming => "no trial enters the water",
+        Effect::HullFlooding => "no trial is in the water",
+        Effect::WaveMemory => "no trial changes its speed",
+        Effect::SensorDelay => "the predicted wrench hardly changes within a trial",
+        Effect::DriveGain => "the known drive force is zero",
+        _ => "no trial excites it in the components that were measured",
+    }
+}

@@ -1,0 +1,298 @@
+//! The gap before and after on trials that took no part in naming and fitting.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::candidates::{Column, Setting, columns};
+use super::design::{Rows, to_rows};
+use super::features::{Features, of_bins};
+use super::judge::Judge;
+use super::locate::{Limits, OPEN, Region, inside};
+use super::noise::Floor;
+use super::rates::mean_square;
+use super::series::Series;
+use super::statistics::quantile;
+use super::{Config, Named};
+use wade_learn::random::Random;
+use wade_learn::trials::WRENCH;
+
+/// Fewest trials over which a bootstrap says how far a closure may be off.
+pub(super) const ENOUGH: usize = 3;
+/// Floors that a gap must have before a share of what stands above is said.
+const ABOVE: f64 = 1.02;
+/// Floors below which a gap hardly stands above them, and what must be left then: where less is, the floor is none, and hundreds of per
+/// cent of what stands above it tell nobody anything.
+const NEAR: [f64; 2] = [1.5, 0.9];
+/// A region may not become worse by more than this share.
+const WORSE: f64 = 0.05;
+
+/// Root mean squares of one component [N or N m]; of `all` in noise floors, each with what the model states of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Closure {
+    /// Without the named effects.
+    pub before: f64,
+    /// With them.
+    pub after: f64,
+    /// What noise alone would show.
+    pub noise_floor: f64,
+    /// `(before - after) / (before - noise_floor)`; none where before is not above the floor, or hardly, and after
+    /// far below it.
+    pub closure: Option<f64>,
+    /// 90 % interval of the closure, by a bootstrap over the trials kept back; none of fewer than three.
+    pub interval: Option<[f64; 2]>,
+}
+
+impl Closure {
+    /// Share of the squared gap above noise and the model's own error that is explained of all components, where what was named
+    /// does not hold on trials that nobody looked at: less than `least` is explained and what is left is loud; or it names a
+    /// fault of a sensor, which is exact, and closes too little even at the upper end of the interval.
+    pub(super) fn disproof(&self, least: f64, is_fault: bool) -> Option<f64> {
+        /// In noise and the model's own error, as all components together are.
+        const LOUD: f64 = 2.0;
+        /// Closure that a fault must reach.
+        const EXACT: f64 = 0.7;
+        let [before, after] = [self.before, self.after].map(|size| size * size);
+        let share = (before - after) / (before - 1.0).max(f64::MIN_POSITIVE);
+        let inexact = is_fault && self.interval.is_some_and(|[_, high]| high < EXACT);
+        (inexact || self.after > LOUD && share < least).then_some(share)
+    }
+}
+
+/// A region that the named effects make worse.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Worse {
+    /// The region.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// The component that gets worse; none where all together do.
+    pub component: Option<&'static str>,
+    /// Gap before, in noise floors.
+    pub before: f64,
+    /// Gap after.
+    pub after: f64,
+}
+
+/// The wrench that the named effects add to each sample of a trial.
+pub(super) fn explained(named: &[Named], series: &Series, rank: usize, setting: &Setting) -> Vec<[f64; 6]> {
+    let mut sum = vec![[0.0; 6]; series.t.len()];
+    for named in named {
+        let columns = columns(named.effect, &named.shape, series, rank, setting);
+        for &(coefficient, value) in &named.coefficients {
+            for (sum, column) in sum.iter_mut().zip(&columns[coefficient]) {
+                (0..6).for_each(|c| sum[c] += value * column[c]);
+            }
+        }
+    }
+    sum
+}
+
+/// Squares before and after of one trial, by component, and its samples.
+#[derive(Clone)]
+struct Sums {
+    before: [f64; 6],
+    after: [f64; 6],
+    count: f64,
+}
+
+/// The closure of each component, and of all together, each in its noise and what the model states of itself.
+pub(super) fn closures(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    setting: &Setting,
+    floors: &[Floor; 6],
+    config: &Config,
+) -> BTreeMap<&'static str, Closure> {
+    let sums: Vec<Sums> = held
+        .iter()
+        .map(|&trial| {
+            let series = &all[trial];
+            let added = explained(named, series, trial, setting);
+            let mut sums = Sums { before: [0.0; 6], after: [0.0; 6], count: series.t.len() as f64 };
+            for (gap, added) in series.gap.iter().zip(&added) {
+                for &c in &setting.components {
+                    sums.before[c] += gap[c].powi(2);
+                    sums.after[c] += (gap[c] - added[c]).powi(2);
+                }
+            }
+            sums
+        })
+        .collect();
+    let mut random = Random::new(config.seed ^ 0xc105);
+    let draws: Vec<Vec<Sums>> = (0..config.bootstrap)
+        .map(|_| {
+            (0..sums.len()).map(|_| sums[(random.unit() * sums.len() as f64) as usize].clone()).collect()
+        })
+        .collect();
+    let closure = |components: &[usize], floor: f64, unit: bool| {
+        let weight = |c: usize| if unit { 1.0 } else { floors[c].with_model().max(1e-12).powi(-2) };
+        let sizes = |sums: &[Sums]| {
+            let count = sums.iter().map(|s| s.count).sum::<f64>() * components.len() as f64;
+            let rms = |of: &dyn Fn(&Sums, usize) -> f64| {
+                let squares = sums.iter().flat_map(|s| components.iter().map(move |&c| (s, c)));
+                (squares.map(|(s, c)| of(s, c) * weight(c)).sum::<f64>() / count.max(1.0)).sqrt()
+            };
+            (rms(&|s, c| s.before[c]), rms(&|s, c| s.after[c]))
+        };
+        let share = |(before, after): (f64, f64)| {
+            (before > ABOVE * floor).then(|| (before - after) / (before - floor))
+        };
+        let (before, after) = sizes(&sums);
+        let is_told = before > NEAR[0] * floor || after > NEAR[1] * floor;
+        let closed = share((before, after)).filter(|_| is_told);
+        let mut found: Vec<f64> = draws.iter().filter_map(|draw| share(sizes(draw))).collect();
+        let interval = closed
+            .filter(|_| sums.len() >= ENOUGH && found.len() * 2 > draws.len())
+            .map(|_| [quantile(&mut found.clone(), 0.05), quantile(&mut found, 0.95)]);
+        Closure { before, after, noise_floor: floor, closure: closed, interval }
+    };
+    let mut closures: BTreeMap<&'static str, Closure> =
+        setting.components.iter().map(|&c| (WRENCH[c], closure(&[c], floors[c].total(), true))).collect();
+    let noise = |c: usize| (floors[c].total() / floors[c].with_model().max(1e-12)).powi(2);
+    let squares = setting.components.iter().map(|&c| noise(c)).sum::<f64>();
+    let floor = (squares / setting.components.len().max(1) as f64).sqrt();
+    closures.insert("all", closure(&setting.components, floor, false));
+    closures
+}
+
+/// A closure with the sizes of the gap as naming saw it, where the model states how far it may be off: without the share that its
+/// own error, a load that stays and one that goes with the square of the speed, has in each trial. What was named is held to
+/// nothing that its naming did not look at. Sizes in noises of a row, which hold the model's error.
+pub(super) fn as_naming_saw_it(
+    closure: Closure,
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    judge: &Judge,
+) -> Closure {
+    let (noise, setting) = (&judge.design.noise, judge.setting);
+    if !held.iter().any(|&trial| noise.model[trial].iter().any(|std| *std > 0.0)) {
+        return closure;
+    }
+    let components = &setting.components;
+    let rows = Rows::new(all, held, components, judge.config.block_s);
+    let of = |value: &dyn Fn(usize) -> Column| {
+        mean_square(&to_rows(all, &rows, held, components, noise, value)).sqrt()
+    };
+    let after = |trial: usize| {
+        let added = explained(named, &all[trial], trial, setting);
+        let less = |(gap, added): (&[f64; 6], &[f64; 6])| std::array::from_fn(|c| gap[c] - added[c]);
+        all[trial].gap.iter().zip(&added).map(less).collect()
+    };
+    Closure { before: of(&|trial| all[trial].gap.clone()), after: of(&after), ..closure }
+}
+
+impl std::fmt::Display for Worse {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { place, component, before, after } = self;
+        let of = component.map_or_else(String::new, |component| format!(" of {component}"));
+        write!(f, "the gap{of} grows from {before:.1} to {after:.1} noise floors ({place})")
+    }
+}
+
+/// What of the trials kept back a gap is looked at in: all components together, then each by itself.
+struct Point {
+    features: Features,
+    /// Squares in floors, each with what the model states of itself.
+    before: Vec<f64>,
+    after: Vec<f64>,
+}
+
+/// Regions, thirds of depth and speed, and all of them, where the gap of the trials kept back grows by more than a twentieth: of
+/// all components together or of one of them.
+pub(super) fn worse(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    setting: &Setting,
+    floors: &[Floor; 6],
+    regions: &[Region],
+) -> Vec<Worse> {
+    /// Squared floors by which it must grow, in the mean of all components and of one alone: a fraction of the floor more is no
+    /// harm that anyone could measure, and of several components chance picks the worst.
+    const HARM: [f64; 2] = [0.05, 0.25];
+    let components = &setting.components;
+    let mut points: Vec<Point> = Vec::new();
+    for &trial in held {
+        let series = &all[trial];
+        let added = explained(named, series, trial, setting);
+        let squares = |value: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+            let of =
+                |&c: &usize| series.binned(|i| (value(i, c) / floors[c].with_model().max(1e-12)).powi(2));
+            components.iter().map(of).collect()
+        };
+        let before = squares(&|i, c| series.gap[i][c]);
+        let after = squares(&|i, c| series.gap[i][c] - added[i][c]);
+        let at = |squares: &[Vec<f64>], bin: usize| squares.iter().map(|of| of[bin]).collect();
+        points.extend(of_bins(series).into_iter().enumerate().map(|(bin, features)| Point {
+            features,
+            before: at(&before, bin),
+            after: at(&after, bin),
+        }));
+    }
+    let mut worse = Vec::new();
+    for (place, limits) in places(&points, regions) {
+        let within: Vec<&Point> = points.iter().filter(|point| inside(&limits, &point.features)).collect();
+        if within.len() < LEAST {
+            continue;
+        }
+        let mean =
+            |of: &dyn Fn(&Point) -> f64| within.iter().map(|p| of(p)).sum::<f64>() / within.len() as f64;
+        let whole = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
+        let together = (None, mean(&|p| whole(&p.before)), mean(&|p| whole(&p.after)), HARM[0]);
+        let alone = components.iter().enumerate().map(|(index, &c)| {
+            (Some(WRENCH[c]), mean(&|p| p.before[index]), mean(&|p| p.after[index]), HARM[1])
+        });
+        for (component, before, after, harm) in std::iter::once(together).chain(alone) {
+            if after.sqrt() > (1.0 + WORSE) * before.sqrt() && after - before > harm {
+                let [before, after] = [before, after].map(f64::sqrt);
+                worse.push(Worse { place: place.clone(), component, before, after });
+            }
+        }
+    }
+    worse
+}
+
+/// Fewest bins of a place.
+const LEAST: usize = 5;
+
+/// The regions, the thirds of depth and speed, and everywhere, in words and as limits.
+fn places(points: &[Point], regions: &[Region]) -> Vec<(String, Limits)> {
+    let mut places: Vec<(String, Limits)> =
+        regions.iter().map(|region| (region.place.clone(), region.limits)).collect();
+    for (feature, name) in [(0, "depth"), (2, "speed")] {
+        let mut values: Vec<f64> = points.iter().map(|point| point.features[feature]).collect();
+        let cuts = [quantile(&mut values.clone(), 1.0 / 3.0), quantile(&mut values, 2.0 / 3.0)];
+        let thirds = [[f64::NEG_INFINITY, cuts[0]], cuts, [cuts[1], f64::INFINITY]];
+        for (third, range) in ["lowest", "middle", "highest"].into_iter().zip(thirds) {
+            let mut limits = OPEN;
+            limits[feature] = range;
+            places.push((format!("{third} third of {name}"), limits));
+        }
+    }
+    places.push(("all held-out trials".to_owned(), OPEN));
+    places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_disproved_where_little_is_explained_and_what_is_left_is_loud() {
+        let of = |before: f64, after: f64| {
+            Closure { before, after, noise_floor: 1.0, closure: None, interval: None }.disproof(0.6, false)
+        };
+        // (85^2 - 57^2) / (85^2 - 1)
+        assert!(of(85.0, 57.0).is_some_and(|share| (share - 0.5504).abs() < 1e-4));
+        assert_eq!(of(85.0, 40.0), None, "most of it is explained");
+        assert_eq!(of(2.1, 1.9), None, "what is left is hardly larger than the noise");
+        let fault = |high: f64| {
+            let interval = Some([0.4, high]);
+            Closure { before: 1.2, after: 1.1, noise_floor: 1.0, closure: Some(0.5), interval }
+                .disproof(0.6, true)
+        };
+        assert!(fault(0.64).is_some() && fault(0.82).is_none(), "a zero that is off explains all of it");
+    }
+}

@@ -1,0 +1,139 @@
+//! The measured wrench of a trial: as its columns say, or inferred from the motion.
+//!
+//! Inverse dynamics (`method = "inverse_dynamics"`): `F = m (a + g up) - sum of other forces`. A column of a known other
+//! force is named after the component it acts on (`drive_fx`). Components without such a column are not inferred, since
+//! what the ground carries is unknown there. A dry twin, the same command without water, is taken off at the same time
+//! since the start, and so is its part in all that the wrench was inferred from: an error of the mass or of the drive
+//! stands in both.
+
+use std::collections::BTreeMap;
+
+use super::GapError;
+use super::rates::mean_step;
+use wade_core::frame::{GRAVITY, Vec3};
+use wade_learn::signal::interpolate;
+use wade_learn::trials::{Manifest, Method, Trial, Trials, component_of};
+
+/// Speed below which rolling resistance fades out [m/s].
+const ROLLING_SPEED: f64 = 0.05;
+
+/// What was measured of a trial, a value a sample; where the wrench was inferred, all of it less that of the dry twin.
+pub(super) struct Measurement {
+    /// `None` for a component that was not measured [N, N m].
+    pub wrench: [Option<Vec<f64>>; 6],
+    /// What the wrench was inferred from; `None` where it was measured, or comes inferred.
+    pub motion: Option<Motion>,
+    /// Known other force on each component, where there is one [N, N m].
+    pub other: Vec<[f64; 6]>,
+}
+
+/// What times the mass is force.
+pub(super) struct Motion {
+    /// [m/s2]
+    pub acceleration: Vec<Vec3>,
+    pub up: Vec<Vec3>,
+    /// The dry twin's weight times the direction in which it rolls, over its mass; 0 without one [m/s2].
+    pub dry_rolling: Vec<f64>,
+}
+
+pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<Measurement, GapError> {
+    let own = of_columns(&trial.other_forces, trial.len());
+    let twin = trials.manifest.measured.dry_twins.get(&trial.name);
+    if !is_inferred_here(trials, trial) {
+        if twin.is_some() {
+            return Err(GapError::TwinOfMeasured { trial: trial.name.clone() });
+        }
+        return Ok(Measurement { wrench: trial.measured.clone(), motion: None, other: own });
+    }
+    let mut other = own;
+    let mut motion = Motion {
+        acceleration: trial.acceleration.clone(),
+        up: (0..trial.len()).map(|sample| trial.up(sample).into_inner()).collect(),
+        dry_rolling: vec![0.0; trial.len()],
+    };
+    if let Some(name) = twin {
+        let missing = || GapError::NoTwin { trial: trial.name.clone(), twin: name.clone() };
+        let twin = trials.trials.iter().find(|other| other.name == *name).ok_or_else(missing)?;
+        take_off(&mut motion, &mut other, trial, twin)?;
+    }
+    let mass = trials.manifest.mass.unwrap_or(mass);
+    let force = |axis: usize| {
+        sum_on(axis, &trial.other_forces)?;
+        let inertia = motion.acceleration.iter().zip(&motion.up).map(|(a, up)| a[axis] + GRAVITY * up[axis]);
+        Some(inertia.zip(&other).map(|(inertia, other)| mass * inertia - other[axis]).collect())
+    };
+    let wrench = [force(0), force(1), force(2), None, None, None];
+    Ok(Measurement { wrench, motion: Some(motion), other })
+}
+
+/// Which way wheels roll: the sign of the speed ahead [m/s], 0 at rest.
+pub(super) fn rolling_direction(speed: f64) -> f64 {
+    speed / speed.hypot(ROLLING_SPEED)
+}
+
+/// True where the wrench of the trials was computed by a resolved flow.
+pub(super) fn is_computed(manifest: &Manifest) -> bool {
+    manifest.measured.method == Some(Method::Cfd)
+}
+
+/// True where the wrench of the trials rests on inertia and drive.
+pub(super) fn is_inferred(manifest: &Manifest) -> bool {
+    manifest.measured.method == Some(Method::InverseDynamics)
+}
+
+/// True where the wrench is inferred from the trial's own motion; false where it was measured, or comes inferred.
+fn is_inferred_here(trials: &Trials, trial: &Trial) -> bool {
+    trials.manifest.measured.method == Some(Method::InverseDynamics)
+        && trial.measured.iter().all(Option::is_none)
+}
+
+/// Known forces on each component; 0 where no column acts on it.
+pub(super) fn of_columns(columns: &BTreeMap<String, Vec<f64>>, count: usize) -> Vec<[f64; 6]> {
+    let sums: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| sum_on(c, columns));
+    (0..count).map(|i| std::array::from_fn(|c| sums[c].as_ref().map_or(0.0, |sum| sum[i]))).collect()
+}
+
+/// Sum of the columns of known forces that act on a component; `None` where there is none.
+fn sum_on(component: usize, columns: &BTreeMap<String, Vec<f64>>) -> Option<Vec<f64>> {
+    let mut columns = columns.iter().filter(|(name, _)| component_of(name) == Some(component));
+    let mut sum = columns.next()?.1.clone();
+    for (_, column) in columns {
+        sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += value);
+    }
+    Some(sum)
+}
+
+fn take_off(
+    motion: &mut Motion,
+    other: &mut [[f64; 6]],
+    trial: &Trial,
+    twin: &Trial,
+) -> Result<(), GapError> {
+    let length = |trial: &Trial| trial.t[trial.len() - 1] - trial.t[0];
+    // the last sample may stand for one more, and for no longer
+    if length(twin) + mean_step(&twin.t) < length(trial) {
+        return Err(GapError::ShortTwin {
+            trial: trial.name.clone(),
+            twin: twin.name.clone(),
+            seconds: length(trial) - length(twin),
+        });
+    }
+    let since_start: Vec<f64> = trial.t.iter().map(|t| t - trial.t[0] + twin.t[0]).collect();
+    let at = |value: &dyn Fn(usize) -> f64| {
+        let values: Vec<f64> = (0..twin.len()).map(value).collect();
+        interpolate(&twin.t, &values, &since_start)
+    };
+    for axis in 0..3 {
+        let acceleration = at(&|i| twin.acceleration[i][axis]);
+        motion.acceleration.iter_mut().zip(acceleration).for_each(|(wet, dry)| wet[axis] -= dry);
+        let up = at(&|i| twin.up(i)[axis]);
+        motion.up.iter_mut().zip(up).for_each(|(wet, dry)| wet[axis] -= dry);
+    }
+    motion.dry_rolling = at(&|i| GRAVITY * twin.up(i).z * rolling_direction(twin.velocity[i].x));
+    let dry = of_columns(&twin.other_forces, twin.len());
+    for component in 0..6 {
+        let dry = at(&|i| dry[i][component]);
+        other.iter_mut().zip(dry).for_each(|(wet, dry)| wet[component] -= dry);
+    }
+    Ok(())
+}

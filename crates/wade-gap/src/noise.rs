@@ -1,0 +1,203 @@
+//! The noise floor: what no effect can explain.
+//!
+//! From repeats, where there are any; else from the part of the gap that changes within a tenth of a second; never below the
+//! noise that `trials.toml` states. The model's own uncertainty stands beside it.
+
+use super::design::RowNoise;
+use super::rates::mean_step;
+use super::series::Series;
+use super::smoothing::Smoothing;
+use super::statistics::{median, noise_variance, white_variance};
+use serde::Serialize;
+use wade_learn::signal::interpolate;
+use wade_learn::trials::{Manifest, WRENCH};
+
+/// Where a floor comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FloorSource {
+    /// Trials that repeat each other.
+    Repeats,
+    /// The part of the gap that changes within a tenth of a second.
+    HighFrequency,
+    /// Stated in `trials.toml`.
+    Stated,
+}
+
+/// The floor of one component, one standard deviation of a sample [N or N m].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Floor {
+    /// Of one sample.
+    pub sample: f64,
+    /// Of a trial's zero, from trial to trial.
+    pub offset: f64,
+    /// The model's own.
+    pub model: f64,
+    /// Where `sample` comes from.
+    pub source: FloorSource,
+}
+
+impl Floor {
+    /// What is expected of the gap where nothing is missing [N or N m].
+    pub fn total(&self) -> f64 {
+        self.sample.hypot(self.offset)
+    }
+
+    /// The same with what the model states of itself: what weighs one component against another [N or N m].
+    pub fn with_model(&self) -> f64 {
+        self.total().hypot(self.model)
+    }
+}
+
+/// The floor of each compared component from the trials `naming`; the others are 0. Repeats may be of any trials: what
+/// differs between them is noise, whatever effect they share.
+pub(super) fn floors(
+    all: &[Series],
+    naming: &[usize],
+    manifest: &Manifest,
+    components: &[usize],
+) -> [Floor; 6] {
+    let model = model_error(&naming.iter().map(|&trial| &all[trial]).collect::<Vec<_>>());
+    std::array::from_fn(|component| {
+        let name = WRENCH[component];
+        let stated = manifest.sensor_noise.get(name).copied();
+        let offsets = naming.iter().map(|&trial| manifest.trial_offset_of(&all[trial].name, name));
+        let offset = (offsets.map(|o| o * o).sum::<f64>() / naming.len().max(1) as f64).sqrt();
+        let mut floor = Floor { sample: 0.0, offset, model: 0.0, source: FloorSource::HighFrequency };
+        if !components.contains(&component) {
+            return floor;
+        }
+        floor.sample = high_frequency(naming.iter().map(|&trial| &all[trial]), component);
+        if let Some(repeats) = repeats(all, manifest, component) {
+            floor = Floor { sample: repeats, source: FloorSource::Repeats, ..floor };
+        }
+        if let Some(stated) = stated.filter(|&stated| stated > floor.sample) {
+            floor = Floor { sample: stated, source: FloorSource::Stated, ..floor };
+        }
+        floor.model = model[component];
+        floor
+    })
+}
+
+/// Root mean square of what the model states of itself over the samples of some trials [N or N m]: those in states that it
+/// learnt, where there are any, or one trial far outside would hide what all others show.
+fn model_error(trials: &[&Series]) -> [f64; 6] {
+    let of = |with_outside: bool| {
+        let samples = trials.iter().flat_map(|series| series.uncertainty.iter().zip(&series.outside));
+        samples.filter(move |(_, outside)| with_outside || !**outside).map(|(uncertainty, _)| uncertainty)
+    };
+    let with_outside = of(false).next().is_none();
+    let count = of(with_outside).count().max(1) as f64;
+    std::array::from_fn(|c| (of(with_outside).map(|u| u[c].powi(2)).sum::<f64>() / count).sqrt())
+}
+
+fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for series in all {
+        let samples = series.t.len() as f64;
+        sum += sample_noise(series, component).powi(2) * samples;
+        count += samples;
+    }
+    (sum / f64::max(count, 1.0)).sqrt()
+}
+
+/// Noise of a sample of one trial by what changes within a tenth of a second [N or N m].
+pub(super) fn sample_noise(series: &Series, component: usize) -> f64 {
+    let values: Vec<f64> = series.gap.iter().map(|gap| gap[component]).collect();
+    noise_variance(&values, scales(&series.t)).sqrt()
+}
+
+/// Octaves below the rate of the samples in which noise is told from signal.
+fn scales(t: &[f64]) -> u32 {
+    /// What changes faster is no load [s].
+    const FAST: f64 = 0.08;
+    (FAST / mean_step(t).max(1e-6)).log2().max(0.0) as u32
+}
+
+/// The floors of some trials alone, where they come from the trials themselves or these are louder than is stated: noise may
+/// differ from trial to trial.
+pub(super) fn floors_of(
+    all: &[Series],
+    trials: &[usize],
+    floors: &[Floor; 6],
+    components: &[usize],
+) -> [Floor; 6] {
+    let mut own = *floors;
+    for &component in components {
+        if own[component].source == FloorSource::Repeats || trials.is_empty() {
+            continue;
+        }
+        let sample = high_frequency(trials.iter().map(|&trial| &all[trial]), component);
+        let is_stated = own[component].source == FloorSource::Stated;
+        own[component].sample = if is_stated { sample.max(own[component].sample) } else { sample };
+    }
+    own
+}
+
+/// Half the variance of the difference of two trials that repeat each other, at the same time since their start.
+fn repeats(all: &[Series], manifest: &Manifest, component: usize) -> Option<f64> {
+    let mut variances = Vec::new();
+    for group in &manifest.measured.repeats {
+        let group: Vec<&Series> =
+            group.iter().filter_map(|name| all.iter().find(|series| series.name == *name)).collect();
+        for (index, a) in group.iter().enumerate() {
+            for b in &group[index + 1..] {
+                variances.push(half_difference(a, b, component));
+            }
+        }
+    }
+    (!variances.is_empty()).then(|| median(&mut variances).sqrt())
+}
+
+fn half_difference(a: &Series, b: &Series, component: usize) -> f64 {
+    let gap = |series: &Series| series.gap.iter().map(|gap| gap[component]).collect::<Vec<f64>>();
+    let since: Vec<f64> = a.t.iter().map(|t| t - a.t[0] + b.t[0]).collect();
+    let other = interpolate(&b.t, &gap(b), &since);
+    let last = b.t[b.t.len() - 1];
+    let differences: Vec<f64> =
+        gap(a).iter().zip(&other).zip(&since).filter(|(_, t)| **t <= last).map(|((a, b), _)| a - b).collect();
+    let mean = differences.iter().sum::<f64>() / differences.len().max(1) as f64;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
+    0.5 * variance / differences.len().max(1) as f64
+}
+
+/// Noise of the rows, for weights: of bins by their own high-frequency part, of trials by what the manifest states.
+pub(super) fn row_noise(
+    all: &[Series],
+    trials: &[usize],
+    components: &[usize],
+    (floors, manifest): (&[Floor; 6], &Manifest),
+    smoothing: Smoothing,
+) -> RowNoise {
+    let model = all.iter().map(|series| model_error(std::slice::from_ref(&series))).collect();
+    let mut noise = RowNoise { bin: [1.0; 6], offset: vec![[0.0; 6]; all.len()], model, smoothing };
+    for &component in components {
+        let mut variances = Vec::new();
+        for &trial in trials {
+            let series = &all[trial];
+            let values = series.binned(|sample| series.gap[sample][component]);
+            let runs = series.runs.iter().filter(|run| run.len() >= 4);
+            variances.extend(runs.map(|run| white_variance(&values[run.clone()])));
+        }
+        let samples = trials.iter().flat_map(|&trial| all[trial].bins.iter().map(|bin| bin.len() as f64));
+        let per_bin = median(&mut samples.collect::<Vec<_>>()).max(1.0);
+        let white = floors[component].sample / per_bin.sqrt();
+        let bin = median(&mut variances).sqrt().max(white);
+        // a component without any noise at all weighs as if its gap were noise of a thousandth
+        let size = rms(all, trials, component);
+        let bin = bin.max(1e-3 * size).max(1e-12);
+        // what the model does not know of itself goes with the state, and stays; a component of which it knows little
+        // says little beside the others
+        noise.bin[component] = bin.hypot(floors[component].model);
+        for (offset, series) in noise.offset.iter_mut().zip(all) {
+            offset[component] = manifest.trial_offset_of(&series.name, WRENCH[component]);
+        }
+    }
+    noise
+}
+
+fn rms(all: &[Series], trials: &[usize], component: usize) -> f64 {
+    let squares = trials.iter().flat_map(|&t| all[t].gap.iter().map(|gap| gap[component].powi(2)));
+    let count = trials.iter().map(|&t| all[t].t.len()).sum::<usize>().max(1);
+    (squares.sum::<f64>() / count as f64).sqrt()
+}

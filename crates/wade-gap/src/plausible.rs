@@ -1,0 +1,260 @@
+//! Trials that cannot be what they are said to be, as far as the prediction beside them tells.
+
+use super::GapError;
+use super::noise::sample_noise;
+use super::series::Series;
+use super::statistics::quantile;
+use wade_learn::trials::WRENCH;
+
+/// Fewest samples in which a channel that never changes is told from one that happens not to.
+const ENOUGH: usize = 20;
+/// Share of the size of a prediction by which it must change where a dead channel is to show, ...
+const CHANGES: f64 = 0.1;
+/// ... and how many times the noise of a sample, where samples of single trials or values are held against it.
+const CLEARLY: f64 = 3.0;
+/// A number a thousand times as large or as small, and the factor by which a prediction may be off beside it.
+const THOUSAND: f64 = 1000.0;
+const OFF: f64 = 1.6;
+/// Correlation with the prediction from which a factor between the two is one, and from which it says that a sign is reversed:
+/// a current that is not known turns the drag of some trials about, but does not mirror it.
+const SAME: f64 = 0.7;
+const MIRRORED: f64 = -0.85;
+/// An end of the range of a channel is its stop where it holds this many times the samples of the value beside it.
+const STOP: usize = 10;
+/// Times by which two channels must come closer to what is expected where they are taken for each other.
+const SWAPPED: f64 = 10.0;
+/// Times the noise that three quarters of the trials stay below, beyond which that of one is no noise of the sensor, ...
+const LOUD: f64 = 4.0;
+/// ... where it is at most this share of the trials: more of them are another kind of trial.
+const FEW: f64 = 0.1;
+
+/// What all trials together are called.
+const ALL: &str = "every trial";
+
+/// What one component measured and what is expected of it.
+struct Channel<'a> {
+    component: usize,
+    trials: Vec<(&'a str, Vec<Pair>)>,
+    /// Root mean square of what is expected [N or N m].
+    size: f64,
+    /// Noise of a sample that three quarters of the trials stay below [N or N m].
+    noise: f64,
+}
+
+/// Measured and expected [N or N m].
+type Pair = [f64; 2];
+
+/// Refuses trials of the same samples, and measured channels that never change where they should, stop short of it, stand in
+/// for each other, have their sign reversed or are in another unit.
+pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Result<(), GapError> {
+    for (index, series) in all.iter().enumerate() {
+        let is_same = |other: &&Series| {
+            series.t.len() >= ENOUGH && other.gap == series.gap && other.seen == series.seen
+        };
+        if let Some(other) = all[..index].iter().find(is_same) {
+            return Err(GapError::SameTrial { trial: series.name.clone(), other: other.name.clone() });
+        }
+    }
+    // what is inferred is no channel, and in the unit of the mass
+    if inferred {
+        return Ok(());
+    }
+    let channels: Vec<Channel> = components.iter().map(|&component| Channel::new(all, component)).collect();
+    for channel in &channels {
+        channel.check()?;
+    }
+    for (index, a) in channels.iter().enumerate() {
+        let rest = channels[index + 1..].iter().filter(|b| a.component / 3 == b.component / 3);
+        rest.into_iter().try_for_each(|b| a.check_apart(b))?;
+    }
+    Ok(())
+}
+
+/// Few trials with far more noise than the others, which may hide what these show.
+pub(super) fn remarks(all: &[Series], components: &[usize]) -> Vec<String> {
+    let of = |&component: &usize| {
+        let noises: Vec<f64> = all.iter().map(|series| sample_noise(series, component)).collect();
+        let usual = usual(&noises);
+        let most = noises.iter().copied().fold(0.0, f64::max);
+        let loud = noises.iter().filter(|noise| **noise > LOUD * usual).count();
+        let trial = noises.iter().position(|noise| *noise == most)?;
+        let is_few = loud == 1 || loud as f64 <= FEW * all.len() as f64;
+        (usual > 0.0 && loud > 0 && is_few).then(|| {
+            format!(
+                "{}: {loud} of {} trials have up to {:.1} times the noise of the others, most of all {}: if their recording was damaged, leave them out",
+                WRENCH[component],
+                all.len(),
+                most / usual,
+                all[trial].name,
+            )
+        })
+    };
+    components.iter().filter_map(of).collect()
+}
+
+impl<'a> Channel<'a> {
+    fn new(all: &'a [Series], component: usize) -> Self {
+        let pairs = |series: &Series| -> Vec<Pair> {
+            let samples = series.seen.iter().zip(&series.gap);
+            samples.map(|(seen, gap)| [gap[component] + seen[component], seen[component]]).collect()
+        };
+        let trials: Vec<_> = all.iter().map(|series| (series.name.as_str(), pairs(series))).collect();
+        let expected = trials.iter().flat_map(|(_, pairs)| pairs.iter().map(|[_, p]| p * p));
+        let count = trials.iter().map(|(_, pairs)| pairs.len()).sum::<usize>().max(1);
+        let size = (expected.sum::<f64>() / count as f64).sqrt();
+        let noises: Vec<f64> = all.iter().map(|series| sample_noise(series, component)).collect();
+        Self { component, trials, size, noise: usual(&noises) }
+    }
+
+    fn column(&self) -> &'static str {
+        WRENCH[self.component]
+    }
+
+    /// The unit, and those in which a number is a thousand times as large and as small.
+    fn units(&self) -> (&'static str, &'static str, &'static str) {
+        if self.component < 3 { ("N", "mN", "kN") } else { ("N m", "N mm", "kN m") }
+    }
+
+    /// True for a change of what is expected that a channel cannot but show.
+    fn is_clear(&self, spread: f64) -> bool {
+        spread > CHANGES * self.size && spread > CLEARLY * self.noise
+    }
+
+    /// All trials together, then each alone.
+    fn check(&self) -> Result<(), GapError> {
+        let all: Vec<Pair> = self.trials.iter().flat_map(|(_, pairs)| pairs.iter().copied()).collect();
+        self.check_unit(ALL, &all)?;
+        self.check_pairs(ALL, &all)?;
+        self.trials.iter().try_for_each(|(name, pairs)| {
+            let [_, _, pp] = products(pairs);
+            let place = format!("{name}.csv");
+            if pairs.len() >= ENOUGH && self.is_clear((pp / pairs.len() as f64).sqrt()) {
+                self.check_unit(&place, pairs)?;
+            }
+            self.check_pairs(&place, pairs)
+        })
+    }
+
+    fn check_unit(&self, place: &str, pairs: &[Pair]) -> Result<(), GapError> {
+        let ((unit, larger, smaller), place) = (self.units(), place.to_owned());
+        let [mm, mp, pp] = products(pairs);
+        let ratio = mp.abs() / pp.max(f64::MIN_POSITIVE);
+        let is_near = |factor: f64| is_about(ratio / factor);
+        let other = [(THOUSAND, larger), (1.0 / THOUSAND, smaller)].into_iter().find(|(f, _)| is_near(*f));
+        match other.filter(|_| mp.abs() > SAME * (mm * pp).sqrt()) {
+            Some((_, other)) => Err(GapError::Unit { place, column: self.column(), ratio, unit, other }),
+            None => Ok(()),
+        }
+    }
+
+    fn check_pairs(&self, place: &str, pairs: &[Pair]) -> Result<(), GapError> {
+        if pairs.len() < ENOUGH {
+            return Ok(());
+        }
+        let (column, unit, place) = (self.column(), self.units().0, place.to_owned());
+        let whole = spread(pairs);
+        // a gap is a difference: adding the prediction to it again leaves an error of rounding
+        let first = pairs[0][0];
+        let near = 1e-9 * self.size.max(first.abs());
+        if pairs.iter().all(|[measured, _]| (measured - first).abs() <= near) && self.is_clear(whole) {
+            return Err(GapError::Dead { place, column, value: first, spread: whole, unit });
+        }
+        if self.is_clear(whole) && is_mirrored(pairs) {
+            let [_, mp, pp] = products(pairs);
+            return Err(GapError::Reversed { place, column, ratio: mp / pp });
+        }
+        match self.stop(pairs) {
+            Some((value, count, spread)) => {
+                Err(GapError::Saturated { place, column, value, count, spread, unit })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// An end of its range at which a channel stands while what is expected goes on: the value, how many samples have it, and
+    /// the standard deviation of what is expected in them.
+    fn stop(&self, pairs: &[Pair]) -> Option<(f64, usize, f64)> {
+        let mut sorted = pairs.to_vec();
+        sorted.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let of_end = |sorted: &[Pair]| {
+            let near = |from: f64| move |pair: &&Pair| (pair[0] - from).abs() <= 1e-9 * from.abs();
+            let first = sorted[0][0];
+            let count = sorted.iter().take_while(near(first)).count();
+            let rest = &sorted[count..];
+            let next = rest.first().map_or(0, |[next, _]| rest.iter().take_while(near(*next)).count());
+            let spread = spread(&sorted[..count]);
+            // at rest, and in the air, a computed load is exactly nothing
+            let stands = first != 0.0 && count >= ENOUGH && count >= STOP * next && next > 0;
+            (stands && self.is_clear(spread)).then_some((first, count, spread))
+        };
+        of_end(&sorted).or_else(|| {
+            sorted.reverse();
+            of_end(&sorted)
+        })
+    }
+
+    /// Refuses two channels that stand in for each other, in all trials or in one.
+    fn check_apart(&self, other: &Self) -> Result<(), GapError> {
+        // within what noise makes of channels of which nothing is expected
+        let noise = self.noise.powi(2) + other.noise.powi(2);
+        // how far the two are from what is expected of them, and from what is expected of each other
+        let sums = |(ours, theirs): (&[Pair], &[Pair])| {
+            ours.iter().zip(theirs).fold([0.0; 3], |[apart, swapped, least], ([a, of_a], [b, of_b])| {
+                let square = |x: f64, y: f64| x * x + y * y;
+                [apart + square(a - of_a, b - of_b), swapped + square(a - of_b, b - of_a), least + noise]
+            })
+        };
+        let of_trials: Vec<[f64; 3]> = self
+            .trials
+            .iter()
+            .zip(&other.trials)
+            .map(|((_, ours), (_, theirs))| sums((ours, theirs)))
+            .collect();
+        let all = of_trials.iter().fold([0.0; 3], |sum, of| std::array::from_fn(|i| sum[i] + of[i]));
+        let is_swapped = |[apart, swapped, least]: [f64; 3]| apart > SWAPPED * swapped.max(least);
+        let place = match of_trials.iter().position(|of| is_swapped(*of)) {
+            _ if is_swapped(all) => ALL.to_owned(),
+            Some(trial) => format!("{}.csv", self.trials[trial].0),
+            None => return Ok(()),
+        };
+        Err(GapError::Swapped { place, column: self.column(), other: other.column() })
+    }
+}
+
+/// The noise that three quarters of some trials stay below.
+fn usual(noises: &[f64]) -> f64 {
+    quantile(&mut noises.to_vec(), 0.75)
+}
+
+/// Sums of squares and products: measured, both, expected.
+fn products(pairs: &[Pair]) -> [f64; 3] {
+    pairs.iter().fold([0.0; 3], |[mm, mp, pp], [m, p]| [mm + m * m, mp + m * p, pp + p * p])
+}
+
+/// The same pairs about their means.
+fn centered(pairs: &[Pair]) -> Vec<Pair> {
+    let count = pairs.len().max(1) as f64;
+    let mean = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).sum::<f64>() / count);
+    pairs.iter().map(|[m, p]| [m - mean[0], p - mean[1]]).collect()
+}
+
+/// Standard deviation of what is expected.
+fn spread(pairs: &[Pair]) -> f64 {
+    let [_, _, pp] = products(&centered(pairs));
+    (pp / pairs.len().max(1) as f64).sqrt()
+}
+
+/// True where what was measured is what is expected with the other sign, in its mean and in its changes: a zero that is off may
+/// turn the one about and not the other.
+fn is_mirrored(pairs: &[Pair]) -> bool {
+    let is_opposite = |pairs: &[Pair]| {
+        let [mm, mp, pp] = products(pairs);
+        mp < MIRRORED * (mm * pp).sqrt() && is_about(-mp / pp.max(f64::MIN_POSITIVE))
+    };
+    is_opposite(pairs) && is_opposite(&centered(pairs))
+}
+
+/// True for a factor that is one but for what a prediction may be off by.
+fn is_about(factor: f64) -> bool {
+    (1.0 / OFF..OFF).contains(&factor)
+}

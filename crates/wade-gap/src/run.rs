@@ -1,0 +1,137 @@
+//! The workflow from trials to report.
+
+use super::base_drag::BaseDrag;
+use super::calibrate::calibrate;
+use super::candidates::{Setting, shapes, unavailable};
+use super::compose::compose;
+use super::design::{Design, Rows};
+use super::general::General;
+use super::judge::Judge;
+use super::measurement::{is_computed, is_inferred};
+use super::noise::{floors, row_noise};
+use super::nonlinear::{refine, settle, through_sensors};
+use super::plausible;
+use super::report::Report;
+use super::series::{Series, one_clock, series};
+use super::smoothing::Smoothing;
+use super::split::hold_out;
+use super::statistics::median;
+use super::verdict::{Found, floor_loss};
+use super::{Config, GapError, Predicted};
+use wade_core::condition::Condition;
+use wade_core::effects::{Block, Body, Effect, Shape};
+use wade_learn::trials::Trials;
+
+/// The body that `trials.toml` describes, for another simulator's prediction; its wheels are as large as they roll.
+pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
+    let vehicle = &trials.manifest.vehicle;
+    let body = trials.manifest.body.ok_or_else(|| GapError::NoBody { vehicle: vehicle.clone() })?;
+    let block = Block {
+        length: body.length,
+        width: body.width,
+        draft: body.draft,
+        mass: body.mass,
+        displaced_volume: body.displaced_volume,
+        center_of_mass: body.center_of_mass,
+        wheel_radius: rolling_radius(trials),
+    };
+    Ok(Body::of_block(vehicle, block))
+}
+
+/// Runs the workflow. `predict` is asked where trials have no `sim_` columns; it answers about the body's center of mass.
+pub fn run(
+    trials: &Trials,
+    body: &Body,
+    predict: &mut dyn FnMut(&Condition) -> Predicted,
+    config: &Config,
+) -> Result<Report, GapError> {
+    config.check()?;
+    // neither the order in which effects are asked for nor that one is asked for twice must matter
+    let mut library = config.library.clone();
+    library.sort();
+    library.dedup();
+    let config = &Config { library, ..config.clone() };
+    if trials.manifest.vehicle != body.name {
+        let (trials, asked) = (trials.manifest.vehicle.clone(), body.name.clone());
+        return Err(GapError::Vehicle { trials, asked });
+    }
+    let (mut all, components) = series(trials, body, predict, config)?;
+    plausible::check(&all, &components, is_inferred(&trials.manifest))?;
+    let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
+    check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
+    let floors = floors(&all, &naming, &trials.manifest, &components);
+    let setting = Setting {
+        body,
+        base_drag: BaseDrag::new(&all, body),
+        in_channel: all.iter().any(|series| series.channel_width.is_some()),
+        mass: trials.manifest.mass.unwrap_or(body.mass),
+        components,
+        inferred: is_inferred(&trials.manifest),
+        computed: is_computed(&trials.manifest),
+        one_clock: one_clock(all.iter().map(|series| series.t.as_slice())),
+        first_stamp: all.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min),
+    };
+    let available = |effect: &Effect| unavailable(*effect, &setting, &trials.manifest, &all).is_none();
+    let library: Vec<Effect> = config.library.iter().copied().filter(available).collect();
+    let forms: Vec<(Effect, Shape)> = library
+        .iter()
+        .flat_map(|&effect| shapes(effect, &all, &setting).into_iter().map(move |shape| (effect, shape)))
+        .collect();
+    let rows = Rows::new(&all, &naming, &setting.components, config.block_s);
+    if rows.blocks / 2 < config.folds {
+        let (blocks, block_s, folds) = (rows.blocks, config.block_s, config.folds);
+        return Err(GapError::TooShort { blocks, block_s, folds });
+    }
+    let smoothing = if setting.computed { Smoothing::default() } else { calibrate(&mut all) };
+    let noise = row_noise(&all, &naming, &setting.components, (&floors, &trials.manifest), smoothing);
+    let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
+    settle(&mut design, &all, &setting);
+    let general = General::new(&all, &design, &setting.components);
+    let gap_structure = general.structure(&design, &setting.components, &design.y);
+    let floor_loss = floor_loss(&design, &gap_structure);
+    let mut members = {
+        let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
+        judge.select(&library)
+    };
+    refine(&mut design, &all, &setting, &members);
+    through_sensors(&mut design, &mut all, &setting, &members);
+    // what stood in for a shape that was not yet right has no place any more
+    let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
+    members = judge.confirmed(&members);
+    let found = Found::of(&judge, &members, &library, &general, &gap_structure);
+    Ok(compose(trials, &judge, found, held, &library))
+}
+
+/// Refuses trials kept back that repeat trials which are not.
+fn check_kept_back(
+    all: &[Series],
+    naming: &[usize],
+    held: &[usize],
+    repeats: &[Vec<String>],
+) -> Result<(), GapError> {
+    for group in repeats {
+        let of_group = |trials: &[usize]| {
+            trials.iter().map(|&trial| all[trial].name.clone()).find(|name| group.contains(name))
+        };
+        if let (Some(trial), Some(other)) = (of_group(held), of_group(naming)) {
+            return Err(GapError::RepeatKeptBack { trial, other });
+        }
+    }
+    Ok(())
+}
+
+/// Radius at which the wheels roll [m]: the median of speed over turning, where wheels turn the way the vehicle goes. Most
+/// driving is rolling; `None` where too little of it was recorded.
+fn rolling_radius(trials: &Trials) -> Option<f64> {
+    const SLOWEST: f64 = 0.3;
+    const LEAST: usize = 50;
+    let mut radii = Vec::new();
+    for trial in &trials.trials {
+        let wheels: Vec<&Vec<f64>> = trial.wheel_speeds.iter().flatten().collect();
+        let turning =
+            |i: usize| wheels.iter().map(|wheel| wheel[i]).sum::<f64>() / f64::max(wheels.len() as f64, 1.0);
+        let rolling = (0..trial.len()).map(|i| (trial.velocity[i].x, turning(i)));
+        radii.extend(rolling.filter(|(v, omega)| v.abs() > SLOWEST && v * omega > 0.0).map(|(v, w)| v / w));
+    }
+    (radii.len() >= LEAST).then(|| median(&mut radii))
+}

@@ -1,0 +1,184 @@
+//! What the search found, and the verdict on it.
+
+use nalgebra::DVector;
+
+use super::design::Design;
+use super::detect::sizes;
+use super::features::{energy, without_zeros};
+use super::gated::{Gated, WORTH, gated};
+use super::general::{General, Structure};
+use super::judge::{Judge, Member};
+use super::lasting::lasting;
+use super::nonlinear::is_too_short;
+use super::report::Verdict;
+use wade_core::effects::{Effect, Kind};
+
+/// Deviates that structure without a name needs.
+pub(super) const STRUCTURE: f64 = 5.0;
+/// Deviates that energy without a phase needs; with a score a trial it cannot exceed the root of their number, so that
+/// few trials need this share of the root.
+const ENERGY: [f64; 2] = [4.5, 0.8];
+
+/// Deviates in one trial that what lasts needs: one of a hundred trials with noise alone reaches 3.5, and products of
+/// normal numbers have heavier tails than they.
+const LASTS: f64 = 7.0;
+/// What lasts beyond the zero of its trial and is clearly larger than the noise itself needs no more than what one of a hundred
+/// trials reaches by chance: noise that hangs together is no larger than all of the noise. Deviates, and root mean square
+/// in noises of a bin.
+const LOUD: [f64; 2] = [3.5, 1.2];
+/// Noises of a bin beyond which what lasts in all trials together is no noise that hangs together: one that has forgotten itself
+/// after half a second reaches 2.
+const HUGE: f64 = 4.0;
+
+/// Least share of the structure that must be explained where a fault of the sensor is named. Laws of the water hold in
+/// outline; a zero, a gain or a turned axis is exact, and where one leaves more it stands in for another thing.
+const EXACT: f64 = 0.9;
+
+/// Share of the gap above the floor that an effect may leave to a region of its own and still be named for everywhere.
+const LIMITED: f64 = 0.1;
+
+/// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
+const MUCH: f64 = 0.15;
+
+/// What the search found.
+pub(super) struct Found {
+    pub verdict: Verdict,
+    pub members: Vec<Member>,
+    pub alternatives: Vec<Vec<Member>>,
+    pub residual: DVector<f64>,
+    /// One effect that explains more within a region than the members do everywhere.
+    pub gated: Option<Gated>,
+    /// What is left without a name: after the members where they fit, else of the gap as it is.
+    pub left: Structure,
+    /// What the gap has without a name before anything is taken out.
+    pub of_gap: Structure,
+    pub loss: f64,
+    /// Why members that pass every gate are not named.
+    pub unfit: Option<Unfit>,
+}
+
+/// Why effects that pass every gate are not named.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Unfit {
+    /// They explain this share of what is missing, where that much is asked for.
+    Explains(f64, f64),
+    /// One of them goes faster than the samples tell.
+    Unresolved,
+    /// One effect in a region explains more.
+    Imitates,
+    /// Much of what lasts is still there.
+    Leaves,
+}
+
+impl Found {
+    pub fn of(
+        judge: &Judge,
+        members: &[Member],
+        library: &[Effect],
+        general: &General,
+        gap_structure: &Structure,
+    ) -> Self {
+        let (design, config) = (judge.design, judge.config);
+        let columns = judge.columns(members);
+        let (beta, loss) =
+            design.solve(&columns).unwrap_or_else(|| (DVector::zeros(columns.len()), design.empty_loss()));
+        let residual = design.residual(&columns, &beta);
+        let coverage = (design.empty_loss() - loss) / judge.missing();
+        let faults = members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
+        let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
+        let unresolved = members.iter().any(|member| {
+            let candidate = &design.candidates[member.candidate];
+            is_too_short(candidate.effect, &candidate.shape, judge.setting)
+        });
+        let missing = !members.is_empty() || is_structured(judge, gap_structure);
+        // what one effect explains in a region, a sum of others can imitate everywhere; never the other way round, since a limit
+        // takes from an effect
+        let gated = missing.then(|| gated(judge, library)).flatten();
+        let gated = gated.filter(|gated| gated.share > coverage + WORTH);
+        let imitated = gated.is_some_and(|gated| {
+            let same = matches!(members, [one] if judge.effect(one) == gated.effect);
+            !same || gated.share > coverage + LIMITED
+        });
+        let unfit = match members.is_empty() {
+            true => None,
+            _ if coverage < needed => Some(Unfit::Explains(coverage, needed)),
+            _ if unresolved => Some(Unfit::Unresolved),
+            _ if imitated => Some(Unfit::Imitates),
+            _ => leaves_much(design, &residual).then_some(Unfit::Leaves),
+        };
+        let fits = !members.is_empty() && unfit.is_none();
+        let left = match fits {
+            true => general.structure(design, &judge.setting.components, &residual),
+            false => gap_structure.clone(),
+        };
+        let alternatives = if fits { judge.alternatives(members, library) } else { Vec::new() };
+        let verdict = match (missing, fits) {
+            (false, _) => Verdict::NothingMissing,
+            (_, false) => Verdict::NoCandidateFits,
+            _ if alternatives.is_empty() => Verdict::Named,
+            _ => Verdict::Ambiguous,
+        };
+        let of_gap = gap_structure.clone();
+        Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, of_gap, loss, unfit }
+    }
+}
+
+/// True where much of what lasts of the gap is still there after the named effects, beyond what the zeros of the trials leave: a
+/// zero of a stated deviation is one square in the rows of a trial, as each of their noises is, and it lasts.
+fn leaves_much(design: &Design, residual: &DVector<f64>) -> bool {
+    let (before, after) = (lasting(design, &design.y), lasting(design, residual));
+    // what the rows keep of a zero of z noises, of n rows: n z^2 / (1 + n z^2)
+    let kept = |(&trial, rows): (&usize, &std::ops::Range<usize>)| -> f64 {
+        let count = (rows.len() / design.rows.width) as f64;
+        let squares = design.noise.offset[trial].iter().zip(design.noise.bin).map(|(zero, bin)| zero / bin);
+        squares.map(|z| count * z * z / (1.0 + count * z * z)).sum()
+    };
+    let of_zeros: f64 = design.trials.iter().zip(&design.rows.of_trial).map(kept).sum();
+    f64::min(before.most.deviate, after.most.deviate) > LASTS
+        && after.energy - of_zeros > MUCH * before.energy
+}
+
+/// Predictable from the state, or lasting in a trial, and large enough to matter.
+fn is_structured(judge: &Judge, structure: &Structure) -> bool {
+    let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
+    let rows = design.y.len().max(1) as f64;
+    // gain per row is in bins' noise; relevance is in samples' noise
+    let relative = setting
+        .components
+        .iter()
+        .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].model) / design.noise.bin[c])
+        .fold(f64::INFINITY, f64::min);
+    let least = config.relevance * relative;
+    let size = (structure.gain / rows).sqrt();
+    // a force that comes and goes with no phase of its own shows in its energy alone
+    let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
+    let (deviate, energy) = energy(all, design, &unsmoothed);
+    let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
+    let kept = lasting(design, &design.y);
+    let moving = lasting(design, &without_zeros(design, &design.y));
+    // a load that was computed has no noise that hangs together and could pass for a gap
+    let naming = design.trials.iter().map(|&trial| &all[trial]);
+    let above =
+        || sizes(naming.clone(), judge.floors, &setting.components, config).values().any(|s| s.above_floor);
+    setting.computed && above()
+        || structure.deviate > STRUCTURE && size > least
+        || deviate > bar && energy > 2.0 * least.max(0.5)
+        || kept.most.deviate > LASTS && kept.most.rms > least
+        || moving.most.deviate > LOUD[0] && moving.most.rms > LOUD[1].max(least)
+        || moving.together.deviate > LOUD[0] && moving.together.rms > HUGE.max(least)
+}
+
+/// Loss that nothing explains: the whole library at once, or the general model, whichever leaves less.
+pub(super) fn floor_loss(design: &Design, structure: &Structure) -> f64 {
+    let mut columns: Vec<usize> = Vec::new();
+    for candidate in &design.candidates {
+        for &(column, _) in &candidate.columns {
+            if design.novelty(column, &columns) > 1e-3 {
+                columns.push(column);
+            }
+        }
+    }
+    // midway between in sample and cross-validated, as the general model has it
+    let library = design.fit(&columns).map_or(f64::INFINITY, |fit| 0.5 * (fit.loss + fit.cv_loss));
+    library.min(structure.loss).min(design.empty_loss()).max(0.0)
+}

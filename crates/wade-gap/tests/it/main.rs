@@ -1,0 +1,7 @@
+//! What the gap workflow promises, a module a promise.
+
+#![allow(clippy::unwrap_used)]
+
+mod planted;
+
+mod gap_recovery;

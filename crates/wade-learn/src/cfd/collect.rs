@@ -1,0 +1,444 @@
+//! Outcomes of cases to what is kept of a campaign: `sections.parquet`, the data set, and `cases.csv`, a row a case.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::plan::{Bed, CAMPAIGN_FILE, Case, Plan, Set};
+use super::run::{RunError, Work};
+use super::solve::{Load, Outcome, method};
+use crate::dataset::{self, Dataset, DatasetError, Image, Meta, Rest, Sample, SurfaceLoad};
+use crate::files::write_whole;
+use wade_core::condition::GroundContact;
+use wade_core::digest::sha256;
+use wade_core::frame::Vec3;
+use wade_core::vehicle::Vehicle;
+
+/// File of the data set in the folder of the campaign.
+pub const SECTIONS_FILE: &str = "sections.parquet";
+/// File of the summaries.
+pub const CASES_FILE: &str = "cases.csv";
+
+/// The method of summaries from before methods had a number.
+fn first_method() -> u32 {
+    1
+}
+
+/// What is kept of a case beside its sections.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaseSummary {
+    /// Its name.
+    pub id: String,
+    /// What it is for.
+    pub set: Set,
+    /// First half of the SHA-256 of its row in the plan, so that a row that was edited since is noticed.
+    pub state: String,
+    /// What the bed does.
+    pub bed: Bed,
+    /// Speed, of an unsteady case at the start [m/s].
+    pub speed_mps: f64,
+    /// Heading [degrees].
+    pub heading_deg: f64,
+    /// Depth [m].
+    pub depth_m: f64,
+    /// Density [kg/m3].
+    pub density_kgpm3: f64,
+    /// Size of the cells relative to the settings.
+    pub cell_scale: f64,
+    /// How it was computed, see [`method`].
+    #[serde(default = "first_method")]
+    pub method: u32,
+    /// Cells of the mesh.
+    pub cells: usize,
+    /// Time steps.
+    pub steps: usize,
+    /// Processor time [s].
+    pub core_s: f64,
+    /// Attempts.
+    pub attempts: u32,
+    /// Courant number of the attempt that held.
+    pub courant: f64,
+    /// End of the last section [s].
+    pub end_s: f64,
+    /// Windows that were computed.
+    pub windows: u32,
+    /// True where the mean had settled.
+    pub settled: bool,
+    /// Mean net force over the last window, body frame [N].
+    pub fx_n: f64,
+    /// See `fx_n`.
+    pub fy_n: f64,
+    /// See `fx_n`.
+    pub fz_n: f64,
+    /// Net force at rest on the mesh of the case, along body z [N].
+    pub rest_fz_n: f64,
+    /// Standard deviation of the sections about their mean [N].
+    pub scatter_fx_n: f64,
+    /// See `scatter_fx_n`.
+    pub scatter_fy_n: f64,
+    /// See `scatter_fx_n`.
+    pub scatter_fz_n: f64,
+    /// Change of the mean from the first to the second half of the window [N].
+    pub drift_fx_n: f64,
+    /// See `drift_fx_n`.
+    pub drift_fy_n: f64,
+    /// See `drift_fx_n`.
+    pub drift_fz_n: f64,
+    /// Mass that went in and did not come out over the water that went in.
+    pub mass_imbalance: f64,
+    /// Size of the channel relative to the settings.
+    #[serde(default = "super::plan::as_set")]
+    pub channel_scale: f64,
+}
+
+impl CaseSummary {
+    /// True where this version would compute the case of this summary another way.
+    pub fn is_outdated(&self, case: &Case) -> bool {
+        self.method < method(case)
+    }
+
+    /// Summary of an outcome.
+    pub fn of(outcome: &Outcome) -> Self {
+        let nets: Vec<Vec3> = outcome.sections.iter().map(|section| net(&section.loads)).collect();
+        let count = nets.len().max(1) as f64;
+        let mean = nets.iter().sum::<Vec3>() / count;
+        let variance = nets.iter().map(|f| (f - mean).component_mul(&(f - mean))).sum::<Vec3>() / count;
+        let scatter = variance.map(f64::sqrt);
+        let case = &outcome.case;
+        Self {
+            id: case.id.clone(),
+            set: case.set,
+            state: state_hash(case),
+            bed: case.bed,
+            speed_mps: case.speed_mps,
+            heading_deg: case.heading_deg,
+            depth_m: case.depth_m,
+            density_kgpm3: case.density_kgpm3,
+            cell_scale: case.cell_scale,
+            method: outcome.method,
+            cells: outcome.cells,
+            steps: outcome.steps,
+            core_s: outcome.core_s,
+            attempts: outcome.attempts,
+            courant: outcome.courant,
+            end_s: outcome.sections.last().map_or(0.0, |section| section.end_s),
+            windows: outcome.windows,
+            settled: outcome.settled,
+            fx_n: mean.x,
+            fy_n: mean.y,
+            fz_n: mean.z,
+            rest_fz_n: net(&outcome.rest).z,
+            scatter_fx_n: scatter.x,
+            scatter_fy_n: scatter.y,
+            scatter_fz_n: scatter.z,
+            drift_fx_n: outcome.drift[0],
+            drift_fy_n: outcome.drift[1],
+            drift_fz_n: outcome.drift[2],
+            mass_imbalance: outcome.mass_imbalance,
+            channel_scale: case.channel_scale,
+        }
+    }
+}
+
+fn net(loads: &[Load]) -> Vec3 {
+    loads.iter().map(|load| Vec3::from(load.force)).sum()
+}
+
+/// First half of the SHA-256 of a case's row in the plan.
+pub fn state_hash(case: &Case) -> String {
+    // a case always has a JSON form; an empty one would match no other
+    let text = serde_json::to_string(case).unwrap_or_default();
+    // what was computed in the channel of the settings keeps the hash that it had before there was another
+    let text = text.replace(",\"channel_scale\":1.0}", "}");
+    sha256(text.as_bytes())[..32].to_owned()
+}
+
+/// Why a campaign could not be collected.
+#[derive(Debug, thiserror::Error)]
+pub enum CollectError {
+    /// A file that cannot be read or written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Summaries that do not parse.
+    #[error("{path}: {message}")]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Where and what.
+        message: String,
+    },
+    /// A row of the plan that was edited after its case was computed.
+    #[error(
+        "{path}: case `{id}` was computed for another state than the plan has now: bring the old row back, or give the new one a name of its own"
+    )]
+    Edited {
+        /// The summaries.
+        path: PathBuf,
+        /// The case.
+        id: String,
+    },
+    /// Cases of two kinds, which are not one data set.
+    #[error(
+        "{path}: was computed {what} {before}, and case `{id}` {what} {now}: begin another campaign for the one or the other, `wade dataset merge` joins their data sets"
+    )]
+    Mixed {
+        /// The data set.
+        path: PathBuf,
+        /// `by` a solver or `with the settings`.
+        what: &'static str,
+        /// Those of the data set.
+        before: String,
+        /// The case that differs.
+        id: String,
+        /// Its own.
+        now: String,
+    },
+    /// A data set and summaries that are not of the same cases: what is added to one would go on without the other.
+    #[error(
+        "{sections} and {cases} do not belong together: {what}: restore what was there, or remove both and collect again from the work folder"
+    )]
+    Apart {
+        /// The data set.
+        sections: PathBuf,
+        /// The summaries.
+        cases: PathBuf,
+        /// What is missing, and where.
+        what: String,
+    },
+    /// Nothing is done yet.
+    #[error("{path}: no case is done yet: `wade campaign run` computes them")]
+    Nothing {
+        /// The folder of the campaign.
+        path: PathBuf,
+    },
+    /// The data set.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The outcomes.
+    #[error(transparent)]
+    Outcomes(#[from] RunError),
+}
+
+/// What has been collected of a campaign.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Collected {
+    /// One summary a case, by its name.
+    pub cases: BTreeMap<String, CaseSummary>,
+}
+
+impl Collected {
+    /// Reads the summaries of a campaign; none where nothing was collected yet.
+    pub fn read(folder: &Path, plan: &Plan) -> Result<Self, CollectError> {
+        let path = folder.join(CASES_FILE);
+        if !path.exists() {
+            return Ok(Self::default());
+        }
+        let syntax =
+            |error: csv::Error| CollectError::Syntax { path: path.clone(), message: error.to_string() };
+        let mut reader = csv::Reader::from_path(&path).map_err(syntax)?;
+        let rows: Vec<CaseSummary> = reader.deserialize().collect::<Result<_, _>>().map_err(syntax)?;
+        let planned: BTreeMap<&str, &Case> = plan.cases.iter().map(|case| (case.id.as_str(), case)).collect();
+        for row in &rows {
+            if planned.get(row.id.as_str()).is_none_or(|case| state_hash(case) != row.state) {
+                return Err(CollectError::Edited { path, id: row.id.clone() });
+            }
+        }
+        Ok(Self { cases: rows.into_iter().map(|row| (row.id.clone(), row)).collect() })
+    }
+
+    /// The same state over a parked bed as a case over a driving one, where both flows have settled.
+    pub fn settled_twin(&self, driving: &CaseSummary) -> Option<&CaseSummary> {
+        let state = |case: &CaseSummary| {
+            let CaseSummary {
+                speed_mps, heading_deg, depth_m, density_kgpm3, cell_scale, channel_scale, ..
+            } = *case;
+            [speed_mps, heading_deg, depth_m, density_kgpm3, cell_scale, channel_scale]
+        };
+        let is_twin = |case: &&CaseSummary| Set::TWINNED.contains(&case.set) && state(case) == state(driving);
+        let parked = self.cases.values().find(is_twin)?;
+        (driving.set == Set::Driving && driving.settled && parked.settled).then_some(parked)
+    }
+
+    fn write(&self, folder: &Path) -> Result<(), CollectError> {
+        let path = folder.join(CASES_FILE);
+        let syntax = |message: String| CollectError::Syntax { path: path.clone(), message };
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        for case in self.cases.values() {
+            writer.serialize(case).map_err(|error| syntax(error.to_string()))?;
+        }
+        let bytes = writer.into_inner().map_err(|error| syntax(error.to_string()))?;
+        write_whole(&path, &bytes).map_err(|source| CollectError::Io { path: path.clone(), source })
+    }
+}
+
+/// Adds the outcomes of `work` to the data set and the summaries in `folder`; gives the number of new cases.
+///
+/// A case that was collected before and was computed again since, by a newer method, is replaced.
+pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Result<usize, CollectError> {
+    // one after the other: each adds to what it has read
+    let path = folder.join(CAMPAIGN_FILE);
+    let campaign = File::open(&path).and_then(|file| file.lock().map(|()| file));
+    let _alone = campaign.map_err(|source| CollectError::Io { path, source })?;
+    let mut collected = Collected::read(folder, plan)?;
+    let mut fresh = Vec::new();
+    for case in &plan.cases {
+        let before = collected.cases.get(&case.id).map_or(0, |summary| summary.method);
+        fresh.extend(work.outcome(&plan.campaign, case)?.filter(|outcome| outcome.method > before));
+    }
+    let so_far = data_so_far(folder, &collected, &fresh)?;
+    if fresh.is_empty() {
+        return if collected.cases.is_empty() {
+            Err(CollectError::Nothing { path: folder.to_owned() })
+        } else {
+            Ok(0)
+        };
+    }
+    let path = folder.join(SECTIONS_FILE);
+    let mut dataset = so_far.unwrap_or_else(|| empty(plan, vehicle, &fresh[0]));
+    check_alike(&path, plan, &dataset, &fresh)?;
+    let replaced: BTreeSet<&str> = fresh.iter().map(|outcome| outcome.case.id.as_str()).collect();
+    dataset.samples.retain(|sample| !replaced.contains(sample.case.as_str()));
+    for outcome in &fresh {
+        collected.cases.insert(outcome.case.id.clone(), CaseSummary::of(outcome));
+        dataset.samples.extend(samples(&plan.campaign.vehicle, outcome));
+    }
+    dataset.samples.sort_by(|a, b| a.case.cmp(&b.case).then(a.section.cmp(&b.section)));
+    // the data set first: a summary without its sections would never be computed again
+    dataset::write_compact(&path, &dataset)?;
+    collected.write(folder)?;
+    Ok(fresh.len())
+}
+
+/// The data set so far, if there is one. Refuses one that does not hold the cases of the summaries.
+fn data_so_far(
+    folder: &Path,
+    collected: &Collected,
+    fresh: &[Outcome],
+) -> Result<Option<Dataset>, CollectError> {
+    let (sections, cases) = (folder.join(SECTIONS_FILE), folder.join(CASES_FILE));
+    let dataset = sections.exists().then(|| dataset::read(&sections));
+    let what = match &dataset {
+        Some(Err(DatasetError { fault, .. })) => Some(format!("{SECTIONS_FILE} cannot be read ({fault})")),
+        Some(Ok(dataset)) => difference(&dataset.samples, collected, fresh, cases.exists()),
+        None => lacking(&BTreeSet::new(), collected, fresh).map(|_| format!("{SECTIONS_FILE} is missing")),
+    };
+    match what {
+        Some(what) => Err(CollectError::Apart { sections, cases, what }),
+        None => Ok(dataset.transpose()?),
+    }
+}
+
+/// What a data set and the summaries do not have in common.
+fn difference(
+    samples: &[Sample],
+    collected: &Collected,
+    fresh: &[Outcome],
+    has_summaries: bool,
+) -> Option<String> {
+    let there: BTreeSet<&str> = samples.iter().map(|sample| sample.case.as_str()).collect();
+    if let Some(id) = lacking(&there, collected, fresh) {
+        return Some(format!("{SECTIONS_FILE} has no section of case `{id}`"));
+    }
+    let is_known = |id: &str| collected.cases.contains_key(id) || is_fresh(fresh, id);
+    let unknown = there.into_iter().find(|&id| !is_known(id))?;
+    Some(match has_summaries {
+        true => format!("{CASES_FILE} has no row for case `{unknown}`"),
+        false => format!("{CASES_FILE} is missing"),
+    })
+}
+
+/// A case that the summaries hold and the data set does not.
+fn lacking<'a>(there: &BTreeSet<&str>, collected: &'a Collected, fresh: &[Outcome]) -> Option<&'a str> {
+    let mut ids = collected.cases.keys().map(String::as_str);
+    ids.find(|&id| !there.contains(id) && !is_fresh(fresh, id))
+}
+
+/// True for a case that is about to be added: a collection that was cut off between the two files may have left the
+/// sections of such a one alone.
+fn is_fresh(fresh: &[Outcome], id: &str) -> bool {
+    fresh.iter().any(|outcome| outcome.case.id == id)
+}
+
+/// Refuses outcomes of another solver than the data set's, and settings that were changed since it was begun.
+fn check_alike(path: &Path, plan: &Plan, dataset: &Dataset, fresh: &[Outcome]) -> Result<(), CollectError> {
+    let mixed = |what: &'static str, before: &str, id: &str, now: &str| CollectError::Mixed {
+        path: path.to_owned(),
+        what,
+        before: before.to_owned(),
+        id: id.to_owned(),
+        now: now.to_owned(),
+    };
+    if let Some(other) = fresh.iter().find(|outcome| outcome.solver != dataset.meta.provenance) {
+        let (before, id) = (&dataset.meta.provenance, &other.case.id);
+        return Err(mixed("by", before, id, &other.solver));
+    }
+    let settings = settings_note(plan);
+    match dataset.meta.notes.get("settings") {
+        Some(before) if *before != settings => {
+            Err(mixed("with the settings", before, &fresh[0].case.id, &settings))
+        }
+        // one that was begun before they were noted keeps its notes: what learnt from it names it by its hash
+        _ => Ok(()),
+    }
+}
+
+fn settings_note(plan: &Plan) -> String {
+    // settings always have a JSON form
+    serde_json::to_string(&plan.campaign.settings).unwrap_or_default()
+}
+
+fn empty(plan: &Plan, vehicle: &Vehicle, first: &Outcome) -> Dataset {
+    let names = vehicle.surfaces.iter().map(|surface| surface.name.clone()).collect();
+    let notes = [
+        ("hull_sha256", plan.campaign.hull_sha256.clone()),
+        ("settings", settings_note(plan)),
+        (
+            "loads",
+            "pressure and viscous; moments about the body origin; `rest` on the mesh of the case".to_owned(),
+        ),
+    ];
+    let meta = Meta {
+        provenance: first.solver.clone(),
+        ground_contact: GroundContact::Dry,
+        vehicles: BTreeMap::from([(plan.campaign.vehicle.clone(), names)]),
+        notes: notes.map(|(key, value)| (key.to_owned(), value)).into(),
+    };
+    Dataset { meta, samples: Vec::new() }
+}
+
+fn samples(vehicle: &str, outcome: &Outcome) -> Vec<Sample> {
+    let sample = |(index, section): (usize, &super::solve::Section)| Sample {
+        vehicle: vehicle.to_owned(),
+        case: outcome.case.id.clone(),
+        set: outcome.case.set.to_string(),
+        image: Image::Original,
+        section: index as u32,
+        start_s: section.start_s,
+        end_s: section.end_s,
+        condition: outcome.case.condition(section.speed_mps, section.acceleration_mps2),
+        surfaces: section
+            .loads
+            .iter()
+            .zip(&outcome.rest)
+            .map(|(load, rest)| surface_load(load, rest))
+            .collect(),
+    };
+    outcome.sections.iter().enumerate().map(sample).collect()
+}
+
+fn surface_load(load: &Load, rest: &Load) -> SurfaceLoad {
+    SurfaceLoad {
+        force: load.force.into(),
+        moment: Some(load.moment.into()),
+        viscous: Some(load.viscous.into()),
+        rest: Some(Rest { force: rest.force.into(), moment: rest.moment.into() }),
+    }
+}

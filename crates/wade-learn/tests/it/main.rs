@@ -1,0 +1,14 @@
+//! What learning and judging promise, a module a promise.
+
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../../tests/common/bundles.rs"]
+mod common;
+
+mod anchored;
+mod dataset;
+mod evaluate;
+mod gradient;
+mod training;
+mod trials;
+mod validate;

@@ -1,0 +1,429 @@
+//! The generated types to and from ours, by hand.
+
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use wade_core::domain::{Domain, Outside, Quantity};
+use wade_core::effects::{self, BoxQuantity, EffectLoads, EffectsFile, OutsideBox};
+use wade_core::forces::Forces;
+use wade_core::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
+use wade_core::served::ServedVehicle;
+use wade_core::vehicle::{Surface, SurfaceKind};
+
+use super::evaluator::Evaluated;
+use super::proto::{self, state::Attitude};
+use super::refusal::Refusal;
+use super::state::{Field, InvalidState, Problem, State, UNIT_TOLERANCE, scalar};
+
+/// The state of a single request.
+pub fn state(message: &proto::State) -> Result<State, InvalidState> {
+    let default = State::default();
+    let vector = |v: &Option<proto::Vector3>| v.as_ref().map_or([0.0; 3], |v| [v.x, v.y, v.z]);
+    Ok(State {
+        velocity: vector(&message.velocity_mps),
+        current: vector(&message.current_mps),
+        angular_velocity: vector(&message.angular_velocity_radps),
+        acceleration: vector(&message.acceleration_mps2),
+        angular_acceleration: vector(&message.angular_acceleration_radps2),
+        gravity: message.attitude.as_ref().map_or(Ok(default.gravity), gravity)?,
+        depth: message.depth_m,
+        density: message.density_kgpm3.unwrap_or(default.density),
+        dry_contact: is_dry(message.ground_contact)?,
+        heading: message.heading_rad.map_or_else(|| heading(message.attitude.as_ref()), |h| Ok(Some(h)))?,
+        depth_rate: message.depth_rate_mps,
+        wheel_speeds: match message.wheel_speed_radps.as_slice() {
+            [] => None,
+            &[fl, fr, rl, rr] => Some([fl, fr, rl, rr]),
+            _ => return Err(InvalidState { field: Field::WheelSpeed, problem: Problem::Count }),
+        },
+        time_step: message.time_step_s,
+        implicit_added_mass: message.implicit_added_mass,
+    })
+}
+
+/// The heading of a quaternion; the other attitudes know none.
+fn heading(attitude: Option<&Attitude>) -> Result<Option<f32>, InvalidState> {
+    let Some(Attitude::WorldFromBody(q)) = attitude else { return Ok(None) };
+    let (_, _, yaw) = quaternion(q)?.euler_angles();
+    Ok(Some(yaw as f32))
+}
+
+fn quaternion(q: &proto::Quaternion) -> Result<UnitQuaternion<f64>, InvalidState> {
+    let [w, x, y, z] = [q.w, q.x, q.y, q.z].map(|part| scalar(Field::Quaternion, part));
+    let q = Quaternion::new(w?, x?, y?, z?);
+    if (q.norm() - 1.0).abs() > UNIT_TOLERANCE {
+        return Err(InvalidState { field: Field::Quaternion, problem: Problem::NotUnit });
+    }
+    Ok(UnitQuaternion::from_quaternion(q))
+}
+
+fn is_dry(ground_contact: i32) -> Result<bool, InvalidState> {
+    let known = proto::GroundContact::try_from(ground_contact);
+    known
+        .map(|contact| contact == proto::GroundContact::Dry)
+        .map_err(|_| InvalidState { field: Field::GroundContact, problem: Problem::Unknown })
+}
+
+fn gravity(attitude: &Attitude) -> Result<[f32; 3], InvalidState> {
+    let up = match attitude {
+        Attitude::GravityDirection(g) => return Ok([g.x, g.y, g.z]),
+        Attitude::WorldFromBody(q) => up_from_quaternion(&quaternion(q)?),
+        Attitude::RollPitch(attitude) => {
+            let [roll, pitch] =
+                [attitude.roll_rad, attitude.pitch_rad].map(|angle| scalar(Field::RollPitch, angle));
+            up_from_roll_pitch(roll?, pitch?)
+        }
+    };
+    Ok(single(&-up.into_inner()))
+}
+
+/// The states of a batch; every array is checked against the length of `depth_m`.
+pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<State>, Refusal> {
+    let len = message.depth_m.len();
+    if len == 0 {
+        return Err(Refusal::EmptyBatch);
+    }
+    if len > max {
+        return Err(Refusal::BatchTooLong { len, limit: max });
+    }
+    let default = State::default();
+    let velocity = rows(Field::Velocity, &message.velocity_mps, len, default.velocity)?;
+    let current = rows(Field::Current, &message.current_mps, len, default.current)?;
+    let (rates, accelerations) = (&message.angular_velocity_radps, &message.angular_acceleration_radps2);
+    let angular_velocity = rows(Field::AngularVelocity, rates, len, default.angular_velocity)?;
+    let acceleration = rows(Field::Acceleration, &message.acceleration_mps2, len, default.acceleration)?;
+    let angular_acceleration =
+        rows(Field::AngularAcceleration, accelerations, len, default.angular_acceleration)?;
+    let gravity = rows(Field::Gravity, &message.gravity_direction, len, default.gravity)?;
+    let density = rows(Field::Density, &message.density_kgpm3, len, [default.density])?;
+    let dry_contact = is_dry(message.ground_contact)?;
+    let heading = optional_rows::<1>(Field::Heading, &message.heading_rad, len)?;
+    let depth_rate = optional_rows::<1>(Field::DepthRate, &message.depth_rate_mps, len)?;
+    let wheel_speeds = optional_rows::<4>(Field::WheelSpeed, &message.wheel_speed_radps, len)?;
+    let state = |i: usize| State {
+        velocity: velocity(i),
+        current: current(i),
+        angular_velocity: angular_velocity(i),
+        acceleration: acceleration(i),
+        angular_acceleration: angular_acceleration(i),
+        gravity: gravity(i),
+        depth: message.depth_m[i],
+        density: density(i)[0],
+        dry_contact,
+        heading: heading(i).map(|[heading]| heading),
+        depth_rate: depth_rate(i).map(|[rate]| rate),
+        wheel_speeds: wheel_speeds(i),
+        // the states of a batch do not follow each other
+        time_step: 0.0,
+        implicit_added_mass: message.implicit_added_mass,
+    };
+    Ok((0..len).map(state).collect())
+}
+
+/// Row `i` of an array, or the default where the array is empty.
+fn rows<const WIDTH: usize>(
+    field: Field,
+    values: &[f32],
+    len: usize,
+    default: [f32; WIDTH],
+) -> Result<impl Fn(usize) -> [f32; WIDTH], Refusal> {
+    let row = optional_rows(field, values, len)?;
+    Ok(move |i| row(i).unwrap_or(default))
+}
+
+/// Row `i` of an array, or none where the array is empty.
+fn optional_rows<const WIDTH: usize>(
+    field: Field,
+    values: &[f32],
+    len: usize,
+) -> Result<impl Fn(usize) -> Option<[f32; WIDTH]>, Refusal> {
+    let (rows, rest) = values.as_chunks::<WIDTH>();
+    if !values.is_empty() && (rows.len() != len || !rest.is_empty()) {
+        return Err(Refusal::UnequalLength {
+            name: field.name(),
+            len: values.len(),
+            expected: len * WIDTH,
+            width: WIDTH,
+        });
+    }
+    Ok(move |i| rows.get(i).copied())
+}
+
+/// A vector in the wire's precision.
+pub fn single(vector: &Vec3) -> [f32; 3] {
+    [vector.x as f32, vector.y as f32, vector.z as f32]
+}
+
+fn vector3(vector: &Vec3) -> proto::Vector3 {
+    let [x, y, z] = single(vector);
+    proto::Vector3 { x, y, z }
+}
+
+/// The answer to a single request.
+pub fn response(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> proto::EvaluateResponse {
+    let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
+    let mut response = proto::EvaluateResponse {
+        wrench: Some(proto::Wrench {
+            force_n: Some(vector3(&forces.wrench.force)),
+            moment_nm: Some(vector3(&forces.wrench.moment)),
+            about_m: Some(vector3(&model.vehicle().center_of_mass)),
+        }),
+        uncertainty_n: Some(vector3(&forces.uncertainty)),
+        in_domain: forces.outside.is_inside(),
+        outside: outside(&forces.outside, 0).collect(),
+        bundle_version: model.version(),
+        provenance: model.provenance().to_owned(),
+        compute_ns: *compute_ns,
+        effects: effects.loads.iter().map(effect_load).collect(),
+        effect_surface_force_n: effects.surface_forces.iter().flat_map(single).collect(),
+        effects_outside: outside_box(&effects.outside, 0).collect(),
+        added_mass: added_mass(effects).into_iter().flatten().collect(),
+        ..Default::default()
+    };
+    reserve_surfaces(&mut response, model.vehicle().surfaces.len());
+    let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
+    push_surfaces(forces, force, point, &mut response.wetted_fraction);
+    response
+}
+
+fn effect_load(load: &effects::EffectLoad) -> proto::EffectLoad {
+    proto::EffectLoad {
+        effect: load.effect.code() as i32,
+        force_n: Some(vector3(&load.wrench.force)),
+        moment_nm: Some(vector3(&load.wrench.moment)),
+        left_out: left_out(load),
+    }
+}
+
+fn left_out(load: &effects::EffectLoad) -> i32 {
+    load.left_out.map_or(0, |reason| reason as i32)
+}
+
+/// The added mass by rows, in the wire's precision.
+pub fn added_mass(effects: &EffectLoads) -> Option<[f32; 36]> {
+    effects.added_mass.map(|matrix| std::array::from_fn(|i| matrix[(i / 6, i % 6)] as f32))
+}
+
+fn outside_box(outside: &OutsideBox, index: u32) -> impl Iterator<Item = proto::EffectOutside> + '_ {
+    let entries = BoxQuantity::ALL.into_iter().zip(outside).filter(|(_, excess)| **excess != 0.0);
+    entries.map(move |(quantity, excess)| proto::EffectOutside {
+        quantity: quantity as i32,
+        excess: *excess as f32,
+        index,
+    })
+}
+
+fn reserve_surfaces(response: &mut proto::EvaluateResponse, surfaces: usize) {
+    response.surface_force_n.reserve_exact(3 * surfaces);
+    response.surface_point_m.reserve_exact(3 * surfaces);
+    response.wetted_fraction.reserve_exact(surfaces);
+}
+
+fn push_surfaces(forces: &Forces, force: &mut Vec<f32>, point: &mut Vec<f32>, wetted: &mut Vec<f32>) {
+    for load in &forces.surfaces {
+        force.extend(single(&load.force));
+        point.extend(single(&load.point));
+        wetted.push(load.wetted_fraction as f32);
+    }
+}
+
+/// An empty answer to a batch with room for its states.
+pub fn batch_response(
+    vehicle: &ServedVehicle,
+    len: usize,
+    with_surfaces: bool,
+) -> proto::EvaluateBatchResponse {
+    let model = vehicle.model();
+    let rows = if with_surfaces { len * model.vehicle().surfaces.len() } else { 0 };
+    let effects = vehicle.effects().map_or(&[][..], |file| &file.effects);
+    let codes: Vec<i32> = effects.iter().map(|effect| effect.name.code() as i32).collect();
+    proto::EvaluateBatchResponse {
+        surface_force_n: Vec::with_capacity(3 * rows),
+        surface_point_m: Vec::with_capacity(3 * rows),
+        wetted_fraction: Vec::with_capacity(rows),
+        force_n: Vec::with_capacity(3 * len),
+        moment_nm: Vec::with_capacity(3 * len),
+        about_m: Some(vector3(&model.vehicle().center_of_mass)),
+        uncertainty_n: Vec::with_capacity(3 * len),
+        bundle_version: model.version(),
+        provenance: model.provenance().to_owned(),
+        effect_force_n: Vec::with_capacity(3 * len * codes.len()),
+        effect_moment_nm: Vec::with_capacity(3 * len * codes.len()),
+        effect_left_out: Vec::with_capacity(len * codes.len()),
+        effects: codes,
+        ..Default::default()
+    }
+}
+
+/// Adds the forces of state `index` to the answer to a batch.
+pub fn push(
+    response: &mut proto::EvaluateBatchResponse,
+    evaluated: &Evaluated<'_>,
+    index: u32,
+    with_surfaces: bool,
+) {
+    let Evaluated { forces, effects, compute_ns } = evaluated;
+    response.compute_ns += compute_ns;
+    response.force_n.extend(single(&forces.wrench.force));
+    response.moment_nm.extend(single(&forces.wrench.moment));
+    response.uncertainty_n.extend(single(&forces.uncertainty));
+    response.outside.extend(outside(&forces.outside, index));
+    for load in &effects.loads {
+        response.effect_force_n.extend(single(&load.wrench.force));
+        response.effect_moment_nm.extend(single(&load.wrench.moment));
+        response.effect_left_out.push(left_out(load));
+    }
+    response.effects_outside.extend(outside_box(&effects.outside, index));
+    response.added_mass.extend(added_mass(effects).into_iter().flatten());
+    if with_surfaces {
+        let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
+        push_surfaces(forces, force, point, &mut response.wetted_fraction);
+        response.effect_surface_force_n.extend(effects.surface_forces.iter().flat_map(single));
+    }
+}
+
+fn outside(outside: &Outside, index: u32) -> impl Iterator<Item = proto::Outside> + '_ {
+    outside.iter().map(move |(quantity, excess)| proto::Outside {
+        quantity: quantity as i32,
+        excess: excess as f32,
+        index,
+    })
+}
+
+/// What a list says of a vehicle.
+pub fn summary(vehicle: &ServedVehicle) -> proto::VehicleSummary {
+    let model = vehicle.model();
+    proto::VehicleSummary {
+        name: model.vehicle().name.clone(),
+        bundle_version: model.version(),
+        surface_count: model.vehicle().surfaces.len() as u32,
+        provenance: model.provenance().to_owned(),
+        origin: vehicle.origin().to_owned(),
+    }
+}
+
+/// Everything about a vehicle.
+pub fn vehicle(served: &ServedVehicle, include_mesh: bool) -> proto::GetVehicleResponse {
+    let (model, vehicle) = (served.model(), served.model().vehicle());
+    let mut response = proto::GetVehicleResponse {
+        summary: Some(summary(served)),
+        length_m: vehicle.dimensions.length,
+        width_m: vehicle.dimensions.width,
+        height_m: vehicle.dimensions.height,
+        z0_m: vehicle.z0,
+        mass_kg: vehicle.mass,
+        center_of_mass_m: Some(vector3(&vehicle.center_of_mass)),
+        inertia_kgm2: vehicle.inertia.transpose().iter().copied().collect(),
+        surfaces: vehicle.surfaces.iter().map(surface).collect(),
+        domain: ranges(model.domain()),
+        effects: served.effects().map_or_else(Vec::new, active_effects),
+        effects_validity: served.effects().map_or_else(Vec::new, box_ranges),
+        ..Default::default()
+    };
+    if include_mesh {
+        response.mesh_stl = wade_core::geometry::mesh::write_stl(&vehicle.hull.mesh);
+        response.face_surface = vehicle.hull.face_surface.iter().map(|&s| s.into()).collect();
+    }
+    response
+}
+
+fn active_effects(file: &EffectsFile) -> Vec<proto::ActiveEffect> {
+    let parameter = |(name, parameter): (&String, &effects::ParameterValue)| proto::EffectParameter {
+        name: name.clone(),
+        value: parameter.value,
+        std: parameter.std,
+        unit: parameter.unit.clone(),
+    };
+    let active = |effect: &effects::ActiveEffect| proto::ActiveEffect {
+        effect: effect.name.code() as i32,
+        name: effect.name.name().into(),
+        equation: effect.equation.clone(),
+        parameters: effect.parameters.iter().map(parameter).collect(),
+        provisional: effect.provisional,
+    };
+    file.effects.iter().map(active).collect()
+}
+
+fn box_ranges(file: &EffectsFile) -> Vec<proto::BoxRange> {
+    let range = |quantity: BoxQuantity| {
+        let [minimum, maximum] = file.validity.range(quantity);
+        proto::BoxRange { quantity: quantity as i32, minimum, maximum }
+    };
+    BoxQuantity::ALL.into_iter().map(range).collect()
+}
+
+fn surface(surface: &Surface) -> proto::Surface {
+    let kind = match surface.kind {
+        SurfaceKind::Bottom => "bottom",
+        SurfaceKind::Front => "front",
+        SurfaceKind::Rear => "rear",
+        SurfaceKind::Side => "side",
+        SurfaceKind::Wheel => "wheel",
+    };
+    proto::Surface {
+        name: surface.name.clone(),
+        kind: kind.into(),
+        centroid_m: Some(vector3(&surface.centroid)),
+        normal: Some(vector3(&surface.normal)),
+        area_m2: surface.area,
+    }
+}
+
+fn ranges(domain: &Domain) -> Vec<proto::Range> {
+    let range = |quantity: Quantity| {
+        let range = domain.range(quantity)?;
+        Some(proto::Range { quantity: quantity as i32, minimum: range.min, maximum: range.max })
+    };
+    Quantity::ALL.into_iter().filter_map(range).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wade_core::effects::{Effect, Kind, LeftOut};
+
+    #[test]
+    fn the_numbers_of_the_wire_are_those_of_the_library() {
+        for effect in Effect::ALL {
+            let name = proto::Effect::try_from(effect.code() as i32)
+                .map(|effect| effect.as_str_name().to_lowercase());
+            let expected = (effect.kind() == Kind::Physics).then(|| format!("effect_{}", effect.name()));
+            assert_eq!(name.ok(), expected);
+        }
+        for reason in LeftOut::ALL {
+            let name =
+                proto::LeftOut::try_from(reason as i32).map(|reason| reason.as_str_name().to_lowercase());
+            assert_eq!(name.ok(), Some(format!("left_out_{}", reason.name())));
+        }
+        for quantity in BoxQuantity::ALL {
+            let name =
+                proto::BoxQuantity::try_from(quantity as i32).expect("known").as_str_name().to_lowercase();
+            let name = name.trim_start_matches("box_quantity_").to_owned();
+            assert!(quantity.name().starts_with(&name), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_quaternion_has_a_heading_and_a_tilt_has_none() {
+        let q = UnitQuaternion::from_euler_angles(0.1, -0.2, 2.0).into_inner();
+        let [w, x, y, z] = [q.w, q.i, q.j, q.k].map(|part| part as f32);
+        let of = |attitude| {
+            let message = proto::State { depth_m: 0.1, attitude: Some(attitude), ..Default::default() };
+            state(&message).expect("valid").heading
+        };
+        let heading = of(Attitude::WorldFromBody(proto::Quaternion { w, x, y, z })).expect("known");
+        assert!((heading - 2.0).abs() < 1e-6);
+        assert_eq!(of(Attitude::RollPitch(proto::RollPitch { roll_rad: 0.1, pitch_rad: 0.0 })), None);
+    }
+
+    #[test]
+    fn an_array_of_another_length_is_named() {
+        let message = proto::EvaluateBatchRequest {
+            depth_m: vec![0.1, 0.2],
+            velocity_mps: vec![0.0; 5],
+            ..Default::default()
+        };
+        let refusal = batch(&message, 10).expect_err("five values for two states");
+        let expected = Refusal::UnequalLength { name: "velocity_mps", len: 5, expected: 6, width: 3 };
+        assert_eq!(refusal, expected);
+    }
+}

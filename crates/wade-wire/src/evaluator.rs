@@ -1,0 +1,49 @@
+//! What every transport does between its checks and its answer.
+
+use std::time::Instant;
+
+use super::state::{InvalidState, State};
+use wade_core::effects::{EffectLoads, Session};
+use wade_core::forces::Forces;
+use wade_core::model::Workspace;
+use wade_core::served::{Loads, ServedVehicle};
+
+/// What every transport does between its checks and its answer. Owned by one thread.
+#[derive(Debug, Default)]
+pub struct Evaluator {
+    workspace: Workspace,
+    loads: Loads,
+}
+
+/// An answer that lives in its [`Evaluator`].
+#[derive(Debug)]
+pub struct Evaluated<'e> {
+    /// The forces on the surfaces, and the net wrench.
+    pub forces: &'e Forces,
+    /// The share of the effects.
+    pub effects: &'e EffectLoads,
+    /// Time from the checked state to the forces [ns].
+    pub compute_ns: u64,
+}
+
+impl Evaluator {
+    /// Checks a state and answers it. Effects that remember live in the session; without one they are left out.
+    pub fn evaluate(
+        &mut self,
+        vehicle: &ServedVehicle,
+        state: &State,
+        session: Option<&mut Session>,
+    ) -> Result<Evaluated<'_>, InvalidState> {
+        let condition = state.check()?;
+        let circumstances = state.circumstances()?;
+        let start = Instant::now();
+        vehicle.evaluate(&condition, &circumstances, session, &mut self.workspace, &mut self.loads);
+        let Loads { forces, effects, .. } = &self.loads;
+        Ok(Evaluated { forces, effects, compute_ns: nanoseconds_since(start) })
+    }
+}
+
+/// Nanoseconds since an instant.
+pub fn nanoseconds_since(start: Instant) -> u64 {
+    u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX)
+}

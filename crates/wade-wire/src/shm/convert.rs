@@ -1,0 +1,264 @@
+//! Between the pages of shared memory and what is behind them: a query to a checked kind of state, an evaluation to an answer.
+
+use super::layout::{
+    Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE, HAS_DAMPING,
+    HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, IMPLICIT_ADDED_MASS,
+    MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, Query, Status, SurfaceAnswer,
+};
+use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, single};
+use wade_core::domain::{Outside, Quantity};
+use wade_core::effects::{BoxQuantity, OutsideBox};
+use wade_core::served::ServedVehicle;
+use wade_core::vehicle::MAX_SURFACES;
+
+/// Flags of a query that are known.
+const QUERY_FLAGS: u64 = DRY_CONTACT
+    | IMPLICIT_ADDED_MASS
+    | HAS_HEADING
+    | HAS_DEPTH_RATE
+    | HAS_WHEEL_SPEEDS
+    | HAS_WATER_LEVEL
+    | HAS_BED_CLEARANCE
+    | HAS_BED
+    | HAS_WHEEL_LEVELS;
+
+/// Wheels that effects know of.
+const WHEELS: usize = 4;
+
+impl Query {
+    /// The state, or what it sets that cannot be used. Its values are not checked yet.
+    pub fn state(&self) -> Result<State, InvalidState> {
+        if self.flags & !QUERY_FLAGS != 0 {
+            return Err(InvalidState { field: Field::Flags, problem: Problem::Unsupported });
+        }
+        let unsupported = [
+            (HAS_WATER_LEVEL, Field::WaterLevel, std::slice::from_ref(&self.water_level_m)),
+            (HAS_BED_CLEARANCE, Field::BedClearance, std::slice::from_ref(&self.bed_clearance_m)),
+            (HAS_BED, Field::Bed, std::slice::from_ref(&self.bed)),
+            (HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m[..]),
+        ];
+        for (flag, field, values) in unsupported {
+            if self.has(flag, field, values)? {
+                return Err(InvalidState { field, problem: Problem::Unsupported });
+            }
+        }
+        let heading = self.has(HAS_HEADING, Field::Heading, &[self.heading_rad])?;
+        let depth_rate = self.has(HAS_DEPTH_RATE, Field::DepthRate, &[self.depth_rate_mps])?;
+        let wheel_speeds = self.has(HAS_WHEEL_SPEEDS, Field::WheelSpeed, &self.wheel_speed_radps)?;
+        let [a, b, c, d, beyond @ ..] = self.wheel_speed_radps;
+        if beyond.iter().any(|speed| !speed.is_nan()) {
+            return Err(InvalidState { field: Field::WheelSpeed, problem: Problem::Count });
+        }
+        Ok(State {
+            velocity: self.velocity_mps,
+            current: self.current_mps,
+            angular_velocity: self.angular_velocity_radps,
+            acceleration: self.acceleration_mps2,
+            angular_acceleration: self.angular_acceleration_radps2,
+            gravity: self.gravity_direction,
+            depth: self.depth_m,
+            density: self.density_kgpm3,
+            dry_contact: self.flags & DRY_CONTACT != 0,
+            heading: heading.then_some(self.heading_rad),
+            depth_rate: depth_rate.then_some(self.depth_rate_mps),
+            wheel_speeds: wheel_speeds.then_some([a, b, c, d]),
+            time_step: self.time_step_s,
+            implicit_added_mass: self.flags & IMPLICIT_ADDED_MASS != 0,
+        })
+    }
+
+    /// Whether the flag of an input is set. A value without its flag is a client's mistake, not a value to pass over.
+    fn has(&self, flag: u64, field: Field, values: &[f32]) -> Result<bool, InvalidState> {
+        let has = self.flags & flag != 0;
+        if !has && values.iter().any(|value| !value.is_nan()) {
+            return Err(InvalidState { field, problem: Problem::WithoutFlag });
+        }
+        Ok(has)
+    }
+}
+
+impl From<&State> for Query {
+    fn from(state: &State) -> Self {
+        let flag = |set: bool, flag: u64| if set { flag } else { 0 };
+        let mut wheel_speed_radps = [f32::NAN; MAX_WHEELS];
+        if let Some(speeds) = state.wheel_speeds {
+            wheel_speed_radps[..WHEELS].copy_from_slice(&speeds);
+        }
+        Self {
+            flags: flag(state.dry_contact, DRY_CONTACT)
+                | flag(state.implicit_added_mass, IMPLICIT_ADDED_MASS)
+                | flag(state.heading.is_some(), HAS_HEADING)
+                | flag(state.depth_rate.is_some(), HAS_DEPTH_RATE)
+                | flag(state.wheel_speeds.is_some(), HAS_WHEEL_SPEEDS),
+            depth_m: state.depth,
+            density_kgpm3: state.density,
+            velocity_mps: state.velocity,
+            current_mps: state.current,
+            angular_velocity_radps: state.angular_velocity,
+            acceleration_mps2: state.acceleration,
+            angular_acceleration_radps2: state.angular_acceleration,
+            gravity_direction: state.gravity,
+            heading_rad: state.heading.unwrap_or(f32::NAN),
+            depth_rate_mps: state.depth_rate.unwrap_or(f32::NAN),
+            wheel_speed_radps,
+            time_step_s: state.time_step,
+            ..Self::UNSET
+        }
+    }
+}
+
+impl Answer {
+    /// Becomes the forces of a vehicle, in place: an answer is too large to be handed around.
+    pub fn fill(&mut self, vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) {
+        let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
+        *self = Self::UNSET;
+        self.compute_ns = *compute_ns;
+        self.bundle_version = model.version();
+        self.surface_count = forces.surfaces.len() as u32;
+        self.effect_count = effects.loads.len() as u32;
+        self.force_n = single(&forces.wrench.force);
+        self.moment_nm = single(&forces.wrench.moment);
+        self.about_m = single(&model.vehicle().center_of_mass);
+        self.force_deviation_n = single(&forces.uncertainty);
+        for (slot, excess) in self.outside.iter_mut().zip(forces.outside.excess) {
+            *slot = excess as f32;
+        }
+        let provenance = model.provenance().as_bytes();
+        let len = provenance.len().min(PROVENANCE_LEN);
+        self.provenance[..len].copy_from_slice(&provenance[..len]);
+        for (slot, load) in self.surfaces.iter_mut().zip(&forces.surfaces) {
+            slot.force_n = single(&load.force);
+            slot.point_m = single(&load.point);
+            slot.wetted_fraction = load.wetted_fraction as f32;
+        }
+        if effects.loads.is_empty() {
+            return;
+        }
+        if let Some(matrix) = added_mass(effects) {
+            (self.flags, self.added_mass) = (HAS_ADDED_MASS, matrix);
+        }
+        for (slot, excess) in self.effects_outside.iter_mut().zip(effects.outside) {
+            *slot = excess as f32;
+        }
+        for (slot, load) in self.effects.iter_mut().zip(&effects.loads) {
+            *slot = EffectAnswer {
+                effect: load.effect.code(),
+                left_out: load.left_out.map_or(0, |reason| reason as u32),
+                force_n: single(&load.wrench.force),
+                moment_nm: single(&load.wrench.moment),
+            };
+        }
+        for (slot, force) in self.surfaces.iter_mut().zip(&effects.surface_forces) {
+            slot.effect_force_n = single(force);
+        }
+    }
+
+    /// Becomes a refusal that says which field is wrong.
+    pub fn refuse(&mut self, invalid: InvalidState) {
+        *self = Self {
+            status: Status::InvalidState as u32,
+            field: invalid.field as u32,
+            problem: invalid.problem as u32,
+            ..Self::UNSET
+        };
+    }
+
+    /// A copy, for which what counts is read alone: memory that another core has written is slow to read.
+    pub fn copied(&self) -> Self {
+        let mut copy = Self {
+            sequence: self.sequence,
+            compute_ns: self.compute_ns,
+            flags: self.flags,
+            status: self.status,
+            field: self.field,
+            problem: self.problem,
+            bundle_version: self.bundle_version,
+            surface_count: self.surface_count,
+            effect_count: self.effect_count,
+            force_n: self.force_n,
+            moment_nm: self.moment_nm,
+            about_m: self.about_m,
+            force_deviation_n: self.force_deviation_n,
+            moment_deviation_nm: self.moment_deviation_nm,
+            outside: self.outside,
+            effects_outside: self.effects_outside,
+            water_level_m: self.water_level_m,
+            bed_clearance_m: self.bed_clearance_m,
+            bed: self.bed,
+            provenance: self.provenance,
+            ..Self::UNSET
+        };
+        let (effects, surfaces) = (self.effects(), self.surfaces());
+        copy.effects[..effects.len()].copy_from_slice(effects);
+        copy.surfaces[..surfaces.len()].copy_from_slice(surfaces);
+        if self.flags & HAS_ADDED_MASS != 0 {
+            copy.added_mass = self.added_mass;
+        }
+        if self.flags & HAS_DAMPING != 0 {
+            copy.damping = self.damping;
+        }
+        copy
+    }
+
+    /// What was wrong with the state, where something was.
+    pub fn refusal(&self) -> Option<InvalidState> {
+        (self.status == Status::InvalidState as u32)
+            .then(|| {
+                Some(InvalidState {
+                    field: Field::from_code(self.field)?,
+                    problem: Problem::from_code(self.problem)?,
+                })
+            })
+            .flatten()
+    }
+
+    /// The surfaces that hold a load.
+    pub fn surfaces(&self) -> &[SurfaceAnswer] {
+        &self.surfaces[..(self.surface_count as usize).min(MAX_SURFACES)]
+    }
+
+    /// The effects that hold a load.
+    pub fn effects(&self) -> &[EffectAnswer] {
+        &self.effects[..(self.effect_count as usize).min(MAX_EFFECTS)]
+    }
+
+    /// True where a quantity lies outside the training domain, be it one that this version does not know.
+    pub fn is_outside(&self) -> bool {
+        self.outside.iter().any(|&excess| excess != 0.0 && !excess.is_nan())
+    }
+
+    /// How far each quantity lies outside the training domain.
+    pub fn outside(&self) -> Outside {
+        Outside { excess: known::<{ Quantity::ALL.len() }>(&self.outside) }
+    }
+
+    /// How far the state lies outside the box in which the effects were seen.
+    pub fn effects_outside(&self) -> OutsideBox {
+        known::<{ BoxQuantity::ALL.len() }>(&self.effects_outside)
+    }
+
+    /// The provenance up to its padding.
+    pub fn provenance(&self) -> &str {
+        let end = self.provenance.iter().position(|&b| b == 0).unwrap_or(PROVENANCE_LEN);
+        let bytes = &self.provenance[..end];
+        // a name that was cut within a character is shown up to it
+        std::str::from_utf8(bytes)
+            .or_else(|e| std::str::from_utf8(&bytes[..e.valid_up_to()]))
+            .unwrap_or_default()
+    }
+}
+
+/// The quantities that this version knows; one that is not judged is not outside.
+fn known<const N: usize>(excess: &[f32]) -> [f64; N] {
+    std::array::from_fn(|i| excess.get(i).filter(|excess| !excess.is_nan()).map_or(0.0, |&x| f64::from(x)))
+}
+
+impl BatchAnswer {
+    /// What was wrong with which state, where something was.
+    pub fn refusal(&self) -> Option<(InvalidState, usize)> {
+        let index = self.index as usize % MAX_BATCH;
+        (self.status == Status::InvalidState as u32)
+            .then(|| Some((self.answers[index].refusal()?, index)))
+            .flatten()
+    }
+}

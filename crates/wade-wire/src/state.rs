@@ -1,0 +1,383 @@
+//! A state as it travels, and the checks on it, the same for every transport.
+
+use nalgebra::UnitVector3;
+
+use wade_core::condition::{Condition, FRESH_WATER, GroundContact};
+use wade_core::effects::Circumstances;
+use wade_core::frame::Vec3;
+
+/// A state as it travels: single precision, body frame, not yet checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// Velocity over ground [m/s].
+    pub velocity: [f32; 3],
+    /// Velocity of the water over ground [m/s].
+    pub current: [f32; 3],
+    /// Angular velocity [rad/s].
+    pub angular_velocity: [f32; 3],
+    /// Acceleration [m/s2].
+    pub acceleration: [f32; 3],
+    /// Angular acceleration [rad/s2].
+    pub angular_acceleration: [f32; 3],
+    /// Unit vector along gravity (down).
+    pub gravity: [f32; 3],
+    /// Water depth [m].
+    pub depth: f32,
+    /// Density [kg/m3].
+    pub density: f32,
+    /// No water pressure under the contact patches.
+    pub dry_contact: bool,
+    /// Angle from the world's x to the body's x [rad].
+    pub heading: Option<f32>,
+    /// Rate at which the water rises at the body origin [m/s].
+    pub depth_rate: Option<f32>,
+    /// Wheel speeds front left, front right, rear left, rear right [rad/s].
+    pub wheel_speeds: Option<[f32; 4]>,
+    /// Time since the state before it in the session [s].
+    pub time_step: f32,
+    /// The caller integrates added mass himself.
+    pub implicit_added_mass: bool,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            velocity: [0.0; 3],
+            current: [0.0; 3],
+            angular_velocity: [0.0; 3],
+            acceleration: [0.0; 3],
+            angular_acceleration: [0.0; 3],
+            gravity: [0.0, 0.0, -1.0],
+            depth: 0.0,
+            density: FRESH_WATER as f32,
+            dry_contact: false,
+            heading: None,
+            depth_rate: None,
+            wheel_speeds: None,
+            time_step: 0.0,
+            implicit_added_mass: false,
+        }
+    }
+}
+
+/// A field of a state. The discriminants are the codes of the shared-memory layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Field {
+    /// `velocity_mps`
+    Velocity = 1,
+    /// `current_mps`
+    Current = 2,
+    /// `angular_velocity_radps`
+    AngularVelocity = 3,
+    /// `acceleration_mps2`
+    Acceleration = 4,
+    /// `angular_acceleration_radps2`
+    AngularAcceleration = 5,
+    /// `gravity_direction`
+    Gravity = 6,
+    /// `depth_m`
+    Depth = 7,
+    /// `density_kgpm3`
+    Density = 8,
+    /// `world_from_body`
+    Quaternion = 9,
+    /// `roll_pitch`
+    RollPitch = 10,
+    /// `ground_contact`
+    GroundContact = 11,
+    /// `heading_rad`
+    Heading = 12,
+    /// `depth_rate_mps`
+    DepthRate = 13,
+    /// `wheel_speed_radps`
+    WheelSpeed = 14,
+    /// `time_step_s`
+    TimeStep = 15,
+    /// `water_level_m`
+    WaterLevel = 16,
+    /// `bed_clearance_m`
+    BedClearance = 17,
+    /// `bed`
+    Bed = 18,
+    /// `wheel_water_level_m`
+    WheelWaterLevel = 19,
+    /// `flags`
+    Flags = 20,
+}
+
+impl Field {
+    const ALL: [Self; 20] = [
+        Self::Velocity,
+        Self::Current,
+        Self::AngularVelocity,
+        Self::Acceleration,
+        Self::AngularAcceleration,
+        Self::Gravity,
+        Self::Depth,
+        Self::Density,
+        Self::Quaternion,
+        Self::RollPitch,
+        Self::GroundContact,
+        Self::Heading,
+        Self::DepthRate,
+        Self::WheelSpeed,
+        Self::TimeStep,
+        Self::WaterLevel,
+        Self::BedClearance,
+        Self::Bed,
+        Self::WheelWaterLevel,
+        Self::Flags,
+    ];
+
+    /// The name that the wire gives it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity_mps",
+            Self::Current => "current_mps",
+            Self::AngularVelocity => "angular_velocity_radps",
+            Self::Acceleration => "acceleration_mps2",
+            Self::AngularAcceleration => "angular_acceleration_radps2",
+            Self::Gravity => "gravity_direction",
+            Self::Depth => "depth_m",
+            Self::Density => "density_kgpm3",
+            Self::Quaternion => "world_from_body",
+            Self::RollPitch => "roll_pitch",
+            Self::GroundContact => "ground_contact",
+            Self::Heading => "heading_rad",
+            Self::DepthRate => "depth_rate_mps",
+            Self::WheelSpeed => "wheel_speed_radps",
+            Self::TimeStep => "time_step_s",
+            Self::WaterLevel => "water_level_m",
+            Self::BedClearance => "bed_clearance_m",
+            Self::Bed => "bed",
+            Self::WheelWaterLevel => "wheel_water_level_m",
+            Self::Flags => "flags",
+        }
+    }
+
+    /// The field of a code of the shared-memory layout.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|&field| field as u32 == code)
+    }
+}
+
+/// What is wrong with a field. The discriminants are the codes of the shared-memory layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Problem {
+    /// A NaN or an infinity.
+    NotFinite = 1,
+    /// Beyond anything physical, see [`limit`].
+    TooLarge = 2,
+    /// Below zero.
+    Negative = 3,
+    /// Zero or below.
+    NotPositive = 4,
+    /// Length differs from 1 by more than [`UNIT_TOLERANCE`].
+    NotUnit = 5,
+    /// No value of the enumeration.
+    Unknown = 6,
+    /// Another number of values.
+    Count = 7,
+    /// An input that the server cannot use yet.
+    Unsupported = 8,
+    /// A value, but not the flag that says so.
+    WithoutFlag = 9,
+}
+
+impl Problem {
+    const ALL: [Self; 9] = [
+        Self::NotFinite,
+        Self::TooLarge,
+        Self::Negative,
+        Self::NotPositive,
+        Self::NotUnit,
+        Self::Unknown,
+        Self::Count,
+        Self::Unsupported,
+        Self::WithoutFlag,
+    ];
+
+    /// The problem of a code of the shared-memory layout.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|&problem| problem as u32 == code)
+    }
+}
+
+/// A field that no answer can be given for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InvalidState {
+    /// The field.
+    pub field: Field,
+    /// What is wrong with it.
+    pub problem: Problem,
+}
+
+impl std::error::Error for InvalidState {}
+
+impl std::fmt::Display for InvalidState {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = self.field.name();
+        match self.problem {
+            Problem::NotFinite => write!(f, "{name} must be finite"),
+            Problem::TooLarge => write!(f, "{name} must not exceed {} in magnitude", limit(self.field)),
+            Problem::Negative => write!(f, "{name} must not be negative"),
+            Problem::NotPositive => write!(f, "{name} must be greater than zero"),
+            Problem::Unknown => write!(f, "{name} must be one of the values of its enumeration"),
+            Problem::Count => write!(f, "{name} must have four values, or none"),
+            Problem::Unsupported => write!(f, "{name} is set, which this server does not support yet"),
+            Problem::WithoutFlag => write!(f, "{name} has a value, but its flag is not set"),
+            Problem::NotUnit => write!(f, "{name} must have length 1 (within {UNIT_TOLERANCE})"),
+        }
+    }
+}
+
+/// How far the length of a direction or a quaternion may be from 1.
+pub const UNIT_TOLERANCE: f64 = 1e-3;
+
+/// Bounds far outside the physics, which keep every product in an evaluation finite.
+pub fn limit(field: Field) -> f64 {
+    match field {
+        Field::Velocity | Field::Current | Field::AngularVelocity | Field::Depth => 1e3,
+        Field::Acceleration | Field::AngularAcceleration | Field::Density => 1e5,
+        // anything further from 1 is refused for its length
+        Field::Gravity | Field::Quaternion => 1e3,
+        Field::RollPitch | Field::GroundContact => 1e3,
+        // a turn counter may have wound up
+        Field::Heading => 1e6,
+        Field::DepthRate | Field::WheelSpeed | Field::TimeStep => 1e3,
+        // these are refused whatever their value
+        Field::WaterLevel | Field::BedClearance | Field::Bed | Field::WheelWaterLevel | Field::Flags => 1e3,
+    }
+}
+
+impl State {
+    /// What effects need to know beside the condition, or the first field that is wrong.
+    pub fn circumstances(&self) -> Result<Circumstances, InvalidState> {
+        let optional = |field: Field, value: Option<f32>| value.map(|value| scalar(field, value)).transpose();
+        let time_step = scalar(Field::TimeStep, self.time_step)?;
+        if time_step < 0.0 {
+            return Err(InvalidState { field: Field::TimeStep, problem: Problem::Negative });
+        }
+        let wheel_speeds = self.wheel_speeds.map(|speeds| {
+            let [a, b, c, d] = speeds.map(|speed| scalar(Field::WheelSpeed, speed));
+            Ok([a?, b?, c?, d?])
+        });
+        Ok(Circumstances {
+            heading: optional(Field::Heading, self.heading)?,
+            depth_rate: optional(Field::DepthRate, self.depth_rate)?,
+            wheel_speeds: wheel_speeds.transpose()?,
+            time_step,
+            implicit_added_mass: self.implicit_added_mass,
+        })
+    }
+
+    /// The condition that this state describes, or the first field that is wrong.
+    pub fn check(&self) -> Result<Condition, InvalidState> {
+        let velocity = vector(Field::Velocity, &self.velocity)?;
+        let current = vector(Field::Current, &self.current)?;
+        let density = scalar(Field::Density, self.density)?;
+        if density <= 0.0 {
+            return Err(InvalidState { field: Field::Density, problem: Problem::NotPositive });
+        }
+        let depth = scalar(Field::Depth, self.depth)?;
+        if depth < 0.0 {
+            return Err(InvalidState { field: Field::Depth, problem: Problem::Negative });
+        }
+        Ok(Condition {
+            velocity: velocity - current,
+            ground_velocity: velocity,
+            angular_velocity: vector(Field::AngularVelocity, &self.angular_velocity)?,
+            acceleration: vector(Field::Acceleration, &self.acceleration)?,
+            angular_acceleration: vector(Field::AngularAcceleration, &self.angular_acceleration)?,
+            depth,
+            density,
+            up: -direction(&self.gravity)?,
+            ground_contact: if self.dry_contact { GroundContact::Dry } else { GroundContact::Wetted },
+        })
+    }
+}
+
+fn vector(field: Field, values: &[f32; 3]) -> Result<Vec3, InvalidState> {
+    let [x, y, z] = values.map(|value| scalar(field, value));
+    Ok(Vec3::new(x?, y?, z?))
+}
+
+/// A number that is finite and within its limit.
+pub(crate) fn scalar(field: Field, value: f32) -> Result<f64, InvalidState> {
+    let value = f64::from(value);
+    if !value.is_finite() {
+        Err(InvalidState { field, problem: Problem::NotFinite })
+    } else if value.abs() > limit(field) {
+        Err(InvalidState { field, problem: Problem::TooLarge })
+    } else {
+        Ok(value)
+    }
+}
+
+fn direction(gravity: &[f32; 3]) -> Result<UnitVector3<f64>, InvalidState> {
+    let gravity = Vec3::from(gravity.map(f64::from));
+    if !gravity.iter().all(|x| x.is_finite()) {
+        return Err(InvalidState { field: Field::Gravity, problem: Problem::NotFinite });
+    }
+    if (gravity.norm() - 1.0).abs() > UNIT_TOLERANCE {
+        return Err(InvalidState { field: Field::Gravity, problem: Problem::NotUnit });
+    }
+    Ok(UnitVector3::new_normalize(gravity))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(state: State) -> (Field, Problem) {
+        let checked = state.check().and_then(|_| state.circumstances());
+        let invalid = checked.expect_err("the state is invalid");
+        (invalid.field, invalid.problem)
+    }
+
+    #[test]
+    fn each_bad_field_is_named() {
+        let good = State { depth: 0.1, ..State::default() };
+        assert!(good.check().is_ok());
+        let cases = [
+            (State { velocity: [f32::NAN, 0.0, 0.0], ..good }, Field::Velocity, Problem::NotFinite),
+            (State { current: [0.0, f32::INFINITY, 0.0], ..good }, Field::Current, Problem::NotFinite),
+            (State { angular_velocity: [0.0, 0.0, 1e9], ..good }, Field::AngularVelocity, Problem::TooLarge),
+            (State { acceleration: [f32::NAN; 3], ..good }, Field::Acceleration, Problem::NotFinite),
+            (State { depth: -0.01, ..good }, Field::Depth, Problem::Negative),
+            (State { density: 0.0, ..good }, Field::Density, Problem::NotPositive),
+            (State { density: f32::NAN, ..good }, Field::Density, Problem::NotFinite),
+            (State { gravity: [0.0, 0.0, -0.9], ..good }, Field::Gravity, Problem::NotUnit),
+            (State { gravity: [0.0; 3], ..good }, Field::Gravity, Problem::NotUnit),
+            (State { gravity: [f32::NAN; 3], ..good }, Field::Gravity, Problem::NotFinite),
+            (State { heading: Some(f32::NAN), ..good }, Field::Heading, Problem::NotFinite),
+            (State { depth_rate: Some(1e9), ..good }, Field::DepthRate, Problem::TooLarge),
+            (State { wheel_speeds: Some([f32::INFINITY; 4]), ..good }, Field::WheelSpeed, Problem::NotFinite),
+            (State { time_step: -0.001, ..good }, Field::TimeStep, Problem::Negative),
+        ];
+        for (state, field, expected) in cases {
+            assert_eq!(problem(state), (field, expected));
+        }
+    }
+
+    #[test]
+    fn a_current_is_subtracted() {
+        let state = State { velocity: [1.0, 0.0, 0.0], current: [0.25, 0.5, 0.0], ..State::default() };
+        let condition = state.check().expect("valid");
+        assert_eq!(condition.velocity, Vec3::new(0.75, -0.5, 0.0));
+        assert_eq!(condition.ground_velocity, Vec3::new(1.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn codes_name_the_same_field_and_problem_on_both_sides() {
+        for field in Field::ALL {
+            assert_eq!(Field::from_code(field as u32), Some(field));
+        }
+        for problem in Problem::ALL {
+            assert_eq!(Problem::from_code(problem as u32), Some(problem));
+        }
+        assert_eq!(Field::from_code(0), None);
+    }
+}
