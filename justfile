@@ -8,7 +8,7 @@ default:
 check:
     cargo fmt --check
     cargo clippy --all-targets -- -D warnings
-    cargo test --lib --test layers --test repository
+    cargo test --lib --test repository
 
 # every test of the Rust packages
 test:

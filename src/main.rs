@@ -7,6 +7,13 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        // what comes back as an error is printed as one
+        if !wade_learn::dataset::catches_panics() {
+            usual(info);
+        }
+    }));
     match cli::Cli::parse().run() {
         Ok(code) => code,
         Err(error) => {

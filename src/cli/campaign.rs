@@ -4,22 +4,18 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade_core::geometry::hydrostatics::float_depth;
-use wade_learn::cfd::case::Settings;
+use wade_core::vehicle::Vehicle;
 use wade_learn::cfd::collect::{self, Collected};
 use wade_learn::cfd::openfoam::OpenFoam;
-use wade_learn::cfd::plan::{self, Campaign, Plan, Set};
+use wade_learn::cfd::plan::{self, Plan, Set};
 use wade_learn::cfd::report;
-use wade_learn::cfd::run::{Event, Machine, Work};
+use wade_learn::cfd::run::{Event, Work};
 use wade_learn::cfd::slurm;
-use wade_learn::cfd::trials;
-use wade_learn::dataset;
-use wade_learn::train;
-use wade_learn::trials::write;
+use wade_learn::workflow::campaign::{Addition, Beginning, Folder, Selection};
 
 use super::Vehicles;
 
@@ -54,7 +50,7 @@ const SETTINGS: &str = "  courant = 8.0                # largest Courant number
   windows = 3                  # computed at most, until the mean has settled
   drift = 0.05                 # of a settled mean, over the dynamic force
   sample_s = 0.05              # between two samples of the forces [s]
-  limit_s = 3600.0             # longest run of a program [s]; finer: longer
+  limit_s = 3600.0             # processor time of a program [s]; finer: more
   [mesh]
   cells_per_length = 6.1       # background cells along the vehicle
   wet_layer = 0.42             # height of wet background cells over length
@@ -163,29 +159,13 @@ enum Target {
 
 impl PlanCommand {
     fn run(self) -> Result<ExitCode> {
-        let bundle = self.vehicles.without_weights(&self.vehicle)?;
-        let exists = self.out.join(plan::CAMPAIGN_FILE).exists();
-        let of_a_campaign = [plan::PLAN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
-        if let Some(left) = of_a_campaign.into_iter().find(|name| !exists && self.out.join(name).exists()) {
-            bail!(
-                "{} holds {left} and no {}: bring that back, or name another folder",
-                self.out.display(),
-                plan::CAMPAIGN_FILE
-            );
-        }
-        let mut plan = if exists { Plan::read(&self.out)? } else { self.begin(&bundle.vehicle)? };
-        plan.check_vehicle(&self.out, &bundle.vehicle)?;
-        if exists && (self.settings.is_some() || self.table.is_some()) {
-            bail!("{} has its settings and its table already: edit them there", self.out.display());
-        }
-        let before = plan.cases.len();
-        let float = float_depth(&bundle.vehicle.hull.mesh, bundle.vehicle.z0, bundle.vehicle.mass);
-        plan.extend(self.set.into(), self.cases, self.seed, float)?;
-        if exists {
-            plan.write_cases(&self.out)?
-        } else {
-            plan.write(&self.out)?
-        }
+        let vehicle = self.vehicles.without_weights(&self.vehicle)?.vehicle;
+        let beginning = Beginning {
+            table: self.table.as_ref().map(read_toml).transpose()?,
+            settings: self.settings.as_ref().map(read_toml).transpose()?,
+        };
+        let add = Addition { set: self.set.into(), cases: self.cases, seed: self.seed };
+        let (plan, before) = Folder { path: &self.out, vehicle: &vehicle }.extend(beginning, add)?;
         println!(
             "{}: {} cases, {} of them new",
             self.out.display(),
@@ -196,23 +176,6 @@ impl PlanCommand {
             println!("{}: one task a case", slurm::write(&self.out, &plan)?.display());
         }
         Ok(ExitCode::SUCCESS)
-    }
-
-    fn begin(&self, vehicle: &wade_core::vehicle::Vehicle) -> Result<Plan> {
-        let table = match &self.table {
-            Some(path) => read_toml(path)?,
-            None => *train::Config::default().analytic.tables.get(&self.vehicle).with_context(|| {
-                format!(
-                    "no ranges are known for `{}`: give them with --table (wade campaign plan --help)",
-                    self.vehicle
-                )
-            })?,
-        };
-        let settings: Settings = self.settings.as_ref().map_or_else(|| Ok(Settings::default()), read_toml)?;
-        let hull_sha256 = plan::hull_hash(vehicle);
-        let campaign =
-            Campaign { format: plan::FORMAT, vehicle: self.vehicle.clone(), hull_sha256, table, settings };
-        Ok(Plan { campaign, cases: Vec::new() })
     }
 }
 
@@ -256,38 +219,24 @@ struct Run {
 
 impl Run {
     fn run(self) -> Result<ExitCode> {
-        let plan = Plan::read(&self.campaign)?;
-        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
-        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
-        if let Some(unknown) = self.case.iter().find(|id| !plan.cases.iter().any(|c| c.id == **id)) {
-            bail!("{} has no case `{unknown}`", self.campaign.display());
-        }
+        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
+        let folder = Folder { path: &self.campaign, vehicle: &vehicle };
+        let plan = folder.plan()?;
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: self.keep };
-        let collected = Collected::read(&self.campaign, &plan)?;
-        let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
-        let is_due = |case: &plan::Case| {
-            let summary = collected.cases.get(&case.id);
-            summary.is_none_or(|summary| self.outdated && summary.is_outdated(case))
-        };
-        let is_chosen = |case: &plan::Case| {
-            is_due(case)
-                && (sets.is_empty() || sets.contains(&case.set))
-                && (self.case.is_empty() || self.case.contains(&case.id))
-                && (self.again || !work.failure_path(&case.id).exists())
-        };
-        let cases: Vec<plan::Case> = plan.cases.iter().filter(|case| is_chosen(case)).cloned().collect();
-        let solver = OpenFoam::find()?;
-        eprintln!("{}", solver.label());
-        let machine = Machine {
-            vehicle: &bundle.vehicle,
-            campaign: &plan.campaign,
-            solver: &solver,
-            work: &work,
+        let selection = Selection {
+            sets: self.set.iter().map(|name| (*name).into()).collect(),
+            cases: self.case,
+            again: self.again,
             outdated: self.outdated,
         };
+        let cases = folder.due(&plan, &work, &selection)?;
+        let solver = OpenFoam::find()?;
+        eprintln!("{}", solver.label());
         let mut progress = Progress::new(cases.len(), self.jobs)?;
         let mut failed = Vec::new();
-        machine.run(&cases, self.jobs, &mut |event| progress.hear(event, &mut failed))?;
+        let jobs = (self.jobs, self.outdated);
+        folder
+            .compute((&plan, &solver, &work), &cases, jobs, &mut |event| progress.hear(event, &mut failed))?;
         progress.finish();
         for (id, reason) in &failed {
             println!("set aside: {id}: {reason}");
@@ -304,6 +253,11 @@ impl Run {
         }
         Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
+}
+
+/// The vehicle that a campaign is about.
+fn vehicle_of(campaign: &Path, vehicles: &Vehicles) -> Result<Vehicle> {
+    Ok(vehicles.without_weights(&Plan::read(campaign)?.campaign.vehicle)?.vehicle)
 }
 
 fn work_folder(campaign: &Path, stated: Option<&PathBuf>) -> PathBuf {
@@ -327,11 +281,10 @@ struct Collect {
 
 impl Collect {
     fn run(self) -> Result<ExitCode> {
-        let plan = Plan::read(&self.campaign)?;
-        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
-        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
+        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
+        let plan = Folder { path: &self.campaign, vehicle: &vehicle }.plan()?;
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: true };
-        let new = collect::collect(&self.campaign, &plan, &bundle.vehicle, &work)?;
+        let new = collect::collect(&self.campaign, &plan, &vehicle, &work)?;
         let all = Collected::read(&self.campaign, &plan)?.cases.len();
         println!("{}: {all} of {} cases, {new} of them new", self.campaign.display(), plan.cases.len());
         Ok(ExitCode::SUCCESS)
@@ -364,22 +317,11 @@ struct Trials {
 
 impl Trials {
     fn run(self) -> Result<ExitCode> {
-        let plan = Plan::read(&self.campaign)?;
-        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
-        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
-        let dataset = dataset::read(&self.campaign.join(collect::SECTIONS_FILE))?;
+        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
-        let collected = self.pairs.then(|| Collected::read(&self.campaign, &plan)).transpose()?;
-        let (manifest, trials) = trials::trials(&plan, &dataset, &bundle.vehicle, &sets, collected.as_ref())?;
-        let holds_any = std::fs::read_dir(&self.out).is_ok_and(|mut entries| entries.next().is_some());
-        if holds_any {
-            bail!(
-                "{} holds files already, which would be mixed with these trials: name another folder",
-                self.out.display()
-            );
-        }
-        write(&self.out, &manifest, &trials)?;
-        super::emit(&format!("{}: {} trials\n", self.out.display(), trials.len()))?;
+        let folder = Folder { path: &self.campaign, vehicle: &vehicle };
+        let count = folder.write_trials(&sets, self.pairs, &self.out)?;
+        super::emit(&format!("{}: {count} trials\n", self.out.display()))?;
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -404,17 +346,16 @@ impl Report {
         let files = [plan::PLAN_FILE, plan::CAMPAIGN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
         let files = files.map(|name| self.campaign.join(name));
         let written = super::begin_page(self.html.as_deref(), files)?;
-        let plan = Plan::read(&self.campaign)?;
-        let bundle = self.vehicles.without_weights(&plan.campaign.vehicle)?;
-        plan.check_vehicle(&self.campaign, &bundle.vehicle)?;
-        let report = report::Report::of(&self.campaign, &plan, &bundle.vehicle)?;
+        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
+        let plan = Folder { path: &self.campaign, vehicle: &vehicle }.plan()?;
+        let report = report::Report::of(&self.campaign, &plan, &vehicle)?;
         if self.json {
             super::emit(&(serde_json::to_string_pretty(&report)? + "\n"))?;
         } else {
             super::emit(&report.text())?;
         }
         if let Some(written) = written {
-            written.finish(&report.page(&self.campaign, &bundle.vehicle)?)?;
+            written.finish(&report.page(&self.campaign, &vehicle)?)?;
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -505,7 +446,7 @@ mod tests {
         fn table(value: &impl serde::Serialize) -> toml::Table {
             toml::Table::try_from(value).expect("a table")
         }
-        assert_eq!(toml::from_str(SETTINGS), Ok(table(&Settings::default())));
+        assert_eq!(toml::from_str(SETTINGS), Ok(table(&wade_learn::cfd::case::Settings::default())));
         assert_eq!(toml::from_str(TABLE), Ok(table(&wade_learn::parameter_table::ParameterTable::WARTHOG)));
     }
 }

@@ -19,6 +19,7 @@ use wade_learn::dataset::split::{self, By};
 use wade_learn::dataset::summary::Summary;
 use wade_learn::dataset::{self, CutOff, mirror, page};
 use wade_learn::train::{self, Config};
+use wade_learn::workflow::SplitRule;
 
 use super::train::Rule;
 use super::{Vehicles, begin_page, emit, keep_inputs, usage_error};
@@ -318,7 +319,7 @@ impl SplitFile {
         }
         let defaults = Config::default();
         let share = self.share.unwrap_or(defaults.held_out_share);
-        self.by.by(share, self.parts.unwrap_or(defaults.parts))
+        SplitRule::from(self.by).by(share, self.parts.unwrap_or(defaults.parts))
     }
 
     /// All sides appear together: one side beside an older other one would be a leak.

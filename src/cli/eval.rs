@@ -1,22 +1,17 @@
 //! `wade eval`.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use clap::Args;
 use serde_json::json;
-use wade_core::model::Model;
-use wade_core::model::kernel::Isa;
-use wade_learn::dataset::split;
-use wade_learn::evaluate::contest::{Contest, Contestants, enter};
-use wade_learn::evaluate::report::{About, Report, VehicleReport};
-use wade_learn::evaluate::{held_out, paper};
+use wade_learn::evaluate::paper;
+use wade_learn::evaluate::report::{Report, VehicleReport};
 use wade_learn::train::report::Record;
-use wade_learn::train::{self, Config, Published, Sides, Source, Trained, Variant};
+use wade_learn::workflow::{Evaluation, Event, ModelKind};
 
-use super::train::{Data, Progress, Rule, Served};
+use super::train::{Data, Kind, Progress, Rule};
 use super::{PROGRAM, begin_page, emit, usage_error};
 
 /// Judge the weights of the bundles by the states that their training held out
@@ -41,7 +36,7 @@ pub struct Eval {
     split: Option<Rule>,
     /// Kinds of model to train; the first is the one under evaluation
     #[arg(long, value_enum, value_delimiter = ',', default_value = "anchored", requires = "split")]
-    variants: Vec<Served>,
+    variants: Vec<Kind>,
     /// Trains the paper's three ablations on the same split, with the settings of the paper's network
     #[arg(long)]
     ablations: bool,
@@ -58,10 +53,7 @@ impl Eval {
     pub fn run(self) -> Result<ExitCode> {
         let record = Record::path(&self.trained);
         let page = begin_page(self.html.as_deref(), [&self.data.data, &record])?;
-        let report = match self.split {
-            Some(rule) => self.anew(rule)?,
-            None => self.of_bundles()?,
-        };
+        let report = self.report()?;
         emit(&if self.json { format!("{:#}\n", json!(report)) } else { text(&report) })?;
         if let Some(page) = page {
             page.finish(&report.page()?)?;
@@ -69,116 +61,25 @@ impl Eval {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn of_bundles(&self) -> Result<Report> {
-        if self.data.config.is_some() {
+    fn report(&self) -> Result<Report> {
+        if self.split.is_none() && self.data.config.is_some() {
             usage_error(
                 "--config goes with --split: without it the settings are those of the training report",
             );
         }
-        let record = Record::read(&self.trained).context("which states were held out is not known")?;
-        let loaded = self.data.load(&record.config, &self.data.vehicles.library()?)?;
-        let source = loaded.source(&record.config)?;
-        let split = held_out::of(&record, &loaded.file, &source)?;
-        let (mut models, library) = (BTreeMap::new(), self.data.vehicles.library()?);
-        for name in loaded.bundles.keys() {
-            let bundle = library.read(name)?;
-            let Some((weights, domain)) = bundle.trained else { bail!("{name}: the bundle has no weights") };
-            held_out::check_weights(&record, name, &weights)?;
-            let model = Model::new(bundle.vehicle, bundle.version, domain, weights, Isa::available()[0]);
-            models.insert(name.clone(), vec![model]);
-        }
-        let rule = if record.split.by_sample { Rule::Sample } else { Rule::Case };
-        let by = rule.by(record.config.held_out_share, record.config.parts);
-        let sides = Sides { split: &split, by };
-        let mut contest = Contest::new();
-        let of_paper = match record.variant == train::anchored::NAME {
-            true => {
-                let Config { seed, front_rear, held_out_share, parts, .. } = record.config.clone();
-                let suited = Served::Paper.settings(self.data.is_analytic());
-                Config { seed, front_rear, held_out_share, parts, ..suited }
+        let (data, library) = (self.data.source(), self.data.vehicles.library()?);
+        let settings = self.data.config.as_deref();
+        let evaluation = Evaluation { data: &data, settings, ablations: self.ablations, program: PROGRAM };
+        let progress = Progress::default();
+        let hear = |event: Event<'_>| progress.hear(event);
+        Ok(match self.split {
+            Some(rule) => {
+                let kinds: Vec<ModelKind> = self.variants.iter().map(|kind| (*kind).into()).collect();
+                evaluation.by_split(rule.into(), &kinds, &library, &hear)?
             }
-            false => record.config.clone(),
-        };
-        self.enter(&mut contest, &source, sides, &of_paper, &models)?;
-        let mut settings = self.ablation_settings(&of_paper);
-        settings.insert(record.variant.clone(), record.config);
-        let about = About {
-            data: loaded.file,
-            splits: vec![split.name.clone()],
-            by_sample: record.split.by_sample,
-            settings,
-            history: record.history,
-        };
-        Ok(Report::new(&contest, &source.vehicles, about, PROGRAM)?)
+            None => evaluation.of_bundles(&self.trained, &library, &hear)?,
+        })
     }
-
-    /// One training a part; the held-out states of all parts are pooled.
-    fn anew(&self, rule: Rule) -> Result<Report> {
-        let first = self.variants.first().copied().unwrap_or(Served::Anchored);
-        let config = self.data.settings(first)?;
-        let of_paper = self.data.settings(Served::Paper)?;
-        let mut settings = self.ablation_settings(&of_paper);
-        let loaded = self.data.load(&config, &self.data.vehicles.library()?)?;
-        let source = loaded.source(&config)?;
-        let by = rule.by(config.held_out_share, config.parts);
-        let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;
-        let mut contest = Contest::new();
-        for split in &splits {
-            let sides = Sides { split, by };
-            let mut models: BTreeMap<String, Vec<Model>> = BTreeMap::new();
-            for variant in &self.variants {
-                let config = self.data.settings(*variant)?;
-                eprintln!("training {variant:?}, held out: {}", split.name);
-                let learnt = variant.train(&loaded, &source, (sides, 1), &config, None)?;
-                settings.insert(learnt.record.variant, learnt.record.config);
-                for (name, (weights, domain)) in learnt.weights {
-                    let vehicle = source.vehicles[&name].clone();
-                    let model = Model::new(vehicle, 0, domain, weights, Isa::available()[0]);
-                    models.entry(name).or_default().push(model);
-                }
-            }
-            self.enter(&mut contest, &source, sides, &of_paper, &models)?;
-        }
-        let splits = splits.iter().map(|split| split.name.clone()).collect();
-        let about = About {
-            data: loaded.file,
-            splits,
-            by_sample: rule == Rule::Sample,
-            settings,
-            history: Vec::new(),
-        };
-        Ok(Report::new(&contest, &source.vehicles, about, PROGRAM)?)
-    }
-
-    /// Settings of the ablations, by their names.
-    fn ablation_settings(&self, of_paper: &Config) -> BTreeMap<String, Config> {
-        let ablations = Variant::ABLATIONS.iter().filter(|_| self.ablations);
-        ablations.map(|variant| (variant.name().to_owned(), of_paper.clone())).collect()
-    }
-
-    fn enter(
-        &self,
-        contest: &mut Contest,
-        source: &Source,
-        sides: Sides<'_>,
-        of_paper: &Config,
-        models: &BTreeMap<String, Vec<Model>>,
-    ) -> Result<()> {
-        let mut ablations = Vec::new();
-        if self.ablations {
-            for variant in Variant::ABLATIONS {
-                ablations.push(learn(source, sides, variant, of_paper)?);
-            }
-        }
-        let contestants = Contestants { models, ablations: &ablations };
-        Ok(enter(contest, source, sides.split, &contestants)?)
-    }
-}
-
-fn learn(source: &Source, sides: Sides<'_>, variant: Variant, config: &Config) -> Result<Trained<Published>> {
-    eprintln!("training {}, held out: {}", variant.name(), sides.split.name);
-    let progress = Progress::new(config.epochs)?;
-    Ok(train::train(source, sides, variant, config, None, &|epoch| progress.epoch(epoch))?)
 }
 
 fn text(report: &Report) -> String {

@@ -17,7 +17,8 @@ use wade_gap_bench::generate::generate;
 use wade_gap_bench::real::{falling_balls, kvlcc2, rm2_rotor};
 use wade_gap_bench::score::{Row, rows, table};
 use wade_gap_bench::{
-    Hull, Outcome, Prediction, Progress, Schedule, Simulator, Tool, ToolError, command_tool, folder, run,
+    Hull, Outcome, Prediction, Progress, Schedule, Setup, Simulator, Tool, ToolError, command_tool, folder,
+    run,
 };
 use wade_learn::trials::Trials;
 
@@ -234,7 +235,8 @@ impl Bench {
                 eprintln!("{}/{} {}", progress.done[0], progress.done[1], progress.case);
             }
         };
-        let outcomes = run(cases, schedule, simulator, &borrowed, self.invariance, &mut show);
+        let outcomes =
+            run(cases, Setup { schedule, simulator, invariance: self.invariance }, &borrowed, &mut show);
         bar.finish_and_clear();
         tools.into_iter().map(|(name, _)| name).zip(outcomes).collect()
     }

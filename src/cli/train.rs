@@ -1,29 +1,21 @@
 //! `wade train`.
 
-use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::cell::RefCell;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade_core::bundle::{self, Bundle, Library};
-use wade_core::digest::sha256_of;
-use wade_core::domain::Domain;
-use wade_core::model::Weights;
-use wade_learn::dataset::split::{self, By};
-use wade_learn::dataset::{self, Dataset};
-use wade_learn::files::StagedFile;
 use wade_learn::train::checkpoint::Checkpoint;
 use wade_learn::train::fit::Epoch;
-use wade_learn::train::report::{DataFile, Record, VehicleRecord};
-use wade_learn::train::{self, Config, Sides, Source, Trained, TrainedVehicle, Variant, anchored};
+use wade_learn::train::report::VehicleRecord;
+use wade_learn::workflow::{DataSource, Event, ModelKind, SplitRule, Training, WorkflowError, Written};
 
 use super::running::Running;
-use super::{PROGRAM, Vehicles, check_report_folder, usage_error};
+use super::{PROGRAM, Vehicles, usage_error};
 
 /// Train one network for the vehicles of a data set and write it into their bundles
 ///
@@ -77,7 +69,7 @@ pub struct Train {
     data: Data,
     /// Kind of model; `anchored` is what the shipped vehicles have
     #[arg(long, value_enum, default_value = "anchored")]
-    variant: Served,
+    variant: Kind,
     /// Epochs at most
     #[arg(long)]
     epochs: Option<u32>,
@@ -116,57 +108,31 @@ pub struct Data {
     pub vehicles: Vehicles,
 }
 
-/// What can be learnt and served.
+impl Data {
+    /// Where the loads come from.
+    pub fn source(&self) -> DataSource {
+        if self.data == Path::new("analytic") {
+            DataSource::Analytic
+        } else {
+            DataSource::File(self.data.clone())
+        }
+    }
+}
+
+/// A kind of model that can be trained and served.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Served {
+pub enum Kind {
     /// Exact hydrostatics, a simple drag, and a learned dimensionless remainder
     Anchored,
     /// The paper's network as published
     Paper,
 }
 
-/// What a training comes to: weights for each vehicle, and its record without that of the data.
-pub struct Learnt {
-    /// Weights and domain by vehicle.
-    pub weights: BTreeMap<String, (Weights, Domain)>,
-    /// The record of it.
-    pub record: Record,
-}
-
-impl Served {
-    /// Trains it.
-    pub fn train(
-        self,
-        loaded: &Loaded,
-        source: &Source,
-        (sides, part): (Sides<'_>, usize),
-        config: &Config,
-        checkpoint: Option<&Checkpoint>,
-    ) -> Result<Learnt> {
-        let progress = Progress::new(config.epochs)?;
-        let epoch = |epoch: &Epoch| progress.epoch(epoch);
-        let label = loaded.file.label();
-        Ok(match self {
-            Self::Paper => {
-                let trained = train::train(source, sides, Variant::Paper, config, checkpoint, &epoch)?;
-                let contact = loaded.data.meta.ground_contact;
-                let weights = |of_vehicle: &_| trained.weights(of_vehicle, contact, label.clone());
-                loaded.learnt(&trained, weights, source, (sides, part), config)
-            }
-            Self::Anchored => {
-                let trained = anchored::train(source, sides, config, checkpoint, &epoch)?;
-                let weights = |of_vehicle: &_| trained.weights(of_vehicle, label.clone());
-                loaded.learnt(&trained, weights, source, (sides, part), config)
-            }
-        })
-    }
-
-    /// The settings that suit it.
-    pub fn settings(self, analytic: bool) -> Config {
-        match self {
-            Self::Anchored => Config::anchored(),
-            Self::Paper if analytic => Config::analytic(),
-            Self::Paper => Config::default(),
+impl From<Kind> for ModelKind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Anchored => Self::Anchored,
+            Kind::Paper => Self::Paper,
         }
     }
 }
@@ -188,128 +154,15 @@ pub enum Rule {
     Vehicle,
 }
 
-impl Rule {
-    /// With a share for those that have one, and a number of parts for the others.
-    pub fn by(self, share: f64, parts: usize) -> By {
-        match self {
-            Self::Case => By::Case { share },
-            Self::Sample => By::Sample { share },
-            Self::Folds => By::Folds { count: parts },
-            Self::Depth => By::Depth { bins: parts },
-            Self::Heading => By::Heading { bins: parts },
-            Self::Vehicle => By::Vehicle,
-        }
-    }
-}
-
-/// A data set with all that a training needs besides.
-pub struct Loaded {
-    /// What it is.
-    pub file: DataFile,
-    /// The bundles of its vehicles, by name, without the weights in place.
-    pub bundles: BTreeMap<String, Bundle>,
-    /// Its samples.
-    pub data: Dataset,
-    /// Ranges that the states were drawn from, where that is known.
-    pub domains: BTreeMap<String, Domain>,
-}
-
-impl Data {
-    /// True where loads by formula are learnt from.
-    pub fn is_analytic(&self) -> bool {
-        self.data == Path::new("analytic")
-    }
-
-    /// The settings that suit the data and what is learnt, and over them those of the file.
-    pub fn settings(&self, variant: Served) -> Result<Config> {
-        let suited = variant.settings(self.is_analytic());
-        let Some(path) = &self.config else { return Ok(suited) };
-        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        // as a whole first: its errors know their lines
-        let _: Config = toml::from_str(&text).with_context(|| path.display().to_string())?;
-        let mut whole = toml::Table::try_from(&suited)?;
-        lay_over(&mut whole, toml::from_str(&text)?);
-        whole.try_into().with_context(|| path.display().to_string())
-    }
-
-    /// Reads or generates the data set, and reads the bundles of its vehicles but for their weights.
-    pub fn load(&self, config: &Config, library: &Library) -> Result<Loaded> {
-        config.validate()?;
-        if self.is_analytic() { self.generate(config, library) } else { self.read(library) }
-    }
-
-    fn generate(&self, config: &Config, library: &Library) -> Result<Loaded> {
-        let tables = &config.analytic.tables;
-        let (known, unknown): (Vec<_>, Vec<_>) =
-            library.names()?.into_iter().partition(|name| tables.contains_key(name));
-        unknown
-            .iter()
-            .for_each(|name| eprintln!("{name}: left as it is, there is no parameter table for it"));
-        let bundles = bundles(library, known.iter())?;
-        let vehicles = bundles.iter().map(|(name, bundle)| (name.clone(), bundle.vehicle.clone())).collect();
-        let data = train::analytic::dataset(&vehicles, &config.analytic, config.seed)?;
-        let provenance = data.meta.provenance.clone();
-        let domains = known.iter().map(|name| (name.clone(), tables[name].domain())).collect();
-        let file = DataFile { name: "analytic".to_owned(), sha256: None, provenance };
-        Ok(Loaded { file, bundles, data, domains })
-    }
-
-    fn read(&self, library: &Library) -> Result<Loaded> {
-        let data = dataset::read(&self.data)?;
-        let sha256 = Some(sha256_of(&self.data).with_context(|| self.data.display().to_string())?);
-        // its folder is of this machine alone
-        let name = self.data.file_name().unwrap_or(self.data.as_os_str());
-        let (name, provenance) = (name.to_string_lossy().into_owned(), data.meta.provenance.clone());
-        let bundles = bundles(library, data.meta.vehicles.keys())?;
-        let file = DataFile { name, sha256, provenance };
-        Ok(Loaded { file, bundles, data, domains: BTreeMap::new() })
-    }
-}
-
-fn bundles<'a>(
-    library: &Library,
-    names: impl Iterator<Item = &'a String>,
-) -> Result<BTreeMap<String, Bundle>> {
-    names.map(|name| Ok((name.clone(), library.read_without_weights(name)?))).collect()
-}
-
-/// Lays what a table states over another, key by key.
-fn lay_over(under: &mut toml::Table, over: toml::Table) {
-    for (key, value) in over {
-        match (under.get_mut(&key), value) {
-            (Some(toml::Value::Table(under)), toml::Value::Table(over)) => lay_over(under, over),
-            (_, value) => {
-                under.insert(key, value);
-            }
-        }
-    }
-}
-
-impl Loaded {
-    /// The samples with their mirror images.
-    pub fn source(&self, config: &Config) -> Result<Source> {
-        let vehicles =
-            self.bundles.iter().map(|(name, bundle)| (name.clone(), bundle.vehicle.clone())).collect();
-        let source = Source::new(self.data.clone(), &vehicles, config.front_rear);
-        source.with_context(|| self.file.name.clone())
-    }
-
-    /// Weights of each vehicle with the ranges that their states were drawn from, and the record.
-    fn learnt<L>(
-        &self,
-        trained: &Trained<L>,
-        weights: impl Fn(&TrainedVehicle) -> Weights,
-        source: &Source,
-        (sides, part): (Sides<'_>, usize),
-        config: &Config,
-    ) -> Learnt {
-        let of = |of_vehicle: &TrainedVehicle| {
-            let domain = self.domains.get(&of_vehicle.name).copied().unwrap_or(of_vehicle.domain);
-            (of_vehicle.name.clone(), (weights(of_vehicle), domain))
-        };
-        Learnt {
-            weights: trained.vehicles.iter().map(of).collect(),
-            record: Record::new(trained, source, sides, part, self.file.clone(), (config, PROGRAM)),
+impl From<Rule> for SplitRule {
+    fn from(rule: Rule) -> Self {
+        match rule {
+            Rule::Case => Self::Case,
+            Rule::Sample => Self::Sample,
+            Rule::Folds => Self::Folds,
+            Rule::Depth => Self::Depth,
+            Rule::Heading => Self::Heading,
+            Rule::Vehicle => Self::Vehicle,
         }
     }
 }
@@ -317,57 +170,33 @@ impl Loaded {
 impl Train {
     /// Writes the next version of each bundle and the report.
     pub fn run(self) -> Result<ExitCode> {
-        let mut config = self.data.settings(self.variant)?;
+        let (data, kind) = (self.data.source(), ModelKind::from(self.variant));
+        let mut config = data.settings(kind, self.data.config.as_deref())?;
         config.epochs = self.epochs.unwrap_or(config.epochs);
         config.seed = self.seed.unwrap_or(config.seed);
         let library = self.data.vehicles.library_to_write()?;
-        let loaded = self.data.load(&config, &library)?;
-        let source = loaded.source(&config)?;
-        let by = self.split.by(config.held_out_share, config.parts);
-        let splits = split::split(&source.data, by, config.seed).with_context(|| loaded.file.name.clone())?;
-        let Some(split) = self.part.checked_sub(1).and_then(|index| splits.get(index)) else {
-            usage_error(&format!("--part must be 1 to {}: the split has no other part", splits.len()));
+        let training = Training {
+            data: &data,
+            kind,
+            config: &config,
+            split: self.split.into(),
+            part: self.part,
+            out: &self.out,
+            checkpoint: self.checkpoint.map(|path| Checkpoint { path, resume: self.resume }),
+            program: PROGRAM,
         };
-        // a long training is not to end in a folder that cannot be written
-        check_report_folder(&self.out)?;
-        std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
-        let names: Vec<&str> = loaded.bundles.keys().map(String::as_str).collect();
-        for (place, name) in library.targets(&names)?.iter().zip(names) {
-            bundle::check_place(place, name)?;
-        }
-        if let Some(path) = &self.checkpoint {
-            StagedFile::new(path).with_context(|| path.display().to_string())?;
-        }
-        let sides = Sides { split, by };
-        eprintln!("held out: {}; {} training samples", split.name, split.training.len());
-        let checkpoint =
-            self.checkpoint.as_ref().map(|path| Checkpoint { path: path.clone(), resume: self.resume });
-        let learnt =
-            self.variant.train(&loaded, &source, (sides, self.part), &config, checkpoint.as_ref())?;
-        let record = &learnt.record;
-        let mut next = Vec::with_capacity(record.vehicles.len());
-        for of_vehicle in &record.vehicles {
-            let name = &of_vehicle.name;
-            let (Some(bundle), Some(weights)) = (loaded.bundles.get(name), learnt.weights.get(name)) else {
-                bail!("{name}: there is no bundle of it");
-            };
-            // effects close the gap of the weights that they were fitted to
-            if bundle.effects.is_some() {
-                eprintln!("{name}: its effects are taken out with its former weights; run wade gap again");
-            }
-            let bundle = Bundle { trained: Some(weights.clone()), effects: None, ..bundle.clone() };
-            next.push(bundle);
-        }
-        let placed = library.succeed_together(next)?;
-        for (of_vehicle, (place, version)) in record.vehicles.iter().zip(placed) {
+        let progress = Progress::default();
+        let Written { record, bundles } =
+            training.run(&library, &|event| progress.hear(event)).map_err(|error| match error {
+                WorkflowError::Part { parts, .. } => {
+                    usage_error(&format!("--part must be 1 to {parts}: the split has no other part"))
+                }
+                error => error,
+            })?;
+        for (of_vehicle, (place, version)) in record.vehicles.iter().zip(bundles) {
             report(of_vehicle, record.judged(), version);
             println!("  written to {}", place.display());
             self.running.reload(&of_vehicle.name, &place);
-        }
-        // the last of all: who finds it finds the weights that it is about
-        record.write(&self.out)?;
-        if let Some(checkpoint) = &checkpoint {
-            checkpoint.remove().with_context(|| checkpoint.path.display().to_string())?;
         }
         let time = record.epoch_s.map_or_else(String::new, |s| format!(", {s:.3} s each"));
         println!("{} epochs{time}; weights of epoch {}", record.history.len(), record.kept_epoch);
@@ -376,45 +205,69 @@ impl Train {
     }
 }
 
-/// A bar on a terminal, a line now and then elsewhere.
-pub struct Progress {
+/// Shows what a training says: a bar on a terminal, a line now and then elsewhere.
+#[derive(Default)]
+pub struct Progress(RefCell<Option<Epochs>>);
+
+impl Progress {
+    /// Shows an event.
+    pub fn hear(&self, event: Event<'_>) {
+        match event {
+            Event::NoTable { vehicle } => {
+                eprintln!("{vehicle}: left as it is, there is no parameter table for it");
+            }
+            Event::Begins { model, held_out, samples, epochs } => {
+                eprintln!("training {model}, held out: {held_out}; {samples} training samples");
+                *self.0.borrow_mut() = Some(Epochs::new(epochs));
+            }
+            Event::Epoch(epoch) => {
+                if let Some(epochs) = self.0.borrow_mut().as_mut() {
+                    epochs.show(epoch);
+                }
+            }
+            Event::EffectsRemoved { vehicle } => {
+                eprintln!("{vehicle}: its effects are taken out with its former weights; run wade gap again");
+            }
+        }
+    }
+}
+
+/// The epochs of one training.
+struct Epochs {
     bar: ProgressBar,
     begun: Instant,
-    spoken: Cell<Duration>,
-    first: Cell<Option<u32>>,
+    spoken: Duration,
+    first: Option<u32>,
     epochs: u32,
 }
 
 /// Seconds between two lines where there is no terminal.
 const LINE_S: u64 = 30;
 
-impl Progress {
-    /// Begins to count.
-    pub fn new(epochs: u32) -> Result<Self> {
+impl Epochs {
+    fn new(epochs: u32) -> Self {
         let bar = ProgressBar::new(epochs.into());
-        bar.set_style(ProgressStyle::with_template("{wide_bar} {pos}/{len} epochs, {eta} left, {msg}")?);
-        let (begun, spoken) = (Instant::now(), Cell::new(Duration::ZERO));
-        Ok(Self { bar, begun, spoken, first: Cell::new(None), epochs })
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} epochs, {eta} left, {msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, begun: Instant::now(), spoken: Duration::ZERO, first: None, epochs }
     }
 
-    /// Takes note of an epoch.
-    pub fn epoch(&self, epoch: &Epoch) {
-        let text = said(epoch);
+    fn show(&mut self, epoch: &Epoch) {
         // a run that goes on from a checkpoint has not spent the time of the epochs before
-        let first = self.first.get().unwrap_or_else(|| {
+        let first = *self.first.get_or_insert_with(|| {
             self.bar.set_position(u64::from(epoch.number - 1));
             self.bar.reset_eta();
             epoch.number
         });
-        self.first.set(Some(first));
         self.bar.set_position(epoch.number.into());
         let elapsed = self.begun.elapsed();
-        if !std::io::stderr().is_terminal() && elapsed - self.spoken.get() >= Duration::from_secs(LINE_S) {
-            self.spoken.set(elapsed);
+        if !std::io::stderr().is_terminal() && elapsed - self.spoken >= Duration::from_secs(LINE_S) {
+            self.spoken = elapsed;
             let each = elapsed.as_secs_f64() / f64::from(epoch.number - first + 1);
             eprintln!("{}", line(epoch, self.epochs, each));
         }
-        self.bar.set_message(text);
+        self.bar.set_message(said(epoch));
     }
 }
 

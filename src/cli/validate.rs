@@ -8,7 +8,7 @@ use clap::{ArgGroup, Args};
 use wade_core::model::Model;
 use wade_learn::recordings::{Recordings, generated, trials_from_recordings};
 use wade_learn::trials::Trials;
-use wade_learn::validate::{self, Config, OutFolder, Report, Source, Subject};
+use wade_learn::validate::{self, About, Config, OutFolder, Report, Source, Subject};
 
 use super::{Vehicles, emit};
 
@@ -93,7 +93,8 @@ impl Validate {
         trials.remarks().iter().for_each(|remark| eprintln!("{remark}"));
         let mut predict = validate::predictor(&model);
         let tests = validate::run(&trials, model.vehicle(), &config, &mut predict)?;
-        let report = Report::new(tests, &trials, source, Subject::new(&model), &config, env!("WADE_COMMIT"));
+        let (subject, commit) = (Subject::new(&model), env!("WADE_COMMIT"));
+        let report = Report::new(tests, &trials, About { source, subject, config: &config, commit });
         let json = serde_json::to_string_pretty(&report)? + "\n";
         folder.place(&json, &report.page()?)?;
         emit(&if self.json { json } else { self.summary(&report) })?;

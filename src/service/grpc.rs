@@ -343,8 +343,8 @@ impl Server {
         let serve = |socket, connection: Arc<Connection>, place| {
             let link = link::Link::new(socket, Arc::clone(&connection), frames);
             let calls = calls::Calls { routes: routes.clone(), connection, rules: Arc::clone(&rules) };
-            let serving =
-                serving::serve(http.clone(), link, calls, self.turnstile.turns(), deadlines, stop.clone());
+            let accepted = serving::Accepted { link, calls, turns: self.turnstile.turns() };
+            let serving = serving::serve(http.clone(), accepted, deadlines, stop.clone());
             let open = open.clone();
             tokio::spawn(async move {
                 serving.await;

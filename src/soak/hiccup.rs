@@ -78,17 +78,27 @@ pub(super) fn prepare(deadlines: Deadlines, end: u64) -> Vec<Overshoot> {
     overshoots
 }
 
-/// Sleeps from deadline to deadline until `end` [ns] or until told to stop.
+/// What is watched.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Watch {
+    /// When to wake.
+    pub deadlines: Deadlines,
+    /// When to end [ns].
+    pub end: u64,
+    /// Which core.
+    pub core: Option<usize>,
+}
+
+/// Sleeps from deadline to deadline until the end or until told to stop.
 ///
 /// A stall over several deadlines counts for each of them, as it would for requests.
 pub(super) fn watch(
     clock: &impl Clock,
-    deadlines: Deadlines,
-    end: u64,
-    core: Option<usize>,
+    watch: Watch,
     mut overshoots: Vec<Overshoot>,
     stop: &AtomicBool,
 ) -> Hiccups {
+    let Watch { deadlines, end, core } = watch;
     let core = core.filter(|&core| cores::pin_to(&[core]).is_ok());
     // by default the kernel may delay a sleep by 50 us to save wake-ups; where it refuses, the median shows it
     let _ = prctl::set_timerslack(1);
@@ -139,7 +149,8 @@ mod tests {
         clock.pass(35_000_000);
         let deadlines = Deadlines { period_ns: PERIOD_NS, offset_ns: 0.0 };
         let memory = prepare(deadlines, 100_000_000);
-        let hiccups = watch(&clock, deadlines, 100_000_000, None, memory, &AtomicBool::new(false));
+        let control = Watch { deadlines, end: 100_000_000, core: None };
+        let hiccups = watch(&clock, control, memory, &AtomicBool::new(false));
         let long: Vec<_> = hiccups.overshoots.iter().map(|o| o.late / 1_000_000).take(5).collect();
         assert_eq!(long, [35, 25, 15, 5, 0]);
         assert_eq!(hiccups.overshoots.len(), 10);

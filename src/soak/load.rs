@@ -183,8 +183,10 @@ impl Prepared {
         let end = (config.warm_up + config.duration).as_nanos() as u64;
         let (memory, stop) = (hiccup::prepare(deadlines, end), AtomicBool::new(false));
         thread::scope(|scope| {
-            let control =
-                scope.spawn(|| hiccup::watch(&clock, deadlines, end, config.control_core, memory, &stop));
+            let control = scope.spawn(|| {
+                let control = hiccup::Watch { deadlines, end, core: config.control_core };
+                hiccup::watch(&clock, control, memory, &stop)
+            });
             let stop_on_drop = StopOnDrop(&stop);
             let recording = load(recording);
             drop(stop_on_drop);

@@ -12,7 +12,7 @@ use wade_gap_bench::generate::{gap, generate, predicted};
 use wade_gap_bench::hidden::{Effect, Hidden};
 use wade_gap_bench::real::{kvlcc2, rm2_rotor};
 use wade_gap_bench::score::{Judged, rows};
-use wade_gap_bench::{Hull, NoiseKind, Prediction, Schedule, Simulator, Tool, folder, run};
+use wade_gap_bench::{Hull, NoiseKind, Prediction, Schedule, Setup, Simulator, Tool, folder, run};
 use wade_learn::trials::Trials;
 
 fn schedule() -> Schedule {
@@ -157,7 +157,7 @@ fn a_slice_of_the_benchmark_scores_an_oracle_and_the_baselines() {
     let sparse = |trials: &Trials| Method::ThresholdedSparse.answer(trials, &simulator);
     let best = |trials: &Trials| Method::BestR2.answer(trials, &simulator);
     let tools: [(&str, &Tool); 3] = [("silent", &silent), ("sparse", &sparse), ("best", &best)];
-    let outcomes = run(&all, &schedule(), simulator, &tools, 6, &mut |_| ());
+    let outcomes = run(&all, Setup { schedule: &schedule(), simulator, invariance: 6 }, &tools, &mut |_| ());
     let value = |tool: usize, measure: &str| {
         rows(&outcomes[tool].judged).into_iter().find(|row| row.measure.contains(measure)).unwrap().value
     };
@@ -184,7 +184,11 @@ fn the_workflow_keeps_silent_on_noise_and_names_what_is_hidden() {
     let hidden = [Effect::WaterLevelOffset, Effect::SensorBias, Effect::HullFlooding];
     all.extend(hidden.map(|effect| single(effect, 3.0)));
     let tools: [(&str, &Tool); 1] = [("workflow", &workflow)];
-    let outcome = run(&all, &schedule(), box_simulator(&hull), &tools, 0, &mut |_| ()).remove(0);
+    let outcome = {
+        let setup = Setup { schedule: &schedule(), simulator: box_simulator(&hull), invariance: 0 };
+        run(&all, setup, &tools, &mut |_| ())
+    }
+    .remove(0);
     let value = |measure: &str| {
         rows(&outcome.judged).into_iter().find(|row| row.measure.contains(measure)).unwrap().value
     };

@@ -39,6 +39,7 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
             &["dataset", "recordings", "trials"],
             &["cfd", "train", "validate"],
             &["evaluate"],
+            &["workflow"],
         ],
     ),
     ("src", &[&["cores", "states"], &["engine", "metrics"], &["service", "soak"], &["config"], &["server"]]),

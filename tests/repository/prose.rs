@@ -170,10 +170,10 @@ fn dialect_is_counted() {
     assert_eq!(dialect("Taught anew: it hangs\n// together. Heater, tolda, door-step"), 4);
 }
 
-/// Where a file is counted: a folder below src, or a folder at the root.
+/// Where a file is counted: a crate, a folder below src, or a folder at the root.
 fn folder(path: &Path) -> String {
     let parts: Vec<&str> = path.iter().filter_map(|part| part.to_str()).collect();
-    let depth = if parts[0] == "src" && parts.len() > 2 { 2 } else { 1 };
+    let depth = if ["src", "crates"].contains(&parts[0]) && parts.len() > 2 { 2 } else { 1 };
     parts[..depth].join("/")
 }
 
@@ -182,13 +182,24 @@ fn folder(path: &Path) -> String {
 fn results_of_counting_dialect_do_not_rise() {
     const COUNTS: &str = "tests/repository/dialect.toml";
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    let prefixes =
-        ["src/", "docs/", "README.md", "clients/", "deploy/", "proto/", "campaigns/README.md", ".github/"];
+    let prefixes = [
+        "src/",
+        "crates/",
+        "docs/",
+        "README.md",
+        "clients/",
+        "deploy/",
+        "proto/",
+        "campaigns/README.md",
+        ".github/",
+    ];
     let kinds = ["rs", "md", "proto", "toml", "py", "h", "hpp", "cpp", "js", "html", "cs"];
     for path in files() {
         let name = path.to_string_lossy();
         let is_text = path.extension().is_some_and(|kind| kinds.iter().any(|known| kind == *known));
-        if is_text && prefixes.iter().any(|prefix| name.starts_with(prefix)) {
+        // tests of a crate were counted nowhere
+        let is_test = name.starts_with("crates/") && name.contains("/tests/");
+        if is_text && !is_test && prefixes.iter().any(|prefix| name.starts_with(prefix)) {
             *counts.entry(folder(&path)).or_default() += dialect(&text(&path));
         }
     }

@@ -3,6 +3,15 @@
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
+/// The time that one call may take.
+#[derive(Debug, Clone, Copy)]
+pub struct Budget {
+    /// When the call began.
+    pub start: Instant,
+    /// When it must return.
+    pub deadline: Instant,
+}
+
 /// Tries between two looks at the clock; whoever holds a lock for a copy is done by then.
 const TRIES: u32 = 100;
 /// Longest sleep between tries: whoever holds a lock for a question keeps it for tens of microseconds at least.

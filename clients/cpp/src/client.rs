@@ -8,6 +8,7 @@ use wade_wire::InvalidState;
 use wade_wire::shm::Wait;
 
 use crate::abi::{WADE_MAX_BATCH, WADE_NEVER, WadeBatch, WadeForces, WadeState, WadeStatus};
+use crate::bounded::Budget;
 use crate::connection::Connection;
 use crate::convert::checked;
 use crate::grpc::Grpc;
@@ -59,8 +60,7 @@ impl WadeClient {
 
     /// The forces in a state, or the last ones.
     pub fn evaluate(&self, state: &WadeState, budget_ns: u64, forces: &mut WadeForces) -> WadeStatus {
-        let start = Instant::now();
-        let deadline = start + Duration::from_nanos(budget_ns).min(DAY);
+        let budget = budget(budget_ns);
         let valid = match checked(state) {
             Ok(valid) => valid,
             Err(invalid) => {
@@ -70,8 +70,8 @@ impl WadeClient {
             }
         };
         match &self.transport {
-            Transport::Shm(client) => client.evaluate(&valid, state.session, start, deadline, forces),
-            Transport::Grpc(client) => client.evaluate(&valid, state.session, start, deadline, forces),
+            Transport::Shm(client) => client.evaluate(&valid, state.session, budget, forces),
+            Transport::Grpc(client) => client.evaluate(&valid, state.session, budget, forces),
         }
     }
 
@@ -83,8 +83,7 @@ impl WadeClient {
         forces: &mut [WadeForces],
         batch: &mut WadeBatch,
     ) -> WadeStatus {
-        let start = Instant::now();
-        let deadline = start + Duration::from_nanos(budget_ns).min(DAY);
+        let budget = budget(budget_ns);
         *batch = WadeBatch::default();
         if states.is_empty() || states.len() > self.max_batch {
             return WadeStatus::InvalidArgument;
@@ -93,12 +92,12 @@ impl WadeClient {
             states.iter().enumerate().find_map(|(index, state)| Some((index, checked(state).err()?)));
         let status = match (invalid, &self.transport) {
             (Some((index, invalid)), _) => batch.blame(index, invalid),
-            (None, Transport::Shm(client)) => client.evaluate_batch(states, start, deadline, forces),
-            (None, Transport::Grpc(client)) => client.evaluate_batch(states, start, deadline, forces),
+            (None, Transport::Shm(client)) => client.evaluate_batch(states, budget, forces),
+            (None, Transport::Grpc(client)) => client.evaluate_batch(states, budget, forces),
         };
-        if let Some(mut asked) = crate::bounded::lock_until(&self.batch_asked, deadline) {
+        if let Some(mut asked) = crate::bounded::lock_until(&self.batch_asked, budget.deadline) {
             if status == WadeStatus::Ok {
-                *asked = Some(start);
+                *asked = Some(budget.start);
             }
             batch.age_ns = asked.map_or(WADE_NEVER, nanoseconds_since);
         }
@@ -112,6 +111,12 @@ impl WadeClient {
             Transport::Grpc(client) => client.close(),
         }
     }
+}
+
+/// The budget of a call that begins now.
+fn budget(budget_ns: u64) -> Budget {
+    let start = Instant::now();
+    Budget { start, deadline: start + Duration::from_nanos(budget_ns).min(DAY) }
 }
 
 impl Default for WadeBatch {

@@ -8,7 +8,7 @@ use wade_client::{ClientError, GrpcLink, Reply, replies};
 use wade_wire::State;
 
 use crate::abi::{WADE_SESSION_BEGINS, WadeForces, WadeState, WadeStatus};
-use crate::bounded::{lock, lock_until};
+use crate::bounded::{Budget, lock, lock_until};
 use crate::connection::{RETRY, status_of};
 use crate::event::Event;
 use crate::known::Known;
@@ -115,15 +115,14 @@ impl Grpc {
         &self,
         state: &State,
         session: u64,
-        start: Instant,
-        deadline: Instant,
+        budget: Budget,
         forces: &mut WadeForces,
     ) -> WadeStatus {
         let shared = &*self.shared;
-        let mut turn = lock_until(&shared.turn, deadline);
+        let mut turn = lock_until(&shared.turn, budget.deadline);
         let status = match &mut turn {
             None => WadeStatus::Timeout,
-            Some(turn) => shared.evaluate(turn, state, session, start, deadline),
+            Some(turn) => shared.evaluate(turn, state, session, budget),
         };
         // while it is still this thread's turn, so that no other's answer comes between
         shared.known.last.get(forces);
@@ -135,30 +134,29 @@ impl Grpc {
     pub fn evaluate_batch(
         &self,
         states: &[WadeState],
-        start: Instant,
-        deadline: Instant,
+        budget: Budget,
         forces: &mut [WadeForces],
     ) -> WadeStatus {
         let shared = &*self.shared;
-        let Some(mut turn) = lock_until(&shared.turn, deadline) else { return WadeStatus::Timeout };
+        let Some(mut turn) = lock_until(&shared.turn, budget.deadline) else { return WadeStatus::Timeout };
         let status = shared.known.connection.status();
         if status != WadeStatus::Ok {
             return status;
         }
         // the worker reads the states of an open batch
-        if !shared.free(&mut turn, deadline) {
+        if !shared.free(&mut turn, budget.deadline) {
             return WadeStatus::Timeout;
         }
-        let Some(mut batch) = lock_until(&shared.batch, deadline) else { return WadeStatus::Timeout };
+        let Some(mut batch) = lock_until(&shared.batch, budget.deadline) else { return WadeStatus::Timeout };
         batch.states.clear();
         batch.states.extend(states.iter().map(State::from));
         drop(batch);
-        let status = shared.ask(&mut turn, What::Batch, start, deadline);
+        let status = shared.ask(&mut turn, What::Batch, budget);
         if status != WadeStatus::Ok {
             return status;
         }
-        let Some(batch) = lock_until(&shared.batch, deadline) else { return WadeStatus::Timeout };
-        WadeForces::copy_batch(&batch.forces, start, forces);
+        let Some(batch) = lock_until(&shared.batch, budget.deadline) else { return WadeStatus::Timeout };
+        WadeForces::copy_batch(&batch.forces, budget.start, forces);
         WadeStatus::Ok
     }
 
@@ -171,14 +169,7 @@ impl Grpc {
 }
 
 impl Shared {
-    fn evaluate(
-        &self,
-        turn: &mut Turn,
-        state: &State,
-        session: u64,
-        start: Instant,
-        deadline: Instant,
-    ) -> WadeStatus {
+    fn evaluate(&self, turn: &mut Turn, state: &State, session: u64, budget: Budget) -> WadeStatus {
         let status = self.known.connection.status();
         if status != WadeStatus::Ok {
             // what was remembered is lost with the connection
@@ -187,7 +178,7 @@ impl Shared {
         }
         let time_step = turn.skipped.step(session, state.time_step);
         let what = What::State { state: State { time_step, ..*state }, session };
-        self.ask(turn, what, start, deadline)
+        self.ask(turn, what, budget)
     }
 
     /// Waits until the question of an earlier call is answered; false where it is not until the deadline.
@@ -201,7 +192,8 @@ impl Shared {
         true
     }
 
-    fn ask(&self, turn: &mut Turn, what: What, at: Instant, deadline: Instant) -> WadeStatus {
+    fn ask(&self, turn: &mut Turn, what: What, budget: Budget) -> WadeStatus {
+        let Budget { start: at, deadline } = budget;
         if !self.free(turn, deadline) {
             return WadeStatus::Timeout;
         }

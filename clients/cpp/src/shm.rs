@@ -11,7 +11,7 @@ use wade_wire::shm::Wait;
 use wade_wire::shm::layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
 
 use crate::abi::{WadeForces, WadeState, WadeStatus};
-use crate::bounded::{lock, lock_until};
+use crate::bounded::{Budget, lock, lock_until};
 use crate::connection::RETRY;
 use crate::convert::{answered, refused};
 use crate::known::Known;
@@ -87,17 +87,16 @@ impl Shm {
         &self,
         state: &State,
         session: u64,
-        start: Instant,
-        deadline: Instant,
+        budget: Budget,
         forces: &mut WadeForces,
     ) -> WadeStatus {
-        let turn = lock_until(&self.shared.turn, deadline);
+        let turn = lock_until(&self.shared.turn, budget.deadline);
         let Some(mut turn) = turn else {
             self.shared.known.last.get(forces);
             return WadeStatus::Timeout;
         };
         let query = Query { session, ..Query::from(state) };
-        let status = turn.evaluate(&self.shared, query, start, deadline);
+        let status = turn.evaluate(&self.shared, query, budget);
         self.wake_keeper(&turn);
         // while it is still this thread's turn, so that no other's answer comes between
         self.shared.known.last.get(forces);
@@ -108,17 +107,16 @@ impl Shm {
     pub fn evaluate_batch(
         &self,
         states: &[WadeState],
-        start: Instant,
-        deadline: Instant,
+        budget: Budget,
         forces: &mut [WadeForces],
     ) -> WadeStatus {
-        let Some(mut turn) = lock_until(&self.shared.turn, deadline) else {
+        let Some(mut turn) = lock_until(&self.shared.turn, budget.deadline) else {
             return WadeStatus::Timeout;
         };
-        let status = turn.evaluate_batch(&self.shared, states, deadline);
+        let status = turn.evaluate_batch(&self.shared, states, budget.deadline);
         self.wake_keeper(&turn);
         if status == WadeStatus::Ok {
-            WadeForces::copy_batch(&turn.batch, start, forces);
+            WadeForces::copy_batch(&turn.batch, budget.start, forces);
         }
         status
     }
@@ -138,7 +136,8 @@ impl Shm {
 }
 
 impl Turn {
-    fn evaluate(&mut self, shared: &Shared, query: Query, start: Instant, deadline: Instant) -> WadeStatus {
+    fn evaluate(&mut self, shared: &Shared, query: Query, budget: Budget) -> WadeStatus {
+        let Budget { start, deadline } = budget;
         let Some(link) = &mut self.link else { return shared.why_not() };
         let query = Query { time_step_s: self.skipped.step(query.session, query.time_step_s), ..query };
         if let Some(open) = &self.open {

@@ -273,8 +273,9 @@ impl Anchor {
         out.global = flow.global(vehicle, condition);
         out.coordinates = self.coordinates(&flow, condition);
         out.surfaces.clear();
+        let surroundings = Surroundings { vehicle, condition, flow: &flow };
         for (index, (surface, wetting)) in self.surfaces.iter().zip(&out.wetting).enumerate() {
-            let mut reading = self.surface(vehicle, surface, wetting, condition, &flow);
+            let mut reading = self.surface(&surroundings, surface, wetting);
             if reading.wet_fraction == 0.0 {
                 reading.center = vehicle.surfaces[index].centroid;
             }
@@ -310,12 +311,11 @@ impl Anchor {
 
     fn surface(
         &self,
-        vehicle: &Vehicle,
+        state: &Surroundings<'_>,
         surface: &AnchorSurface,
         wetting: &Wetting,
-        condition: &Condition,
-        flow: &Flow,
     ) -> SurfaceReading {
+        let Surroundings { vehicle, condition, flow } = *state;
         let Some(center) = wetting.centroid() else { return SurfaceReading::default() };
         let (length, width, height) =
             (vehicle.dimensions.length, vehicle.dimensions.width, vehicle.dimensions.height);
@@ -400,6 +400,13 @@ fn bounded(x: f64) -> f64 {
 
 fn density_times_gravity(condition: &Condition) -> f64 {
     condition.density * GRAVITY
+}
+
+/// What every surface of a vehicle is read in.
+struct Surroundings<'a> {
+    vehicle: &'a Vehicle,
+    condition: &'a Condition,
+    flow: &'a Flow,
 }
 
 /// The motion through the water.

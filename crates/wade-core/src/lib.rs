@@ -28,3 +28,8 @@ pub mod features;
 pub mod bundle;
 pub mod model;
 pub mod served;
+
+/// The example of the README compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -14,6 +14,8 @@ pub struct Loads {
     pub effects: EffectLoads,
     /// The model at the edge of the box of the effects.
     edge: Forces,
+    /// Buffers of the model.
+    workspace: Workspace,
 }
 
 /// One version of a bundle, ready to answer.
@@ -58,10 +60,9 @@ impl ServedVehicle {
         condition: &Condition,
         circumstances: &Circumstances,
         session: Option<&mut Session>,
-        workspace: &mut Workspace,
         loads: &mut Loads,
     ) {
-        let Loads { forces, effects: added, edge } = loads;
+        let Loads { forces, effects: added, edge, workspace } = loads;
         self.model.evaluate(condition, workspace, forces);
         match &self.effects {
             Some(effects) => {

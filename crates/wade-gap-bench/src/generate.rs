@@ -72,7 +72,7 @@ pub fn generate(case: &Case, schedule: &Schedule, simulator: Simulator) -> Gener
     let seen = at(scale);
     let hidden = scene.hide(&seen.floor);
     let changes = scene.changes(&hidden);
-    scene.trials(seen, hidden, changes, scale, &mut noise_seed.clone())
+    scene.trials(seen, hidden, changes, &mut noise_seed.clone())
 }
 
 /// All that does not depend on the instruments.
@@ -91,6 +91,16 @@ struct Seen {
     predicted: Vec<Vec<Wrench6>>,
     noise: Vec<Vec<Wrench6>>,
     floor: Wrench6,
+    /// Of the instruments to those of the noise's standard.
+    scale: f64,
+}
+
+/// What the instruments say of the samples of a trial that are kept.
+struct Readings {
+    kept: Vec<usize>,
+    wrench: Vec<Wrench6>,
+    /// Force of the drive [N], where the wrench is inferred.
+    drive: Option<Vec<f64>>,
 }
 
 impl Scene<'_> {
@@ -119,7 +129,7 @@ impl Scene<'_> {
             exact.iter().zip(predicted).zip(known).zip(noise).map(|(((e, p), k), n)| e - p - k + n)
         });
         let floor = root_mean_square(gaps);
-        Seen { tracks, predicted, noise, floor }
+        Seen { tracks, predicted, noise, floor, scale }
     }
 
     /// How much better or worse than stated the instruments are, so that the hidden effects are about as strong as they
@@ -191,9 +201,9 @@ impl Scene<'_> {
         seen: Seen,
         hidden: Vec<Hidden>,
         changes: Vec<Vec<Vec<Wrench6>>>,
-        scale: f64,
         random: &mut Random,
     ) -> Generated {
+        let scale = seen.scale;
         let strengths = changes.iter().map(|change| strength(change, &seen.floor, &self.measured)).collect();
         let manifest = self.manifest(scale);
         let mut trials = Vec::new();
@@ -222,12 +232,12 @@ impl Scene<'_> {
                 kept.iter().map(|&i| mass * track.states[i].acceleration.x - clean(i)[0]).collect()
             });
             let (recorded, predicted) = (&seen.tracks[index], &seen.predicted[index]);
-            trials.push(self.trial(recorded, predicted, &kept, &wrench, drive));
             let rates = depth_rate(track);
             truth.depth_rate.push(kept.iter().map(|&i| rates[i]).collect());
             truth.states.push(kept.iter().map(|&i| track.states[i]).collect());
             let change = |i: usize| changes.iter().map(|change| change[index][i]).sum();
             truth.change.push(kept.iter().map(|&i| change(i)).collect());
+            trials.push(self.trial(recorded, predicted, Readings { kept, wrench, drive }));
         }
         truth.closure = closure(&trials, &truth, &self.setting.simulator);
         Generated { trials: Trials { manifest, trials }, truth }
@@ -286,14 +296,8 @@ impl Scene<'_> {
         }
     }
 
-    fn trial(
-        &self,
-        track: &Track,
-        predicted: &[Wrench6],
-        kept: &[usize],
-        wrench: &[Wrench6],
-        drive: Option<Vec<f64>>,
-    ) -> Trial {
+    fn trial(&self, track: &Track, predicted: &[Wrench6], readings: Readings) -> Trial {
+        let Readings { kept, wrench, drive } = readings;
         let of = |value: &dyn Fn(&State) -> f64| -> Vec<f64> {
             kept.iter().map(|&i| value(&track.states[i])).collect()
         };

@@ -34,7 +34,7 @@ mod track;
 pub use hull::Hull;
 pub use noise::{Gaussian, NoiseKind};
 pub use region::{Feature, Region};
-pub use run::{Outcome, Progress, Tool, ToolError, command_tool, run};
+pub use run::{Outcome, Progress, Setup, Tool, ToolError, command_tool, run};
 pub use schedule::{Plan, Schedule};
 pub use simulator::{Prediction, Simulator};
 pub use track::{State, Track};

@@ -59,16 +59,26 @@ pub struct Outcome {
     pub same_when_mirrored: [usize; 2],
 }
 
+/// What holds for all cases.
+#[derive(Clone, Copy)]
+pub struct Setup<'a> {
+    /// The trials.
+    pub schedule: &'a Schedule,
+    /// What predicts them.
+    pub simulator: Simulator<'a>,
+    /// Every how many cases the tools are asked again with trials shuffled and mirrored; 0 for never.
+    pub invariance: usize,
+}
+
 /// Runs every tool on every case; every `invariance`-th one that is not for timing is asked again with its trials shuffled
 /// and mirrored, none where that is 0.
 pub fn run(
     cases: &[Case],
-    schedule: &Schedule,
-    simulator: Simulator,
+    setup: Setup<'_>,
     tools: &[(&str, &Tool)],
-    invariance: usize,
     progress: &mut dyn FnMut(Progress),
 ) -> Vec<Outcome> {
+    let Setup { schedule, simulator, invariance } = setup;
     let fine = schedule.of_thousand_samples();
     let mut outcomes = vec![Outcome::default(); tools.len()];
     for (index, case) in cases.iter().enumerate() {

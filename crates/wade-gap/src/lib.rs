@@ -10,6 +10,11 @@
 //! `general` and `lasting` (structure without a name), `features`, `gated`, `locate` and `carriers` (where), `verdict`, `fit`, `holdout`,
 //! `detect` (what would have shown), `experiment`, `report`, `compose`, `sentences`, `page` and `effects_file`; `run` calls them.
 
+#![allow(
+    clippy::too_many_arguments,
+    reason = "moved as it was: the rebuild of the workflow gives these their types"
+)]
+
 mod base_drag;
 mod calibrate;
 mod candidates;

@@ -2,7 +2,8 @@
 //!
 //! Modules in reading order; each uses only those above it: tools ([`files`], [`page`], [`random`], [`signal`]), what is given
 //! ([`published`] figures, [`parameter_table`]), what is read and generated ([`dataset`], [`trials`], [`recordings`]), where the data come from ([`cfd`]), what trains on them ([`train`]), judges by held-out cases
-//! ([`evaluate`]) and by measured motion ([`validate`]).
+//! ([`evaluate`]) and by measured motion ([`validate`]); all of it from files to files in
+//! [`workflow`].
 
 pub mod files;
 pub mod page;
@@ -20,3 +21,5 @@ pub mod cfd;
 pub mod evaluate;
 pub mod train;
 pub mod validate;
+
+pub mod workflow;

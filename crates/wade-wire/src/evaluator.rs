@@ -5,13 +5,11 @@ use std::time::Instant;
 use super::state::{InvalidState, State};
 use wade_core::effects::{EffectLoads, Session};
 use wade_core::forces::Forces;
-use wade_core::model::Workspace;
 use wade_core::served::{Loads, ServedVehicle};
 
 /// What every transport does between its checks and its answer. Owned by one thread.
 #[derive(Debug, Default)]
 pub struct Evaluator {
-    workspace: Workspace,
     loads: Loads,
 }
 
@@ -37,7 +35,7 @@ impl Evaluator {
         let condition = state.check()?;
         let circumstances = state.circumstances()?;
         let start = Instant::now();
-        vehicle.evaluate(&condition, &circumstances, session, &mut self.workspace, &mut self.loads);
+        vehicle.evaluate(&condition, &circumstances, session, &mut self.loads);
         let Loads { forces, effects, .. } = &self.loads;
         Ok(Evaluated { forces, effects, compute_ns: nanoseconds_since(start) })
     }

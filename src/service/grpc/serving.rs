@@ -92,15 +92,24 @@ fn broke_protocol(error: &hyper::Error) -> bool {
     cause.is_some_and(h2::Error::is_library)
 }
 
+/// A connection that was accepted.
+pub struct Accepted {
+    /// Its bytes.
+    pub link: Link,
+    /// Its calls.
+    pub calls: Calls,
+    /// Its turns among the others.
+    pub turns: Turns,
+}
+
 /// Serves one connection until it ends, is to be closed, or the server drains and its calls are answered.
 pub async fn serve(
     http: http2::Builder<TokioExecutor>,
-    link: Link,
-    calls: Calls,
-    mut turns: Turns,
+    accepted: Accepted,
     deadlines: Deadlines,
     stop: watch::Receiver<bool>,
 ) {
+    let Accepted { link, calls, mut turns } = accepted;
     let connection = Arc::clone(&calls.connection);
     let mut served = std::pin::pin!(http.serve_connection(TokioIo::new(link), calls));
     let mut stop = std::pin::pin!(stopped(stop));

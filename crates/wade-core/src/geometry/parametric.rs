@@ -125,8 +125,22 @@ pub fn cylinder(center: &Vec3, radius: f64, width: f64, facets: u32) -> Mesh {
     revolve(center, &[(-half, 0.0), (-half, radius), (half, radius), (half, 0.0)], facets)
 }
 
+/// Sizes of a tire [m].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tire {
+    /// Radius of the tread.
+    pub radius: f64,
+    /// Width of the tire.
+    pub width: f64,
+    /// Width of the tread.
+    pub tread: f64,
+    /// By how much the radius of the sides is smaller.
+    pub shoulder: f64,
+}
+
 /// A tire: a cylinder whose tread of full radius is narrower than the tire, with conical shoulders.
-pub fn tire(center: &Vec3, radius: f64, width: f64, tread: f64, shoulder: f64, facets: u32) -> Mesh {
+pub fn tire(center: &Vec3, tire: Tire, facets: u32) -> Mesh {
+    let Tire { radius, width, tread, shoulder } = tire;
     let (half, flat, edge) = (0.5 * width, 0.5 * tread, radius - shoulder);
     let profile = [(-half, 0.0), (-half, edge), (-flat, radius), (flat, radius), (half, edge), (half, 0.0)];
     revolve(center, &profile, facets)

@@ -110,7 +110,7 @@ fn closed(mesh: Mesh, spec: &VehicleSpec, sealed: bool) -> Result<(Mesh, Option<
     }
 }
 
-/// Centerd on the bounding box, and rounded as the bundle's STL stores it: what is built is what is loaded.
+/// Centered on the bounding box, and rounded as the bundle's STL stores it: what is built is what is loaded.
 fn centered(mut mesh: Mesh) -> Result<(Mesh, Vec3), BuildError> {
     let center = mesh.bounds().ok_or(LeakError::Empty)?.center();
     mesh.vertices.iter_mut().for_each(|v| *v -= center);

@@ -114,7 +114,7 @@ pub struct Vehicle {
     pub center_of_mass: Vec3,
     /// How the coordinates of the STL became the body frame's.
     pub body_from_stl: BodyFromStl,
-    /// What was added after scale and axes, so that the hull is centerd [m].
+    /// What was added after scale and axes, so that the hull is centered [m].
     pub translation: Vec3,
     /// True when left and right are mirror images, checked at the build.
     pub symmetric_left_right: bool,

@@ -8,7 +8,7 @@ use super::build::{BuildError, build};
 use super::spec::VehicleSpec;
 use crate::frame::Vec3;
 use crate::geometry::mesh::{Bounds, Mesh, write_stl};
-use crate::geometry::parametric::{Section, cuboid, cylinder, loft, tire};
+use crate::geometry::parametric::{Section, Tire, cuboid, cylinder, loft, tire};
 
 /// Facets of a wheel: the displaced volume of a cylinder is right to 1 % from a fifth of the radius up.
 pub const WHEEL_FACETS: u32 = 64;
@@ -66,7 +66,8 @@ pub fn warthog() -> Result<Shipped, toml::de::Error> {
     // radius and width measured, axles from the measured length 1.524 and width 1.391; tread and shoulder tuned to the
     // sealed wheels alone (251, 745, 1027 N at 4, 8, 10 in)
     for (x, y) in corners(0.5 * 1.524 - 0.305, 0.5 * (1.391 - 0.254)) {
-        mesh.append(&tire(&Vec3::new(x, y, ground + 0.305), 0.305, 0.254, 0.115, 0.056, WHEEL_FACETS));
+        let of_warthog = Tire { radius: 0.305, width: 0.254, tread: 0.115, shoulder: 0.056 };
+        mesh.append(&tire(&Vec3::new(x, y, ground + 0.305), of_warthog, WHEEL_FACETS));
     }
     mesh.append(&warthog_chassis(ground));
     for side in [1.0, -1.0] {

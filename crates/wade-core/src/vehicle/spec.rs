@@ -53,7 +53,7 @@ fn yes() -> bool {
     true
 }
 
-/// Scale and axes of the STL; the hull is then centerd on its bounding box.
+/// Scale and axes of the STL; the hull is then centered on its bounding box.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BodyFromStl {

@@ -16,7 +16,7 @@ use wade_core::wrench::Wrench;
 
 fn evaluate(served: &ServedVehicle, condition: &Condition, told: &Circumstances) -> Loads {
     let mut loads = Loads::default();
-    served.evaluate(condition, told, None, &mut Workspace::new(), &mut loads);
+    served.evaluate(condition, told, None, &mut loads);
     loads
 }
 
@@ -60,11 +60,11 @@ fn surfaces_and_effects_sum_to_the_wrench() {
         let center = served.model().vehicle().center_of_mass;
         let mut session = Session::default();
         let mut numbers = Numbers::new(3);
-        let (mut workspace, mut loads) = (Workspace::new(), Loads::default());
+        let mut loads = Loads::default();
         for _ in 0..50 {
             let drawn = numbers.drawn();
             let (condition, told) = (drawn.condition(), drawn.circumstances());
-            served.evaluate(&condition, &told, Some(&mut session), &mut workspace, &mut loads);
+            served.evaluate(&condition, &told, Some(&mut session), &mut loads);
             let mut sum = Wrench::default();
             for surface in &loads.forces.surfaces {
                 sum += Wrench::from_force_at(surface.force, &surface.point, &center);
@@ -102,7 +102,7 @@ fn a_hull_that_turns_and_drifts_with_a_current_feels_no_more_inertia_than_one_th
         let (mut loads, mut last) = (Loads::default(), Wrench::default());
         for _ in 0..3 {
             let told = Circumstances { time_step: 0.1, ..told() };
-            served.evaluate(condition, &told, Some(&mut session), &mut Workspace::new(), &mut loads);
+            served.evaluate(condition, &told, Some(&mut session), &mut loads);
             last = load(&loads, name).wrench;
         }
         last
@@ -176,12 +176,11 @@ fn what_is_served_along_a_run_is_what_was_fitted() {
             })
             .collect();
         let expected = as_fitted(&served, &motion, &told());
-        let (mut session, mut workspace, mut loads) =
-            (Session::default(), Workspace::new(), Loads::default());
+        let (mut session, mut loads) = (Session::default(), Loads::default());
         let mut remembered = 0.0;
         for ((condition, time_step), expected) in motion.iter().zip(expected) {
             let told = Circumstances { time_step: *time_step, ..told() };
-            served.evaluate(condition, &told, Some(&mut session), &mut workspace, &mut loads);
+            served.evaluate(condition, &told, Some(&mut session), &mut loads);
             for (load, expected) in loads.effects.loads.iter().zip(&expected) {
                 assert_eq!(load.wrench, *expected, "{vehicle} {}", load.effect.name());
                 assert_eq!(load.left_out, None);
@@ -369,7 +368,7 @@ fn what_cannot_be_told_is_left_out_and_named() {
     let state = Condition::level(Vec3::new(0.5, 0.0, 0.0), 0.15);
     let why = |condition: &Condition, told: &Circumstances, session: Option<&mut Session>| {
         let mut loads = Loads::default();
-        served.evaluate(condition, told, session, &mut Workspace::new(), &mut loads);
+        served.evaluate(condition, told, session, &mut loads);
         let left = loads.effects.loads.iter().filter_map(|load| Some((load.effect.name(), load.left_out?)));
         let left: Vec<_> = left.collect();
         let zero = loads.effects.loads.iter().filter(|load| load.left_out.is_some());
@@ -396,7 +395,7 @@ fn what_cannot_be_told_is_left_out_and_named() {
     assert_eq!(why(&state, &silent, Some(&mut session)), [("water_entry_slamming", LeftOut::NoDepthRate)]);
     assert_eq!(why(&Condition { depth: 0.17, ..state }, &silent, Some(&mut session)), []);
     let mut loads = Loads::default();
-    served.evaluate(&state, &silent, Some(&mut session), &mut Workspace::new(), &mut loads);
+    served.evaluate(&state, &silent, Some(&mut session), &mut loads);
     assert_eq!(load(&loads, Effect::WaterEntrySlamming).wrench.force.z, 0.0, "it comes out of the water");
 }
 
@@ -408,7 +407,7 @@ fn a_hull_floods_along_a_session_and_a_step_of_no_time_changes_nothing() {
     let mut lost = |time_step: f64| {
         let mut loads = Loads::default();
         let told = Circumstances { time_step, ..Circumstances::default() };
-        served.evaluate(&state, &told, Some(&mut session), &mut Workspace::new(), &mut loads);
+        served.evaluate(&state, &told, Some(&mut session), &mut loads);
         -load(&loads, Effect::HullFlooding).wrench.force.z
     };
     assert_eq!(lost(0.0), 0.0, "dry at first");

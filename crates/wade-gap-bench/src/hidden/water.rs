@@ -1,7 +1,7 @@
 //! Level, density and motion of the water, water inside, and the entry into it.
 
 use super::{Hidden, Setting};
-use crate::hull::Strip;
+use crate::hull::{Hull, Strip};
 use crate::track::DENSITY;
 use crate::{State, Track, Wrench6};
 use wade_core::frame::{GRAVITY, Vec3};
@@ -75,7 +75,7 @@ pub(super) fn flooding(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec
         let mut sum = Wrench6::zeros();
         for (level, (x, area)) in inside.iter_mut().zip(volumes) {
             let outside = (state.depth + x * state.attitude[1].tan()).clamp(0.0, hull.height);
-            sum += lost(&up, *level, area, x, hull.z0, &hull.center_of_mass);
+            sum += lost(hull, &up, *level, area, x);
             *level = filled(*level, outside, orifice, track.step);
         }
         sum
@@ -83,9 +83,10 @@ pub(super) fn flooding(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec
     track.states.iter().map(&mut force).collect()
 }
 
-fn lost(up: &Vec3, level: f64, area: f64, x: f64, z0: f64, center_of_mass: &Vec3) -> Wrench6 {
+/// Load of a column of water that stands at `x` over an area, about the center of mass.
+fn lost(hull: &Hull, up: &Vec3, level: f64, area: f64, x: f64) -> Wrench6 {
     let force = up * (-DENSITY * GRAVITY * area * level);
-    crate::hull::wrench(force, Vec3::new(x, 0.0, z0 + 0.5 * level) - center_of_mass)
+    crate::hull::wrench(force, Vec3::new(x, 0.0, hull.z0 + 0.5 * level) - hull.center_of_mass)
 }
 
 /// Level inside after a step: `dh/dt = c a/A sqrt(2 g abs(H - h)) sign(H - h)`, whose exact solution for a steady level

@@ -48,7 +48,7 @@ pub struct Settings {
     pub windows: u32,
     /// Time between two samples of the forces [s]; also the largest time step of a steady case.
     pub sample_s: f64,
-    /// Wall-clock time after which a program of a case is given up [s]; longer on finer meshes, see [`Settings::limit`].
+    /// Processor time after which a program of a case is given up [s]; longer on finer meshes, see [`Settings::limit`].
     pub limit_s: f64,
     /// The mesh.
     pub mesh: MeshSettings,
@@ -81,7 +81,7 @@ impl Settings {
         (10.0 * time).ceil() / 10.0
     }
 
-    /// Time that a program may take on cells `cell_scale` times as long [s]: there are as many more as they are smaller.
+    /// Processor time that a program may take on cells `cell_scale` times as long [s]: there are as many more as they are smaller.
     pub fn limit(&self, cell_scale: f64) -> f64 {
         self.limit_s / cell_scale.min(1.0).powi(3)
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::{Bed, CAMPAIGN_FILE, Case, Plan, Set};
+use super::plan::{Bed, CAMPAIGN_FILE, Case, Plan, Set, as_set};
 use super::run::{RunError, Work};
 use super::solve::{Load, Outcome, method};
 use crate::dataset::{self, Dataset, DatasetError, Image, Meta, Rest, Sample, SurfaceLoad};
@@ -147,12 +147,42 @@ fn net(loads: &[Load]) -> Vec3 {
     loads.iter().map(|load| Vec3::from(load.force)).sum()
 }
 
-/// First half of the SHA-256 of a case's row in the plan.
+/// First half of the SHA-256 of a case's row in the plan as JSON. The channel is a part of it where it is another than that of
+/// the settings: the first data sets were computed before a case had one.
 pub fn state_hash(case: &Case) -> String {
-    // a case always has a JSON form; an empty one would match no other
-    let text = serde_json::to_string(case).unwrap_or_default();
-    // what was computed in the channel of the settings keeps the hash that it had before there was another
-    let text = text.replace(",\"channel_scale\":1.0}", "}");
+    #[derive(Serialize)]
+    struct Hashed<'a> {
+        id: &'a str,
+        set: Set,
+        speed_mps: f64,
+        heading_deg: f64,
+        depth_m: f64,
+        density_kgpm3: f64,
+        roll_deg: f64,
+        pitch_deg: f64,
+        bed: Bed,
+        cell_scale: f64,
+        end_speed_mps: f64,
+        ramp_s: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        channel_scale: Option<f64>,
+    }
+    let hashed = Hashed {
+        id: &case.id,
+        set: case.set,
+        speed_mps: case.speed_mps,
+        heading_deg: case.heading_deg,
+        depth_m: case.depth_m,
+        density_kgpm3: case.density_kgpm3,
+        roll_deg: case.roll_deg,
+        pitch_deg: case.pitch_deg,
+        bed: case.bed,
+        cell_scale: case.cell_scale,
+        end_speed_mps: case.end_speed_mps,
+        ramp_s: case.ramp_s,
+        channel_scale: Some(case.channel_scale).filter(|scale| *scale != as_set()),
+    };
+    let text = serde_json::to_string(&hashed).expect("numbers and names are JSON");
     sha256(text.as_bytes())[..32].to_owned()
 }
 
@@ -440,5 +470,22 @@ fn surface_load(load: &Load, rest: &Load) -> SurfaceLoad {
         moment: Some(load.moment.into()),
         viscous: Some(load.viscous.into()),
         rest: Some(Rest { force: rest.force.into(), moment: rest.moment.into() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_of_a_case_is_that_of_its_row_and_of_its_channel_where_it_has_one_of_its_own() {
+        let case = Case::steady("husky", Set::Paper, 7, 0.5, 0.1);
+        let row = "{\"id\":\"husky-paper-0007\",\"set\":\"paper\",\"speed_mps\":0.5,\"heading_deg\":0.0,\"depth_m\":0.1,\
+                   \"density_kgpm3\":1000.0,\"roll_deg\":0.0,\"pitch_deg\":0.0,\"bed\":\"parked\",\"cell_scale\":1.0,\
+                   \"end_speed_mps\":0.5,\"ramp_s\":0.0";
+        let hash = |text: String| sha256(text.as_bytes())[..32].to_owned();
+        assert_eq!(state_hash(&case), hash(format!("{row}}}")));
+        let wide = Case { channel_scale: 1.5, ..case };
+        assert_eq!(state_hash(&wide), hash(format!("{row},\"channel_scale\":1.5}}")));
     }
 }

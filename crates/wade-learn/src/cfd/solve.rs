@@ -2,8 +2,11 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::process::{Child, ExitStatus};
 use std::time::{Duration, Instant};
 
+use nix::time::{clock_getcpuclockid, clock_gettime};
+use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 
 use super::case::{Inputs, SECTIONS_BEFORE_S, Settings};
@@ -128,11 +131,13 @@ pub enum SolveError {
         log: PathBuf,
     },
     /// A program that took too long.
-    #[error("{program} was ended after {seconds:.0} s, the limit of the settings (log: {log})")]
+    #[error(
+        "{program} was ended after {seconds:.0} s of processor time, the limit of the settings (log: {log})"
+    )]
     TooLong {
         /// Its name.
         program: &'static str,
-        /// The limit.
+        /// The limit of its processor time [s].
         seconds: f64,
         /// Its log.
         log: PathBuf,
@@ -186,7 +191,7 @@ pub fn solve(
     attempts: u32,
 ) -> Result<Outcome, SolveError> {
     let placement = Placement::new(inputs.vehicle, inputs.case);
-    let mut running = Running { folder, claim, inputs, started: Instant::now() };
+    let mut running = Running { folder, claim, inputs };
     running.program("blockMesh", &[])?;
     running.program("snappyHexMesh", &["-overwrite"])?;
     let hull = MeshHull::read(folder, inputs.vehicle, &placement)?;
@@ -247,7 +252,30 @@ struct Running<'a> {
     folder: &'a Path,
     claim: &'a Claim,
     inputs: &'a Inputs<'a>,
-    started: Instant,
+}
+
+/// Waits for a program; one that has taken more processor time than `limit_s` is ended, and none comes back. The time on a
+/// busy machine does not count: a case must not fail for its neighbors. What waits without computing is not ended.
+fn wait(child: &mut Child, limit_s: f64) -> std::io::Result<Option<ExitStatus>> {
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        // a program that ends in between has no clock any more
+        if processor_s(child).is_some_and(|seconds| seconds > limit_s) {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Processor time that a child has taken [s].
+fn processor_s(child: &Child) -> Option<f64> {
+    let pid = Pid::from_raw(i32::try_from(child.id()).ok()?);
+    let time = clock_gettime(clock_getcpuclockid(pid).ok()?).ok()?;
+    Some(time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64)
 }
 
 impl Running<'_> {
@@ -268,18 +296,8 @@ impl Running<'_> {
         }
         let limit = self.inputs.settings.limit(self.inputs.case.cell_scale);
         let started = Instant::now();
-        let status = loop {
-            if let Some(status) = child.try_wait().map_err(|source| io(Path::new(program), source))? {
-                break status;
-            }
-            if self.started.elapsed().as_secs_f64() > limit {
-                // it may have ended in between, which is as good
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err(SolveError::TooLong { program, seconds: limit, log });
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
+        let ended = wait(&mut child, limit).map_err(|source| io(Path::new(program), source))?;
+        let Some(status) = ended else { return Err(SolveError::TooLong { program, seconds: limit, log }) };
         if status.success() {
             return Ok(());
         }
@@ -447,7 +465,17 @@ fn mass_imbalance(folder: &Path, start: f64, end: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn a_program_is_ended_for_the_time_that_it_computes_and_not_for_that_in_which_it_waits() {
+        let run = |script: &str| {
+            wait(&mut std::process::Command::new("sh").args(["-c", script]).spawn().unwrap(), 0.1).unwrap()
+        };
+        assert!(run("sleep 0.4").is_some_and(|status| status.success()));
+        assert_eq!(run("while :; do :; done"), None);
+    }
 
     #[test]
     fn processor_time_adds_up_over_restarts() {

@@ -6,7 +6,6 @@ use std::cell::Cell;
 use std::fs::File;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
-use std::sync::Once;
 
 use parquet::errors::ParquetError;
 use parquet::file::reader::SerializedFileReader;
@@ -210,21 +209,16 @@ fn load(path: &Path) -> Result<Dataset, Fault> {
 }
 
 thread_local! {
-    /// True while this thread decodes a file: a panic is then told as an error, and not twice.
     static DECODES: Cell<bool> = const { Cell::new(false) };
+}
+
+/// True while this thread decodes a file: a panic then comes back as an error, which a program's panic hook need not print too.
+pub fn catches_panics() -> bool {
+    DECODES.get()
 }
 
 /// Parquet's own reader panics over some files that are damaged, where it should return an error.
 fn unless_it_panics(decode: impl FnOnce() -> Result<Dataset, Fault>) -> Result<Dataset, Fault> {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        let before = panic::take_hook();
-        panic::set_hook(Box::new(move |info| {
-            if !DECODES.get() {
-                before(info);
-            }
-        }));
-    });
     DECODES.set(true);
     // nothing that the panic may have left half-done outlives it
     let outcome = panic::catch_unwind(AssertUnwindSafe(decode));

@@ -114,7 +114,7 @@ pub fn process(recording: &Recording, rig: &Rig, config: &MocapConfig) -> Result
         longest = longest.max(grid.count);
         if grid.count >= config.window {
             let (position, rotation) = (&recording.position[piece.clone()], &recording.rotation[piece]);
-            add_piece(&mut all, t, position, rotation, &grid, &filter, rig)?;
+            add_piece(&mut all, Piece { t, position, rotation }, &grid, &filter, rig)?;
         }
     }
     match all.t.is_empty() {
@@ -123,15 +123,21 @@ pub fn process(recording: &Recording, rig: &Rig, config: &MocapConfig) -> Result
     }
 }
 
+/// A part of a recording without a hole in time.
+struct Piece<'a> {
+    t: &'a [f64],
+    position: &'a [Vec3],
+    rotation: &'a [UnitQuaternion<f64>],
+}
+
 fn add_piece(
     all: &mut Kinematics,
-    t: &[f64],
-    position: &[Vec3],
-    rotation: &[UnitQuaternion<f64>],
+    piece: Piece<'_>,
     grid: &UniformGrid,
     filter: &SavitzkyGolay,
     rig: &Rig,
 ) -> Result<(), FilterError> {
+    let Piece { t, position, rotation } = piece;
     let instants = grid.times();
     let mut smooth = [const { Vec::new() }; 3];
     let mut rate = [const { Vec::new() }; 3];

@@ -299,15 +299,26 @@ pub struct TrainedVehicle {
     pub score: Score,
 }
 
+/// What a training takes.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// The samples.
+    pub source: &'a Source,
+    /// Which of them are held out.
+    pub sides: Sides<'a>,
+    /// The settings.
+    pub config: &'a Config,
+    /// Where the state of the training is kept.
+    pub checkpoint: Option<&'a Checkpoint>,
+}
+
 /// Trains one network of the paper for all vehicles of a data set; `progress` hears of every epoch.
 pub fn train(
-    source: &Source,
-    sides: Sides<'_>,
+    run: Run<'_>,
     variant: Variant,
-    config: &Config,
-    checkpoint: Option<&Checkpoint>,
     progress: &dyn Fn(&Epoch),
 ) -> Result<Trained<Published>, TrainError> {
+    let Run { source, sides, config, checkpoint } = run;
     config.validate()?;
     sides.check(&source.data)?;
     check_beds(&source.data)?;
@@ -317,7 +328,7 @@ pub fn train(
     let held_out = side(&sides.split.held_out)?;
     let (task, scaling) = Task::new(variant, &training, &validation, config)?;
     let begun = Instant::now();
-    let (fit, epochs) = run(&task, config, checkpoint, progress)?;
+    let (fit, epochs) = epochs(&task, config, checkpoint, progress)?;
     let (layers, kept_epoch) = fit.kept();
     let mut trained = Trained {
         name: variant.name(),
@@ -340,7 +351,7 @@ pub fn train(
 }
 
 /// All epochs, or those that a checkpoint leaves to do, and how many these were.
-fn run<'a>(
+fn epochs<'a>(
     task: &'a Task,
     config: &'a Config,
     checkpoint: Option<&Checkpoint>,

@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::fit::Epoch;
 use super::score::Score;
-use super::{Config, Sides, Source, Trained, page};
+use super::{Config, Run, Trained, page};
 use crate::dataset::split::By;
 use crate::files::write_whole;
 use crate::page::PlotError;
@@ -144,14 +144,8 @@ impl Record {
     }
 
     /// The record of a training.
-    pub fn new<L>(
-        trained: &Trained<L>,
-        source: &Source,
-        sides: Sides<'_>,
-        part: usize,
-        data: DataFile,
-        (config, program): (&Config, &str),
-    ) -> Self {
+    pub fn new<L>(trained: &Trained<L>, run: &Run<'_>, part: usize, data: DataFile, program: &str) -> Self {
+        let Run { source, sides, config, .. } = *run;
         let cases = |numbers: &[usize]| -> BTreeSet<String> {
             numbers.iter().map(|&number| source.data.samples[number].case.clone()).collect()
         };

@@ -23,7 +23,7 @@ pub use check::Check;
 pub use drag::{DragAtDepth, DragScaling, PairConfig, Ratio, drag_coefficient};
 pub use folder::{FolderError, OutFolder};
 pub use planar::{NotPlanar, PlanarConfig, planar_section};
-pub use report::{Data, Report, Source, Subject};
+pub use report::{About, Data, Report, Source, Subject};
 pub use section::{LeftOut, Prediction, Section};
 pub use vertical::{F0AgainstDepth, SpeedBin, VerticalAtDepth, VerticalForce, at_rest};
 

@@ -96,16 +96,23 @@ pub struct Data {
     pub remarks: Vec<String>,
 }
 
+/// What a report is about.
+#[derive(Debug, Clone)]
+pub struct About<'a> {
+    /// Where the motion comes from.
+    pub source: Source,
+    /// The model under test.
+    pub subject: Subject,
+    /// The settings.
+    pub config: &'a Config,
+    /// Commit of the program.
+    pub commit: &'a str,
+}
+
 impl Report {
     /// The verdict over both tests.
-    pub fn new(
-        tests: Tests,
-        trials: &Trials,
-        source: Source,
-        subject: Subject,
-        config: &Config,
-        commit: &str,
-    ) -> Self {
+    pub fn new(tests: Tests, trials: &Trials, about: About<'_>) -> Self {
+        let About { source, subject, config, commit } = about;
         let findings = |holds: Option<bool>| {
             let checks = tests.checks.iter().filter(|check| check.holds == holds);
             checks.map(|check| check.finding.clone()).collect::<Vec<_>>()

@@ -26,7 +26,7 @@ use wade_learn::train::anchored::loss::{AnchoredLoss, TARGETS, loss, targets};
 use wade_learn::train::checkpoint::Checkpoint;
 use wade_learn::train::layers::{Layers, Sizes};
 use wade_learn::train::loss::Batch;
-use wade_learn::train::{self, Analytic, Config, Sides, Source, Trained};
+use wade_learn::train::{self, Analytic, Config, Run, Sides, Source, Trained};
 
 const BY: By = By::Case { share: 0.2 };
 
@@ -59,7 +59,8 @@ impl Lesson {
     }
 
     fn train(&self, config: &Config, checkpoint: Option<&Checkpoint>) -> Trained<anchored::Learnt> {
-        anchored::train(&self.source, self.sides(), config, checkpoint, &|_| ()).unwrap()
+        let run = Run { source: &self.source, sides: self.sides(), config, checkpoint };
+        anchored::train(run, &|_| ()).unwrap()
     }
 
     fn vehicles(&self) -> Vec<Prepared> {

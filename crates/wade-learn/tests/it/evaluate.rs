@@ -20,7 +20,7 @@ use wade_learn::evaluate::states::{State, states};
 use wade_learn::evaluate::{EvaluateError, held_out};
 use wade_learn::train::fit::Epoch;
 use wade_learn::train::report::{DataFile, Record};
-use wade_learn::train::{self, Analytic, Config, Sides, Source, Variant};
+use wade_learn::train::{self, Analytic, Config, Run, Sides, Source, Variant};
 
 fn bundles() -> BTreeMap<String, Bundle> {
     let read = |name: &str| (name.to_owned(), bundle::read(&crate::common::vehicles().join(name)).unwrap());
@@ -225,9 +225,11 @@ fn trained(by: By) -> (Record, Source, DataFile) {
     let source = Source::new(analytic(10), &vehicles(), false).unwrap();
     let split = split(&source.data, by, config.seed).unwrap().remove(0);
     let sides = Sides { split: &split, by };
-    let trained = train::train(&source, sides, Variant::Paper, &config, None, &|_| ()).unwrap();
+    let run = Run { source: &source, sides, config: &config, checkpoint: None };
+    let trained = train::train(run, Variant::Paper, &|_| ()).unwrap();
     let file = DataFile { name: "data".into(), sha256: Some("abc".into()), provenance: "test".into() };
-    (Record::new(&trained, &source, sides, 1, file.clone(), (&config, "test")), source, file)
+    let record = Record::new(&trained, &run, 1, file.clone(), "test");
+    (record, source, file)
 }
 
 #[test]

@@ -22,7 +22,7 @@ use wade_learn::train::checkpoint::Checkpoint;
 use wade_learn::train::samples::samples;
 use wade_learn::train::task::Task;
 use wade_learn::train::{
-    self, Analytic, Config, Keep, Published, Sides, Source, TrainError, Trained, Variant,
+    self, Analytic, Config, Keep, Published, Run, Sides, Source, TrainError, Trained, Variant,
 };
 
 const BY: By = By::Case { share: 0.2 };
@@ -52,7 +52,12 @@ fn by_case(source: &Source) -> Split {
 fn run(config: &Config) -> Trained<Published> {
     let source = source();
     let split = by_case(&source);
-    train::train(&source, Sides { split: &split, by: BY }, Variant::Paper, config, None, &|_| ()).unwrap()
+    train::train(
+        Run { source: &source, sides: Sides { split: &split, by: BY }, config, checkpoint: None },
+        Variant::Paper,
+        &|_| (),
+    )
+    .unwrap()
 }
 
 fn same(a: &Trained<Published>, b: &Trained<Published>) -> bool {
@@ -136,7 +141,8 @@ fn nothing_of_the_held_out_side_reaches_the_weights_or_what_they_state() {
     let config = Config { epochs: 30, patience: 2, ..short() };
     let train = |source: &Source| {
         let sides = Sides { split: &split, by: BY };
-        train::train(source, sides, Variant::Paper, &config, None, &|_| ()).unwrap()
+        train::train(Run { source, sides, config: &config, checkpoint: None }, Variant::Paper, &|_| ())
+            .unwrap()
     };
     let (clean, other) = (train(&source), train(&spoilt));
     assert!(clean.history.last().unwrap().learning_rate < config.learning_rate, "the pace has changed");
@@ -151,7 +157,11 @@ fn a_case_on_both_sides_is_refused_but_of_a_split_by_sample() {
     leak.training.push(leak.held_out[0]);
     let train = |by, split: &Split| {
         let config = Config { epochs: 1, ..short() };
-        train::train(&source, Sides { split, by }, Variant::Paper, &config, None, &|_| ())
+        train::train(
+            Run { source: &source, sides: Sides { split, by }, config: &config, checkpoint: None },
+            Variant::Paper,
+            &|_| (),
+        )
     };
     let error = train(BY, &leak).unwrap_err().to_string();
     assert!(
@@ -209,7 +219,12 @@ fn the_bundle_answers_as_the_trainer_s_own_forward_pass() {
     let source = source();
     let split = by_case(&source);
     let sides = Sides { split: &split, by: BY };
-    let trained = train::train(&source, sides, Variant::Paper, &short(), None, &|_| ()).unwrap();
+    let trained = train::train(
+        Run { source: &source, sides, config: &short(), checkpoint: None },
+        Variant::Paper,
+        &|_| (),
+    )
+    .unwrap();
     let held_out = samples(&source.data, &split.held_out, &source.vehicles).unwrap();
     let folder = TempDir::new().unwrap();
     for (index, of_vehicle) in trained.vehicles.iter().enumerate() {
@@ -245,9 +260,18 @@ fn a_run_that_stopped_goes_on_with_the_same_bits() {
         let sides = Sides { split: &split, by: BY };
         let train = |config: &Config, resume| {
             let checkpoint = Checkpoint { path: path.clone(), resume };
-            train::train(&source, sides, Variant::Paper, config, Some(&checkpoint), &|_| ())
+            train::train(
+                Run { source: &source, sides, config, checkpoint: Some(&checkpoint) },
+                Variant::Paper,
+                &|_| (),
+            )
         };
-        let whole = train::train(&source, sides, Variant::Paper, &config, None, &|_| ()).unwrap();
+        let whole = train::train(
+            Run { source: &source, sides, config: &config, checkpoint: None },
+            Variant::Paper,
+            &|_| (),
+        )
+        .unwrap();
         // the state of epoch 10 is what a run that was killed in epoch 17 leaves
         train(&Config { epochs: 17, ..config.clone() }, false).unwrap();
         let resumed = train(&config, true).unwrap();
@@ -285,7 +309,12 @@ fn refuses_what_it_cannot_train() {
     let source = source();
     let mut sides = by_case(&source);
     let train = |split: &Split, config: &Config| {
-        train::train(&source, Sides { split, by: BY }, Variant::Paper, config, None, &|_| ()).unwrap_err()
+        train::train(
+            Run { source: &source, sides: Sides { split, by: BY }, config, checkpoint: None },
+            Variant::Paper,
+            &|_| (),
+        )
+        .unwrap_err()
     };
     let hot = Config { learning_rate: 1e30, ..short() };
     assert!(matches!(train(&sides, &hot), TrainError::Diverged { .. }));
@@ -295,7 +324,12 @@ fn refuses_what_it_cannot_train() {
     let parked = beds.data.samples.iter().position(|s| s.vehicle == "warthog").unwrap();
     beds.data.samples[parked].condition.ground_velocity = Vec3::zeros();
     let told = Sides { split: &sides, by: BY };
-    let error = train::train(&beds, told, Variant::Paper, &short(), None, &|_| ()).unwrap_err();
+    let error = train::train(
+        Run { source: &beds, sides: told, config: &short(), checkpoint: None },
+        Variant::Paper,
+        &|_| (),
+    )
+    .unwrap_err();
     let case = &source.data.samples[parked].case;
     assert!(
         matches!(error, TrainError::Beds { vehicle, resting, .. } if vehicle == "warthog" && resting == *case)
@@ -363,8 +397,12 @@ fn progress_is_heard_of_every_epoch() {
     let (source, heard) = (source(), RefCell::new(Vec::new()));
     let split = by_case(&source);
     let sides = Sides { split: &split, by: BY };
-    let trained = train::train(&source, sides, Variant::Paper, &short(), None, &|epoch| {
-        heard.borrow_mut().push(*epoch);
-    });
+    let trained = train::train(
+        Run { source: &source, sides, config: &short(), checkpoint: None },
+        Variant::Paper,
+        &|epoch| {
+            heard.borrow_mut().push(*epoch);
+        },
+    );
     assert_eq!(*heard.borrow(), trained.unwrap().history);
 }

@@ -17,13 +17,12 @@ use std::time::Instant;
 
 use nalgebra::DMatrix;
 
-use super::checkpoint::Checkpoint;
 use super::fit::Epoch;
 use super::layers::{Layers, Sizes};
 use super::score::{Judged, Score};
 use super::task::Task;
 use super::variant::{Objective, Rows};
-use super::{Config, Sides, Source, TrainError, Trained, TrainedVehicle, domain, run};
+use super::{Config, Run, TrainError, Trained, TrainedVehicle, domain, epochs};
 use crate::dataset::{Image, split};
 use crate::random::Random;
 use between::Between;
@@ -52,13 +51,8 @@ pub type Learnt = BTreeMap<String, Box<Anchored>>;
 
 /// Trains one network for all vehicles of a data set to answer as the regressions do that are fitted to the training cases,
 /// and to say how far off these are in a case that they do not know.
-pub fn train(
-    source: &Source,
-    sides: Sides<'_>,
-    config: &Config,
-    checkpoint: Option<&Checkpoint>,
-    progress: &dyn Fn(&Epoch),
-) -> Result<Trained<Learnt>, TrainError> {
+pub fn train(run: Run<'_>, progress: &dyn Fn(&Epoch)) -> Result<Trained<Learnt>, TrainError> {
+    let Run { source, sides, config, checkpoint } = run;
     config.validate()?;
     sides.check(&source.data)?;
     let vehicles = Prepared::all(&source.data, &source.vehicles)?;
@@ -71,7 +65,7 @@ pub fn train(
     let taught = between.taught(config.anchored.between, config.anchored.outside, &mut random);
     let task = task(&taught, &held_out, &vehicles, &form, config)?;
     let begun = Instant::now();
-    let (fit, epochs) = run(&task, config, checkpoint, progress)?;
+    let (fit, epochs) = epochs(&task, config, checkpoint, progress)?;
     let epoch_s = (epochs > 0).then(|| begun.elapsed().as_secs_f64() / f64::from(epochs));
     let (mut layers, kept_epoch) = fit.kept();
     let history = fit.state.history;
@@ -89,7 +83,7 @@ pub fn train(
     let mut trained =
         Trained { name: NAME, layers, learnt, vehicles: Vec::new(), history, kept_epoch, epoch_s };
     trained.vehicles = (0..vehicles.len())
-        .map(|index| trained.vehicle(index, &vehicles, source, sides, &held_out))
+        .map(|index| trained.vehicle(index, &vehicles, &run, &held_out))
         .collect::<Result<_, _>>()?;
     Ok(trained)
 }
@@ -272,8 +266,7 @@ impl Trained<Learnt> {
         &self,
         index: usize,
         vehicles: &[Prepared],
-        source: &Source,
-        sides: Sides<'_>,
+        run: &Run<'_>,
         held_out: &[Known],
     ) -> Result<TrainedVehicle, TrainError> {
         let judged = |state: &Known| {
@@ -285,6 +278,6 @@ impl Trained<Learnt> {
         let name = vehicles[index].name.clone();
         let of_vehicle = held_out.iter().filter(|state| state.vehicle == index);
         let score = Score::of(of_vehicle.map(judged));
-        Ok(TrainedVehicle { domain: domain::learnt(&name, source, sides)?, score, name })
+        Ok(TrainedVehicle { domain: domain::learnt(&name, run.source, run.sides)?, score, name })
     }
 }
