@@ -22,7 +22,7 @@ use super::statistics::quantile;
 use super::verdict::Found;
 use super::{Named, plausible};
 use crate::condition::Condition;
-use crate::effects::{Effect, Kind};
+use crate::effects::{self, Effect, Kind};
 use crate::files::hexadecimal;
 use crate::trials::{SIMULATED, SimIs, Trials, WHEELS, WRENCH};
 
@@ -204,9 +204,11 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             );
         }
         // one that is 0 has no place in the law that was found, such as a frequency in a memory that only fades
-        let shape = one.effect.shape_names().iter().enumerate().filter(|(axis, _)| one.shape[*axis] != 0.0);
-        for (axis, &(name, unit)) in shape {
-            let (value, std) = (one.shape[axis], fitted.shape_std[index][axis]);
+        let nonlinear = one.effect.spec().parameters.iter().enumerate();
+        for (axis, &effects::Parameter { name, unit }) in
+            nonlinear.filter(|(axis, _)| one.shape.parameter(*axis) != 0.0)
+        {
+            let (value, std) = (one.shape.parameter(axis), fitted.shape_std[index][axis]);
             let interval = [value - 1.645 * std, value + 1.645 * std];
             parameters.insert(name, Parameter { value, std, unit, interval, literature: None });
         }
@@ -223,7 +225,7 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             coefficients: one.coefficients.iter().map(|&(c, _)| specs[c].name).collect(),
             effect: one.effect,
             shape: one.shape,
-            base_drag: judge.setting.base_drag.of(one.effect, &one.shape).into(),
+            base_drag: judge.setting.base_drag.of(&one.shape).into(),
         });
     }
     effects
