@@ -23,6 +23,6 @@ long:
     WADE_HOSTILE_SECONDS=3600 cargo test --test hostile -- --nocapture
     WADE_STORMS_S=60 cargo test --release --test storms -- --nocapture --test-threads 1
 
-# write the tables of README.md and docs/src/results from the raw results
+# write the tables of README.md and docs/src/results from the raw results, and those of effects from the sources
 results:
     WADE_WRITE=1 cargo test --test repository results

@@ -18,7 +18,7 @@ use wade_core::bundle;
 use wade_core::condition::Condition;
 use wade_core::effects::{
     ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind,
-    ParameterValue, Session, Validity,
+    ParameterValue, Session, Shape, Validity,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, WaterPlane, up_from_roll_pitch};
@@ -159,10 +159,11 @@ fn every_effect(vehicle: &str) -> EffectsFile {
         let parameter = |name: &str, value: f64, unit: &str| {
             (name.to_owned(), ParameterValue { value, std: 0.0, unit: unit.to_owned() })
         };
-        let shape = if name == Effect::WaveMemory { [0.8, 2.0, 0.0] } else { [1e-3, 0.0, 0.0] };
+        let numbers = if name == Effect::WaveMemory { [0.8, 2.0, 0.0] } else { [1e-3, 0.0, 0.0] };
+        // a law without a number in the first place has one form
+        let shape = Shape::from_numbers(name, numbers).unwrap_or_else(|_| name.plain());
         let coefficients = name.coefficients().iter();
         ActiveEffect {
-            name,
             equation: name.equation().to_owned(),
             provisional: false,
             share_of_gap: 0.1,

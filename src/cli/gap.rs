@@ -361,9 +361,13 @@ fn check_loss(
     has_control: bool,
 ) -> Result<()> {
     let Some(before) = before else { return Ok(()) };
-    let stays = |name| effects.effects.iter().any(|effect| effect.name == name);
-    let lost: Vec<&str> =
-        before.effects.iter().filter(|effect| !stays(effect.name)).map(|effect| effect.name.name()).collect();
+    let stays = |name| effects.effects.iter().any(|effect| effect.effect() == name);
+    let lost: Vec<&str> = before
+        .effects
+        .iter()
+        .filter(|effect| !stays(effect.effect()))
+        .map(|effect| effect.effect().name())
+        .collect();
     if lost.is_empty() || before.evidence.trials_sha256 == effects.evidence.trials_sha256 {
         return Ok(());
     }

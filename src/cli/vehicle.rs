@@ -436,7 +436,7 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
         line(format!("trained for {name:<20} {:.4} to {:.4}", range.min, range.max));
     }
     for effect in effects {
-        line(format!("effect {}: {}", effect.name.name(), effect.equation));
+        line(format!("effect {}: {}", effect.effect().name(), effect.equation));
         for (name, p) in &effect.parameters {
             let unit = if p.unit == "1" { "" } else { &p.unit };
             line(format!("  {name:<16} {:.4} +- {:.4} {unit}", p.value, p.std));

@@ -10,7 +10,8 @@ use tempfile::TempDir;
 use wade_core::bundle;
 use wade_core::condition::{Condition, GroundContact};
 use wade_core::effects::{
-    ActiveEffect, Between, Circumstances, Effect, EffectsFile, Evidence, Kind, ParameterValue, Validity,
+    ActiveEffect, Between, Circumstances, Effect, EffectsFile, Evidence, Kind, ParameterValue, Shape,
+    Validity,
 };
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::model::Model;
@@ -43,7 +44,7 @@ pub fn effect(name: Effect, value: f64) -> ActiveEffect {
     let coefficients = name.coefficients();
     let parameter =
         |value: f64, unit: &str| ParameterValue { value, std: 0.1 * value.abs(), unit: unit.into() };
-    let shape = match name {
+    let numbers = match name {
         Effect::HullFlooding => [0.01, 0.0, 0.0],
         Effect::WaveMemory => [0.8, 2.0, 0.0],
         // exact where the estimate is the value
@@ -52,22 +53,21 @@ pub fn effect(name: Effect, value: f64) -> ActiveEffect {
         _ => [0.0; 3],
     };
     let fitted = coefficients.iter().map(|c| (c.name.to_owned(), parameter(value, c.unit)));
-    let shapes = name.shape_names().iter().zip(shape);
-    let shapes = shapes.map(|((name, unit), value)| ((*name).to_owned(), parameter(value, unit)));
+    let nonlinear = name.spec().parameters.iter().zip(numbers);
+    let nonlinear = nonlinear.map(|(spec, value)| (spec.name.to_owned(), parameter(value, spec.unit)));
     let count = coefficients.len();
     ActiveEffect {
-        name,
         equation: name.equation().to_owned(),
         provisional: false,
         share_of_gap: 0.5,
-        shape,
+        shape: Shape::from_numbers(name, numbers).expect("numbers that mean something"),
         base_drag: [1.1, 1.3, 0.9],
         channel_width: (name == Effect::ChannelBlockage).then_some(4.0),
         coefficients: coefficients.iter().map(|c| c.name.to_owned()).collect(),
         covariance: (0..count)
             .map(|i| (0..count).map(|j| if i == j { 1e-4 } else { 0.0 }).collect())
             .collect(),
-        parameters: fitted.chain(shapes).collect(),
+        parameters: fitted.chain(nonlinear).collect(),
     }
 }
 
@@ -89,8 +89,10 @@ pub fn every_effect(vehicle: &str) -> EffectsFile {
     let physics = Effect::ALL.into_iter().filter(|effect| effect.kind() == Kind::Physics);
     let effects: Vec<ActiveEffect> = physics.map(|name| effect(name, 0.15)).collect();
     let [rows, columns] = [0, 1].map(|index: usize| effects[index].coefficients.len());
-    let together =
-        Between { effects: [effects[0].name, effects[1].name], covariance: vec![vec![5e-5; columns]; rows] };
+    let together = Between {
+        effects: [0, 1].map(|index: usize| effects[index].effect()),
+        covariance: vec![vec![5e-5; columns]; rows],
+    };
     effects_file(vehicle, effects).with_between(vec![together])
 }
 

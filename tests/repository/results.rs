@@ -1,9 +1,10 @@
 //! Tables of figures are written from raw results, between `<!-- results: NAME -->` and `<!-- end -->` of README.md and the
-//! pages in docs/src/results. `WADE_WRITE=1 cargo test --test repository results` (`just results`) writes them; without
-//! it the test compares.
+//! pages in docs/src/results, and the tables of effects from what the effects say of themselves.
+//! `WADE_WRITE=1 cargo test --test repository results` (`just results`) writes them; without it the test compares.
 
 mod accuracy;
 mod cfd;
+mod effects;
 mod gap;
 mod latency;
 
@@ -42,6 +43,9 @@ fn table(name: &str) -> String {
         "benchmark" => gap::benchmark(),
         "baselines" => gap::baselines(),
         "ramps" => gap::ramps(),
+        "physical effects" => effects::physics(),
+        "faults" => effects::faults(),
+        "separating trials" => effects::experiments(),
         _ => panic!("no table is called {name}"),
     }
 }
@@ -62,7 +66,7 @@ fn rendered(page: &str) -> (String, usize) {
 
 #[test]
 fn pages_hold_what_the_raw_results_say() {
-    let mut pages = vec![PathBuf::from("README.md")];
+    let mut pages = ["README.md", "docs/src/concepts/effects.md"].map(PathBuf::from).to_vec();
     let folder = std::fs::read_dir(root().join("docs/src/results")).expect("readable");
     pages.extend(
         folder.map(|entry| PathBuf::from("docs/src/results").join(entry.expect("readable").file_name())),
@@ -70,7 +74,7 @@ fn pages_hold_what_the_raw_results_say() {
     for page in pages {
         let committed = text(&page);
         let (written, tables) = rendered(&committed);
-        assert!(tables > 0, "{} has no table from raw results", page.display());
+        assert!(tables > 0, "{} has no table that is written", page.display());
         if std::env::var_os("WADE_WRITE").is_some() {
             std::fs::write(root().join(&page), &written).expect("written");
         } else {

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::series::Series;
-use wade_core::effects::{self, Body, Effect, Memory, Shape};
+use wade_core::effects::drag_coefficient_error::{DragCoefficientError, DragLaw};
+use wade_core::effects::{Body, Memory, Shape};
 use wade_core::frame::{GRAVITY, Vec3};
 
 /// Cosine of the tilt up to which a hull counts as level: on a ramp its ends are wetted otherwise than its middle, and what
@@ -31,30 +32,30 @@ impl BaseDrag {
         Self { all: whole, level: if level.len() >= ENOUGH { fitted(&level, body) } else { whole } }
     }
 
-    /// What an effect of a shape is told: those that take the prediction's drag itself are told what a hull is said to have.
-    pub fn of(&self, effect: Effect, shape: &Shape) -> Vec3 {
-        if effect.is_in_proportion(shape) { self.level } else { self.all }
+    /// That for the law of an effect: those that take the prediction's drag itself get what a hull is said to have.
+    pub fn of(&self, shape: &Shape) -> Vec3 {
+        if shape.is_in_proportion() { self.level } else { self.all }
     }
 }
 
 /// Least squares over forces beside buoyancy and lift, by the law that leaves less, with the whole speed or the speed along
 /// each axis. The wrong one has no drag across a hull that drives ahead and only seems to move sideways.
 fn fitted(samples: &[(&Series, usize)], body: &Body) -> Vec3 {
-    let fits = [0.0, 1.0].map(|law| of_law(samples, body, &[law, 0.0, 0.0]));
+    let fits = [DragLaw::Quadratic, DragLaw::CrossFlow].map(|law| of_law(samples, body, law));
     let best = fits.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
     best.map_or_else(Vec3::zeros, |(drag, _)| drag)
 }
 
 /// Coefficients, and the change of the sum of squares.
-fn of_law(samples: &[(&Series, usize)], body: &Body, law: &Shape) -> Option<(Vec3, f64)> {
+fn of_law(samples: &[(&Series, usize)], body: &Body, law: DragLaw) -> Option<(Vec3, f64)> {
     const COLUMNS: usize = 5;
     let mut xx = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
     let mut xy = DVector::<f64>::zeros(COLUMNS);
     for &(series, sample) in samples {
         let input = series.input(sample, body, Vec3::zeros());
         let mut rows = [[0.0; COLUMNS]; 3];
-        let drag = Effect::DragCoefficientError;
-        effects::basis(drag, law, &Memory::default(), &input, |coefficient, _, load| {
+        let drag = Shape::DragCoefficientError(DragCoefficientError { law });
+        drag.basis(&Memory::default(), &input, |coefficient, _, load| {
             (0..3).for_each(|axis| rows[axis][coefficient] += load.force[axis]);
         });
         let state = input.condition;

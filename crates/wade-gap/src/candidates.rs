@@ -3,7 +3,19 @@
 use super::base_drag::BaseDrag;
 use super::measurement::rolling_direction;
 use super::series::Series;
-use wade_core::effects::{self, Body, Effect, MAX_COEFFICIENTS, Memory, Shape};
+use wade_core::effects::added_mass::{AddedMass, HeaveMass};
+use wade_core::effects::bed_motion::{BedArea, BedMotion};
+use wade_core::effects::channel_blockage::ChannelBlockage;
+use wade_core::effects::current::Current;
+use wade_core::effects::drag_coefficient_error::{DragCoefficientError, DragLaw};
+use wade_core::effects::hull_flooding::HullFlooding;
+use wade_core::effects::rotation::{Extent, Rotation};
+use wade_core::effects::sensor::{SensorBiasStep, SensorDelay, SensorDrift, SensorGain};
+use wade_core::effects::squat::Squat;
+use wade_core::effects::water_entry_slamming::WaterEntrySlamming;
+use wade_core::effects::wave_memory::{Kernel, WaveMemory};
+use wade_core::effects::wheel_paddle_thrust::{Rim, WheelPaddleThrust};
+use wade_core::effects::{Body, DragSpeed, Effect, Kind, MAX_COEFFICIENTS, Memory, Quantity, Shape};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_learn::trials::Manifest;
 
@@ -11,8 +23,8 @@ use wade_learn::trials::Manifest;
 /// the gap and the prediction reaches, which would pass for a delay.
 const DELAY_ARM: f64 = 0.15;
 
-/// Shapes of one-dimensional flow in a channel, by the Froude number where it ends.
-const IN_CHANNEL: [Shape; 2] = [[0.7, 0.0, 0.0], [1.0, 0.0, 0.0]];
+/// Froude numbers at which one-dimensional flow in a channel ends.
+const FADED_AT: [f64; 2] = [0.7, 1.0];
 
 /// Coefficient of a gain that all channels share.
 const ALL_CHANNELS: usize = 6;
@@ -47,111 +59,147 @@ pub(super) fn unavailable(
     all: &[Series],
 ) -> Option<String> {
     let has_wheels = || all.iter().any(|s| s.wheels.iter().any(|w| w.iter().any(Option::is_some)));
-    match effect {
-        _ if effect.kind() == effects::Kind::Sensor && setting.computed => {
-            Some("the wrench was computed: no sensor can have a fault".into())
+    let missing = |quantity: &Quantity| match quantity {
+        Quantity::MeasuredWrench if setting.computed => {
+            Some("the wrench was computed: no sensor can have a fault")
         }
-        Effect::ChannelBlockage if !setting.in_channel => Some("trials.toml states no channel_width".into()),
-        Effect::WheelPaddleThrust if !has_wheels() => {
-            Some("no wheel speeds were recorded (wheel_fl, wheel_fr, wheel_rl, wheel_rr)".into())
+        Quantity::ChannelWidth if !setting.in_channel => Some("trials.toml states no channel_width"),
+        Quantity::WheelSpeeds if !has_wheels() => {
+            Some("no wheel speeds were recorded (wheel_fl, wheel_fr, wheel_rl, wheel_rr)")
         }
-        Effect::RollingResistance | Effect::MassError if !setting.inferred => {
-            Some("the wrench was measured, not inferred from mass and drive".into())
+        Quantity::InferredWrench if !setting.inferred => {
+            Some("the wrench was measured, not inferred from mass and drive")
         }
-        Effect::DriveGain if !setting.inferred && manifest.measured.other_forces.is_empty() => {
-            Some("no drive force stands among the columns".into())
+        Quantity::DriveForce if !setting.inferred && manifest.measured.other_forces.is_empty() => {
+            Some("no drive force stands among the columns")
         }
         _ => None,
-    }
+    };
+    effect.spec().inputs.iter().find_map(missing).map(str::to_owned)
 }
 
 /// Shapes among which an effect's is first looked for.
 pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<Shape> {
     match effect {
-        Effect::HullFlooding => [3e-4, 1e-3, 3e-3, 1e-2, 3e-2].map(|ratio| [ratio, 0.0, 0.0]).into(),
-        Effect::WaveMemory => {
-            // a memory shorter than the waves of the hull take to leave it is added mass
-            let period = (setting.body.length / GRAVITY).sqrt();
-            let mut shapes = Vec::new();
-            for tau in [1.0, 2.5, 6.0, 15.0] {
-                let of = |frequency: f64, form: f64| [tau * period, frequency / period, form];
-                shapes.extend([of(0.0, 0.0), of(0.5, 0.0), of(1.0, 0.0), of(2.0, 0.0)]);
-                shapes.extend([of(0.5, 1.0), of(1.0, 1.0), of(2.0, 1.0)]);
-            }
-            shapes
+        Effect::HullFlooding => [3e-4, 1e-3, 3e-3, 1e-2, 3e-2]
+            .map(|opening_ratio| Shape::HullFlooding(HullFlooding { opening_ratio }))
+            .into(),
+        Effect::WaveMemory => memories(setting),
+        Effect::SensorGain => {
+            [SensorGain::EachComponent, SensorGain::AllComponents].map(Shape::SensorGain).into()
         }
-        // each channel by itself, or one factor of all
-        Effect::SensorGain => vec![[0.0; 3], [1.0, 0.0, 0.0]],
-        Effect::Rotation => vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-        Effect::Current => vec![[0.0; 3], [0.0, 0.0, 1.0]],
-        Effect::DragCoefficientError => [0.0, 1.0, 2.0].map(|law| [law, 0.0, 0.0]).into(),
-        Effect::AddedMass | Effect::WheelPaddleThrust => vec![[0.0; 3], [1.0, 0.0, 0.0]],
-        Effect::BedMotion => [0.0, 1.0, 2.0].map(|area| [area, 0.0, 0.0]).into(),
+        Effect::Rotation => [
+            (Extent::Strips, DragSpeed::Whole),
+            (Extent::Whole, DragSpeed::Whole),
+            (Extent::Strips, DragSpeed::PerAxis),
+        ]
+        .map(|(extent, speed)| Shape::Rotation(Rotation { extent, speed }))
+        .into(),
+        Effect::Current => [DragSpeed::Whole, DragSpeed::PerAxis]
+            .map(|speed| Shape::Current(Current { speed, ..Current::default() }))
+            .into(),
+        Effect::DragCoefficientError => [DragLaw::Quadratic, DragLaw::CrossFlow, DragLaw::Proportional]
+            .map(|law| Shape::DragCoefficientError(DragCoefficientError { law }))
+            .into(),
+        Effect::AddedMass => {
+            [HeaveMass::Displaced, HeaveMass::Plate].map(|heave| Shape::AddedMass(AddedMass { heave })).into()
+        }
+        Effect::WheelPaddleThrust => {
+            [Rim::Disc, Rim::Lugs].map(|rim| Shape::WheelPaddleThrust(WheelPaddleThrust { rim })).into()
+        }
+        Effect::BedMotion => [BedArea::Front, BedArea::Underside, BedArea::OfDrag]
+            .map(|area| Shape::BedMotion(BedMotion { area }))
+            .into(),
         Effect::Squat => {
-            let walls = if setting.in_channel { &IN_CHANNEL[..] } else { &[] };
-            [&[[0.0; 3], [0.0, 1.0, 0.0]][..], walls].concat()
+            let walls = FADED_AT.into_iter().filter(|_| setting.in_channel);
+            let open = [Squat::Bernoulli, Squat::Tuck].into_iter();
+            open.chain(walls.map(|faded_at| Squat::Channel { faded_at })).map(Shape::Squat).collect()
         }
-        Effect::ChannelBlockage => [&[[0.0; 3]][..], &IN_CHANNEL].concat(),
+        Effect::ChannelBlockage => {
+            let falling = FADED_AT.map(|faded_at| ChannelBlockage::FallingSurface { faded_at });
+            std::iter::once(ChannelBlockage::WindwardAreas)
+                .chain(falling)
+                .map(Shape::ChannelBlockage)
+                .collect()
+        }
         Effect::WaterEntrySlamming => {
             // a bottom without deadrise, and of 10, 20 and 30 degrees
-            [0.0, 0.18, 0.36, 0.58].map(|slope| [0.5 * slope * setting.body.width, 0.0, 0.0]).into()
+            let wedge = |slope: f64| WaterEntrySlamming::Wedge { wet_at_m: 0.5 * slope * setting.body.width };
+            std::iter::once(WaterEntrySlamming::Displaced)
+                .chain([0.18, 0.36, 0.58].map(wedge))
+                .map(Shape::WaterEntrySlamming)
+                .collect()
         }
-        Effect::SensorDelay => [0.0, 0.1, 0.25, 0.5].map(|delay| [delay, 0.0, 0.0]).into(),
-        Effect::SensorDrift if setting.one_clock => vec![[0.0; 3], [1.0, 0.0, 0.0]],
+        Effect::SensorDelay => {
+            [0.0, 0.1, 0.25, 0.5].map(|delay_s| Shape::SensorDelay(SensorDelay { delay_s })).into()
+        }
+        Effect::SensorDrift if setting.one_clock => {
+            [SensorDrift::OfTrial, SensorDrift::OfSession].map(Shape::SensorDrift).into()
+        }
         Effect::SensorBiasStep => steps(all),
-        _ => vec![[0.0; 3]],
+        _ => vec![effect.plain()],
     }
 }
 
-/// From a trial on in the order of recording (first number 0), or from a time in every trial on (1).
+/// Memories from the time that waves of the hull take to leave it on: a shorter one is added mass.
+fn memories(setting: &Setting) -> Vec<Shape> {
+    let period = (setting.body.length / GRAVITY).sqrt();
+    let mut shapes = Vec::new();
+    for tau in [1.0, 2.5, 6.0, 15.0] {
+        let of = |frequency: f64, kernel: Kernel| {
+            let (time_constant_s, frequency_radps) = (tau * period, frequency / period);
+            Shape::WaveMemory(WaveMemory { time_constant_s, frequency_radps, kernel })
+        };
+        shapes.extend([0.0, 0.5, 1.0, 2.0].map(|frequency| of(frequency, Kernel::Cosine)));
+        shapes.extend([0.5, 1.0, 2.0].map(|frequency| of(frequency, Kernel::Sine)));
+    }
+    shapes
+}
+
+/// From a trial on in the order of recording, or from a time in every trial on.
 fn steps(all: &[Series]) -> Vec<Shape> {
     let count = all.len();
     let stride = (count as f64 / 16.0).max(1.0);
     let mut steps = Vec::new();
     let mut at = 1.0;
     while at < count as f64 - 0.5 && count > 3 {
-        steps.push([0.0, at.round(), 0.0]);
+        steps.push(SensorBiasStep::FromTrial { rank: at.round() });
         at += stride;
     }
     let mut lengths: Vec<f64> = all.iter().map(|series| series.t[series.t.len() - 1] - series.t[0]).collect();
     let length = super::statistics::median(&mut lengths);
-    steps.extend((1..12).map(|i| [1.0, length * f64::from(i) / 12.0, 0.0]));
-    steps
+    steps.extend((1..12).map(|i| SensorBiasStep::WithinTrials { time_s: length * f64::from(i) / 12.0 }));
+    steps.into_iter().map(Shape::SensorBiasStep).collect()
 }
 
 /// The columns of an effect in one trial: one a coefficient. `rank` is the trial's place in the order of recording: by
 /// stamps of one clock, or else by names.
-pub(super) fn columns(
-    effect: Effect,
-    shape: &Shape,
-    series: &Series,
-    rank: usize,
-    setting: &Setting,
-) -> Vec<Column> {
-    let count = series.t.len();
+pub(super) fn columns(shape: &Shape, series: &Series, rank: usize, setting: &Setting) -> Vec<Column> {
+    let (effect, count) = (shape.effect(), series.t.len());
     let mut columns = vec![vec![[0.0; 6]; count]; effect.coefficients().len()];
     match effect.kind() {
-        effects::Kind::Physics => physics(effect, shape, series, setting, &mut columns),
-        _ => chain(effect, shape, series, rank, setting, &mut columns),
+        Kind::Physics => physics(shape, series, setting, &mut columns),
+        _ => chain(shape, series, rank, setting, &mut columns),
     }
     columns
 }
 
 #[allow(clippy::needless_range_loop, reason = "a sample is an index into the series as well")]
-fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Column]) {
+fn physics(shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Column]) {
     let mut memory = Memory::default();
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);
-    let base_drag = setting.base_drag.of(effect, shape);
+    let base_drag = setting.base_drag.of(shape);
+    let has_memory = shape.effect().spec().has_memory;
     for (sample, &t) in series.t.iter().enumerate() {
         let mut input = series.input(sample, setting.body, base_drag);
-        if effect == Effect::AddedMass {
+        if matches!(shape, Shape::AddedMass(_)) {
             input.condition = &series.calibrated[sample];
         }
-        if effect.has_memory() {
+        if has_memory {
             let since = if sample > 0 { t - series.t[sample - 1] } else { 0.0 };
-            effects::advance(effect, shape, &mut memory, &input, since);
+            shape.advance(&mut memory, &input, since);
         }
-        effects::basis(effect, shape, &memory, &input, |coefficient, _, load| {
+        shape.basis(&memory, &input, |coefficient, _, load| {
             let sum = &mut columns[coefficient][sample];
             (0..3).for_each(|axis| {
                 sum[axis] += load.force[axis];
@@ -161,14 +209,7 @@ fn physics(effect: Effect, shape: &Shape, series: &Series, setting: &Setting, co
     }
 }
 
-fn chain(
-    effect: Effect,
-    shape: &Shape,
-    series: &Series,
-    rank: usize,
-    setting: &Setting,
-    columns: &mut [Column],
-) {
+fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns: &mut [Column]) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
     for (sample, p) in series.seen.iter().enumerate() {
         let state = &series.conditions[sample];
@@ -176,23 +217,22 @@ fn chain(
         let mut own = |value: &dyn Fn(usize) -> f64| {
             setting.components.iter().for_each(|&c| columns[c][sample][c] = value(c));
         };
-        match effect {
-            Effect::SensorBias => own(&|_| 1.0),
-            Effect::SensorBiasStep => {
-                let after =
-                    if shape[0] > 0.5 { since_start(sample) >= shape[1] } else { rank as f64 >= shape[1] };
+        match *shape {
+            Shape::SensorBias(_) => own(&|_| 1.0),
+            Shape::SensorBiasStep(step) => {
+                let after = match step {
+                    SensorBiasStep::WithinTrials { time_s } => since_start(sample) >= time_s,
+                    SensorBiasStep::FromTrial { rank: first } => rank as f64 >= first,
+                };
                 own(&|_| f64::from(u8::from(after)));
             }
-            Effect::SensorDrift => {
-                let time =
-                    if shape[0] > 0.5 { series.t[sample] - setting.first_stamp } else { since_start(sample) };
-                own(&|_| time);
-            }
-            Effect::SensorGain if shape[0] > 0.5 => {
+            Shape::SensorDrift(SensorDrift::OfSession) => own(&|_| series.t[sample] - setting.first_stamp),
+            Shape::SensorDrift(SensorDrift::OfTrial) => own(&|_| since_start(sample)),
+            Shape::SensorGain(SensorGain::AllComponents) => {
                 setting.components.iter().for_each(|&c| columns[ALL_CHANNELS][sample][c] = p[c]);
             }
-            Effect::SensorGain => own(&|c| p[c]),
-            Effect::AxisMisalignment => {
+            Shape::SensorGain(SensorGain::EachComponent) => own(&|c| p[c]),
+            Shape::AxisMisalignment(_) => {
                 for (axis, column) in columns.iter_mut().enumerate() {
                     // axes that are turned by an angle see the wrench turned back by it
                     let e = Vec3::ith(axis, -1.0);
@@ -201,13 +241,13 @@ fn chain(
                     column[sample] = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
                 }
             }
-            Effect::RollingResistance => {
+            Shape::RollingResistance(_) => {
                 let load = (setting.mass * GRAVITY * up.z - p[2]).max(0.0);
                 let dry = setting.mass * series.dry_rolling[sample];
                 columns[0][sample][0] = dry - load * rolling_direction(state.ground_velocity.x);
             }
-            Effect::DriveGain => columns[0][sample] = series.other[sample],
-            Effect::MassError => {
+            Shape::DriveGain(_) => columns[0][sample] = series.other[sample],
+            Shape::MassError(_) => {
                 // a wrench that comes inferred was so with an acceleration that nobody knows: with what is expected of it
                 let inertia = match &series.inertia {
                     Some(inertia) => inertia[sample],
@@ -218,8 +258,8 @@ fn chain(
             _ => {}
         }
     }
-    if effect == Effect::SensorDelay {
-        delayed(series, shape[0], &mut columns[0]);
+    if let Shape::SensorDelay(SensorDelay { delay_s }) = *shape {
+        delayed(series, delay_s, &mut columns[0]);
     }
 }
 

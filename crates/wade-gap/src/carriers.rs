@@ -8,7 +8,7 @@ use super::features::of_bins;
 use super::locate::{Limits, Region, inside};
 use super::noise::Floor;
 use super::series::Series;
-use wade_core::effects::{self, Effect, Kind, Memory, Part};
+use wade_core::effects::{Effect, Kind, Memory, Part};
 
 /// Components of a load along the water's surface and across it: the force along x and y with the moment about z, the force along
 /// z with the moments about x and y.
@@ -25,7 +25,7 @@ pub(super) fn carriers(
 ) -> BTreeMap<String, f64> {
     let mut loads: BTreeMap<String, f64> = BTreeMap::new();
     for named in named.iter().filter(|named| named.effect.kind() == Kind::Physics) {
-        let base_drag = setting.base_drag.of(named.effect, &named.shape);
+        let base_drag = setting.base_drag.of(&named.shape);
         for series in all {
             let (features, mut memory) = (of_bins(series), Memory::default());
             for (index, bin) in series.bins.iter().enumerate() {
@@ -34,11 +34,11 @@ pub(super) fn carriers(
                     Some(before) => series.t[bin.start] - series.t[series.bins[before].start],
                     None => 0.0,
                 };
-                effects::advance(named.effect, &named.shape, &mut memory, &input, dt);
+                named.shape.advance(&mut memory, &input, dt);
                 if !inside(limits, &features[index]) {
                     continue;
                 }
-                effects::basis(named.effect, &named.shape, &memory, &input, |coefficient, part, load| {
+                named.shape.basis(&memory, &input, |coefficient, part, load| {
                     let value =
                         named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
                     let name = match part {
@@ -103,5 +103,5 @@ pub(super) fn of_region(
         false => Effect::WaterLevelOffset,
     };
     let coefficients = (0..effect.coefficients().len()).map(|coefficient| (coefficient, 1.0)).collect();
-    carriers(&[Named { effect, shape: [0.0; 3], coefficients }], all, setting, &region.limits)
+    carriers(&[Named { effect, shape: effect.plain(), coefficients }], all, setting, &region.limits)
 }

@@ -23,7 +23,7 @@ use super::verdict::Found;
 use super::{Named, plausible};
 use wade_core::condition::Condition;
 use wade_core::digest::hexadecimal;
-use wade_core::effects::{Effect, Kind};
+use wade_core::effects::{self, Effect, Kind};
 use wade_learn::trials::{SIMULATED, SimIs, Trials, WHEELS, WRENCH};
 
 fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
@@ -204,9 +204,11 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             );
         }
         // one that is 0 has no place in the law that was found, such as a frequency in a memory that only fades
-        let shape = one.effect.shape_names().iter().enumerate().filter(|(axis, _)| one.shape[*axis] != 0.0);
-        for (axis, &(name, unit)) in shape {
-            let (value, std) = (one.shape[axis], fitted.shape_std[index][axis]);
+        let nonlinear = one.effect.spec().parameters.iter().enumerate();
+        for (axis, &effects::Parameter { name, unit }) in
+            nonlinear.filter(|(axis, _)| one.shape.parameter(*axis) != 0.0)
+        {
+            let (value, std) = (one.shape.parameter(axis), fitted.shape_std[index][axis]);
             let interval = [value - 1.645 * std, value + 1.645 * std];
             parameters.insert(name, Parameter { value, std, unit, interval, literature: None });
         }
@@ -223,7 +225,7 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             coefficients: one.coefficients.iter().map(|&(c, _)| specs[c].name).collect(),
             effect: one.effect,
             shape: one.shape,
-            base_drag: judge.setting.base_drag.of(one.effect, &one.shape).into(),
+            base_drag: judge.setting.base_drag.of(&one.shape).into(),
         });
     }
     effects

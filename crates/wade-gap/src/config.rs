@@ -116,7 +116,7 @@ mod tests {
         for (text, expected) in [
             ("bootstrap = 1000000000", "bootstrap = 1000000000 must be from 20 to 100000"),
             ("placebos = 1000000000000000000", "placebos = 1000000000000000000 must be at most 10000"),
-            ("most_effects = 24", "most_effects = 24 must be from 1 to the size of the library"),
+            ("most_effects = 99", "most_effects = 99 must be from 1 to the size of the library"),
             ("significance = 1.0", "significance = 1 must be above 0 and below 1"),
             ("significance = 0.0", "significance = 0 must be above 0 and below 1"),
             ("significance = nan", "significance = NaN must be above 0 and below 1"),

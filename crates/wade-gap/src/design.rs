@@ -219,7 +219,7 @@ impl Design {
         trials: Vec<usize>,
         rows: Rows,
         setting: &Setting,
-        library: &[(Effect, Shape)],
+        library: &[Shape],
         noise: RowNoise,
         config: &Config,
     ) -> Self {
@@ -240,9 +240,9 @@ impl Design {
             rows,
         };
         let mut values: Vec<f64> = Vec::new();
-        for &(effect, shape) in library {
-            let columns = this.candidate_columns(all, setting, effect, &shape);
-            let mut candidate = Candidate { effect, shape, columns: Vec::new() };
+        for &shape in library {
+            let columns = this.candidate_columns(all, setting, &shape);
+            let mut candidate = Candidate { effect: shape.effect(), shape, columns: Vec::new() };
             for (coefficient, column, scale) in columns {
                 candidate.columns.push((this.scale.len(), coefficient));
                 this.scale.push(scale);
@@ -263,26 +263,19 @@ impl Design {
     }
 
     /// Columns of each trial, a value a sample.
-    fn raw_columns(
-        &self,
-        all: &[Series],
-        setting: &Setting,
-        effect: Effect,
-        shape: &Shape,
-    ) -> Vec<Vec<Column>> {
-        self.trials.iter().map(|&trial| columns(effect, shape, &all[trial], trial, setting)).collect()
+    fn raw_columns(&self, all: &[Series], setting: &Setting, shape: &Shape) -> Vec<Vec<Column>> {
+        self.trials.iter().map(|&trial| columns(shape, &all[trial], trial, setting)).collect()
     }
 
     fn candidate_columns(
         &self,
         all: &[Series],
         setting: &Setting,
-        effect: Effect,
         shape: &Shape,
     ) -> Vec<(usize, Vec<f64>, f64)> {
-        let raw = self.raw_columns(all, setting, effect, shape);
+        let raw = self.raw_columns(all, setting, shape);
         let mut found = Vec::new();
-        for (coefficient, _) in effect.coefficients().iter().enumerate() {
+        for (coefficient, _) in shape.effect().coefficients().iter().enumerate() {
             let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
             let mut column = to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
             let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();
@@ -319,7 +312,7 @@ impl Design {
             if own.is_empty() {
                 continue;
             }
-            let raw = self.raw_columns(all, setting, candidate.effect, &candidate.shape);
+            let raw = self.raw_columns(all, setting, &candidate.shape);
             for (place, (column, coefficient)) in own {
                 let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
                 found[place] = self.unsmoothed(all, setting, &of) / self.scale[column];
@@ -330,9 +323,8 @@ impl Design {
 
     /// Gives a candidate another shape.
     pub fn reshape(&mut self, all: &[Series], setting: &Setting, candidate: usize, shape: Shape) {
-        let effect = self.candidates[candidate].effect;
         self.candidates[candidate].shape = shape;
-        let found = self.candidate_columns(all, setting, effect, &shape);
+        let found = self.candidate_columns(all, setting, &shape);
         let held = self.candidates[candidate].columns.clone();
         for (column, coefficient) in held {
             if let Some((_, values, scale)) = found.iter().find(|(c, ..)| *c == coefficient) {
@@ -343,17 +335,16 @@ impl Design {
         }
     }
 
-    /// Loss of some columns beside a candidate of another shape, of which the coefficients listed are in use.
+    /// Loss of some columns beside an effect of a shape, of which the coefficients listed are in use.
     pub fn loss_with(
         &self,
         all: &[Series],
         setting: &Setting,
-        candidate: usize,
         shape: &Shape,
         coefficients: &[usize],
         others: &[usize],
     ) -> f64 {
-        let found = self.candidate_columns(all, setting, self.candidates[candidate].effect, shape);
+        let found = self.candidate_columns(all, setting, shape);
         let own: Vec<DVector<f64>> = found
             .into_iter()
             .filter(|(coefficient, ..)| coefficients.contains(coefficient))
@@ -398,9 +389,8 @@ impl Design {
         columns: &[(usize, usize, f64)],
     ) -> DVector<f64> {
         const STEP: f64 = 0.02;
-        let Candidate { effect, mut shape, .. } = self.candidates[candidate];
-        shape[axis] *= 1.0 + STEP;
-        let moved = self.candidate_columns(all, setting, effect, &shape);
+        let shape = self.candidates[candidate].shape.scaled(axis, 1.0 + STEP);
+        let moved = self.candidate_columns(all, setting, &shape);
         let mut change = DVector::zeros(self.y.len());
         for &(column, coefficient, beta) in columns {
             if let Some((_, values, scale)) = moved.iter().find(|(c, ..)| *c == coefficient) {

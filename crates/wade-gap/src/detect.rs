@@ -13,7 +13,7 @@ use super::series::Series;
 use super::smoothing::bins;
 use super::statistics::{median, quantile, white_variance};
 use super::{Config, Named, noise::Floor};
-use wade_core::effects::Effect;
+use wade_core::effects::{Effect, Rate};
 use wade_learn::random::Random;
 use wade_learn::trials::{Manifest, WRENCH};
 
@@ -137,12 +137,12 @@ fn of_effect(
     let forms: Vec<usize> =
         (0..design.candidates.len()).filter(|&i| design.candidates[i].effect == effect).collect();
     let Some(&form) = forms.get(forms.len() / 2) else {
-        found.not_testable = Some(not_excited(effect).into());
+        found.not_testable = Some(effect.spec().not_excited.into());
         return found;
     };
     let candidate = &design.candidates[form];
     let raw: Vec<Vec<Column>> =
-        all.iter().enumerate().map(|(rank, s)| columns(effect, &candidate.shape, s, rank, setting)).collect();
+        all.iter().enumerate().map(|(rank, s)| columns(&candidate.shape, s, rank, setting)).collect();
     let coherent = is_coherent(effect, all, &setting.components);
     let changes = if effect == Effect::SensorDelay { change_signal(all, &setting.components) } else { 1.0 };
     let mut plausible = false;
@@ -156,7 +156,7 @@ fn of_effect(
         let floor = white_error(design, column);
         let detectable = bar * error.std.max(floor) / design.scale[column] / smooth.max(0.01);
         let coefficient = &effect.coefficients()[coefficient];
-        plausible |= smooth > LEAST_SIGNAL && detectable < largest_plausible(effect, coefficient);
+        plausible |= smooth > LEAST_SIGNAL && detectable < coefficient.largest_plausible();
         found
             .minimum_detectable
             .insert(coefficient.name, Detectable { value: detectable, unit: coefficient.unit });
@@ -164,7 +164,7 @@ fn of_effect(
         found.minimum_load = Some(found.minimum_load.map_or(load, |other| other.min(load)));
     }
     if !excited {
-        found.not_testable = Some(not_excited(effect).into());
+        found.not_testable = Some(effect.spec().not_excited.into());
     } else if !plausible {
         found.not_testable =
             Some("excited too little: even the largest plausible value would drown in the noise".into());
@@ -227,16 +227,15 @@ fn is_coherent(effect: Effect, all: &[Series], components: &[usize]) -> bool {
         let seen = |with: &[usize; 2]| with.iter().any(|c| components.contains(c));
         rates.into_iter().zip(with).filter(|(_, with)| seen(with)).any(|(rate, _)| share(rate) > COHERENT)
     };
-    match effect {
-        // pitch comes with surge, roll with sway; inertia has that of turning as well
-        Effect::AddedMass | Effect::MassError | Effect::WaveMemory => {
-            felt([0, 1, 2], [[0, 4], [1, 3], [2, 2]])
-                || effect == Effect::AddedMass && felt([3, 4, 5], [[3, 3], [4, 4], [5, 5]])
-        }
-        Effect::WaterEntrySlamming => share(6) > COHERENT,
-        Effect::Rotation => felt([7, 8, 9], [[3, 3], [2, 4], [1, 5]]),
-        _ => true,
-    }
+    let is_signal = |rate: &Rate| match rate {
+        // pitch comes with surge, roll with sway
+        Rate::Acceleration => felt([0, 1, 2], [[0, 4], [1, 3], [2, 2]]),
+        Rate::AngularAcceleration => felt([3, 4, 5], [[3, 3], [4, 4], [5, 5]]),
+        Rate::Depth => share(6) > COHERENT,
+        Rate::Attitude => felt([7, 8, 9], [[3, 3], [2, 4], [1, 5]]),
+    };
+    let rates = effect.spec().rates;
+    rates.is_empty() || rates.iter().any(is_signal)
 }
 
 /// Share of signal in the changes of the prediction, on which a delay lives.
@@ -251,30 +250,4 @@ fn change_signal(all: &[Series], components: &[usize]) -> f64 {
         power += changes.sum::<f64>() / white;
     }
     if power > 0.0 { 1.0 - noise / power } else { 0.0 }
-}
-
-/// Above this a coefficient is no longer an error that somebody makes.
-fn largest_plausible(effect: Effect, coefficient: &wade_core::effects::Coefficient) -> f64 {
-    match (effect, coefficient.literature) {
-        (_, Some(band)) => band[1].max(-band[0]),
-        (Effect::Current, _) => 1.0,
-        (Effect::WaterLevelOffset, _) => 0.05,
-        (Effect::DensityError, _) => 0.2,
-        (Effect::SensorDelay, _) => 0.5,
-        (Effect::SensorGain, _) => 0.5,
-        _ => coefficient.bounds[1],
-    }
-}
-
-fn not_excited(effect: Effect) -> &'static str {
-    match effect {
-        Effect::AddedMass => "no trial accelerates beyond the noise of its accelerations",
-        Effect::Rotation => "no trial turns",
-        Effect::WaterEntrySlamming => "no trial enters the water",
-        Effect::HullFlooding => "no trial is in the water",
-        Effect::WaveMemory => "no trial changes its speed",
-        Effect::SensorDelay => "the predicted wrench hardly changes within a trial",
-        Effect::DriveGain => "the known drive force is zero",
-        _ => "no trial excites it in the components that were measured",
-    }
 }

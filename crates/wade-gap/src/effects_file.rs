@@ -134,11 +134,10 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         ((*name).to_owned(), ParameterValue { value, std: parameter.std, unit })
     });
     // the report states those alone that have a place in the law
-    let nothing =
-        |(_, unit): &(&str, &str)| ParameterValue { value: 0.0, std: 0.0, unit: (*unit).to_owned() };
-    let shape = effect.effect.shape_names().iter().map(|one| (one.0.to_owned(), nothing(one)));
+    let nothing = |unit: &str| ParameterValue { value: 0.0, std: 0.0, unit: unit.to_owned() };
+    let nonlinear = effect.effect.spec().parameters.iter();
+    let nonlinear = nonlinear.map(|spec| (spec.name.to_owned(), nothing(spec.unit)));
     ActiveEffect {
-        name: effect.effect,
         equation: effect.effect.equation().to_owned(),
         provisional: effect.provisional,
         share_of_gap: effect.share_of_gap,
@@ -147,7 +146,7 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         channel_width: trials.manifest.channel_width.or_else(|| narrowest(&trials.manifest)),
         coefficients: effect.coefficients.iter().map(|name| (*name).to_owned()).collect(),
         covariance: effect.covariance.clone(),
-        parameters: shape.chain(parameters).collect::<BTreeMap<_, _>>(),
+        parameters: nonlinear.chain(parameters).collect::<BTreeMap<_, _>>(),
     }
 }
 

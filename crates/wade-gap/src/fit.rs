@@ -15,7 +15,7 @@ use super::judge::Member;
 use super::robust::errors;
 use super::series::Series;
 use super::statistics::{quantile, student_from_normal};
-use wade_core::effects::{Effect, Kind, Shape};
+use wade_core::effects::{Effect, Kind, Numbers};
 use wade_learn::random::Random;
 
 /// Two-sided 90 % of a normal distribution.
@@ -57,8 +57,8 @@ pub(super) struct Fit {
     pub intervals: Vec<[f64; 2]>,
     /// Seen in one condition only, by member.
     pub provisional: Vec<bool>,
-    /// Standard errors of the shapes, by member.
-    pub shape_std: Vec<Shape>,
+    /// Standard errors of the nonlinear parameters, by member and number of the parameter.
+    pub shape_std: Vec<Numbers>,
 }
 
 /// Fits a set on the rows of the design.
@@ -147,7 +147,7 @@ pub(super) fn fit(
     let intervals = (0..count).map(interval).collect();
     let mut shape_std = vec![[0.0; 3]; set.len()];
     for (place, &(m, axis)) in shapes.iter().enumerate() {
-        let value = design.candidates[set[m].candidate].shape[axis];
+        let value = design.candidates[set[m].candidate].shape.parameter(axis);
         let leaked: f64 = leaks.iter().map(|leak| leak[count + place].powi(2)).sum();
         shape_std[m][axis] = value * (covariance_of(&draws, count + place) + leaked).sqrt();
     }
@@ -199,8 +199,8 @@ fn shape_axes(design: &Design, set: &[Member]) -> Vec<(usize, usize)> {
     let mut axes = Vec::new();
     for (m, member) in set.iter().enumerate() {
         let candidate = &design.candidates[member.candidate];
-        let named = 0..candidate.effect.shape_names().len();
-        axes.extend(named.filter(|&axis| candidate.shape[axis] != 0.0).map(|axis| (m, axis)));
+        let named = 0..candidate.effect.spec().parameters.len();
+        axes.extend(named.filter(|&axis| candidate.shape.parameter(axis) != 0.0).map(|axis| (m, axis)));
     }
     axes
 }

@@ -80,7 +80,7 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
         !outlasts_noise(design, &load, &design.y)
     };
     // what remembers, or begins in the middle of the trials, has a border of its own
-    let bordered = |effect: Effect| effect.has_memory() || effect == Effect::SensorBiasStep;
+    let bordered = |effect: Effect| effect.spec().has_memory || effect == Effect::SensorBiasStep;
     let candidates = design
         .candidates
         .iter()

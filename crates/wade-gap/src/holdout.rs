@@ -77,7 +77,7 @@ pub struct Worse {
 pub(super) fn explained(named: &[Named], series: &Series, rank: usize, setting: &Setting) -> Vec<[f64; 6]> {
     let mut sum = vec![[0.0; 6]; series.t.len()];
     for named in named {
-        let columns = columns(named.effect, &named.shape, series, rank, setting);
+        let columns = columns(&named.shape, series, rank, setting);
         for &(coefficient, value) in &named.coefficients {
             for (sum, column) in sum.iter_mut().zip(&columns[coefficient]) {
                 (0..6).for_each(|c| sum[c] += value * column[c]);

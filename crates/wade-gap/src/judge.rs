@@ -272,7 +272,7 @@ impl<'a> Judge<'a> {
     ) -> Option<Refusal> {
         let effect = self.effect(member);
         // what comes with an effect does not come without it
-        if effect.needs_its_first() && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
+        if effect.spec().needs_its_first && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
             return Some(Refusal::NotSignificant);
         }
         // a moving bed changes the lift, and the drag along or across: either alone is another effect's

@@ -6,6 +6,8 @@ use super::design::{Candidate, Design};
 use super::holdout::explained;
 use super::judge::Member;
 use super::series::Series;
+use wade_core::effects::current::Current;
+use wade_core::effects::sensor::SensorDelay;
 use wade_core::effects::{Effect, Kind, Shape};
 use wade_core::frame::GRAVITY;
 
@@ -34,16 +36,34 @@ fn iterate(design: &mut Design, all: &[Series], setting: &Setting, member: &Memb
     let effect = design.candidates[member.candidate].effect;
     for time in 0..TIMES {
         let Some((beta, _)) = design.solve(&columns) else { return };
-        let before = design.candidates[member.candidate].shape;
-        let mut shape = before;
-        shape[..effect.coefficients().len()].fill(0.0);
+        let shape = design.candidates[member.candidate].shape;
+        let Some(before) = estimate(&shape) else { return };
+        let mut estimate = [0.0; 2];
         for (index, &(column, coefficient)) in member.columns.iter().enumerate() {
             let [low, high] = effect.coefficients()[coefficient].bounds;
             let found = (beta[index] / design.scale[column]).clamp(low, high);
             let whole = time == 0 && before[coefficient] == 0.0;
-            shape[coefficient] = if whole { found } else { 0.5 * (before[coefficient] + found) };
+            estimate[coefficient] = if whole { found } else { 0.5 * (before[coefficient] + found) };
         }
-        design.reshape(all, setting, member.candidate, shape);
+        design.reshape(all, setting, member.candidate, with_estimate(shape, estimate));
+    }
+}
+
+/// The estimate of an effect's own coefficients about which its load is linear, by coefficient; none where it needs none.
+fn estimate(shape: &Shape) -> Option<[f64; 2]> {
+    match *shape {
+        Shape::Current(Current { east_mps, north_mps, .. }) => Some([east_mps, north_mps]),
+        Shape::SensorDelay(SensorDelay { delay_s }) => Some([delay_s, 0.0]),
+        _ => None,
+    }
+}
+
+/// The same law about another estimate.
+fn with_estimate(shape: Shape, [first, second]: [f64; 2]) -> Shape {
+    match shape {
+        Shape::Current(law) => Shape::Current(Current { east_mps: first, north_mps: second, ..law }),
+        Shape::SensorDelay(_) => Shape::SensorDelay(SensorDelay { delay_s: first }),
+        other => other,
     }
 }
 
@@ -58,15 +78,11 @@ pub(super) fn refine(design: &mut Design, all: &[Series], setting: &Setting, mem
                 .flat_map(|(_, member)| member.columns.iter().map(|(column, _)| *column))
                 .collect();
             let member = &members[index];
-            let effect = design.candidates[member.candidate].effect;
-            match effect {
-                Effect::Current | Effect::SensorDelay => iterate(design, all, setting, member, &others),
-                Effect::HullFlooding
-                | Effect::WaterEntrySlamming
-                | Effect::Squat
-                | Effect::ChannelBlockage => search(design, all, setting, member, &others, &[0]),
-                Effect::WaveMemory => search(design, all, setting, member, &others, &[0, 1]),
-                _ => {}
+            let shape = design.candidates[member.candidate].shape;
+            if estimate(&shape).is_some() {
+                iterate(design, all, setting, member, &others);
+            } else if !shape.effect().spec().parameters.is_empty() {
+                search(design, all, setting, member, &others);
             }
         }
     }
@@ -132,27 +148,22 @@ fn shortest_memory(setting: &Setting) -> f64 {
 }
 
 /// True for a memory that the search would have made shorter still: what it stands for is no memory.
-pub(super) fn is_too_short(effect: Effect, shape: &Shape, setting: &Setting) -> bool {
-    effect == Effect::WaveMemory && shape[0] < SHORTEST_STEP * shortest_memory(setting)
+pub(super) fn is_too_short(shape: &Shape, setting: &Setting) -> bool {
+    let shortest = SHORTEST_STEP * shortest_memory(setting);
+    matches!(shape, Shape::WaveMemory(memory) if memory.time_constant_s < shortest)
 }
 
 /// Coordinate search over the nonlinear parameters of a member, from its own shape and the best of the others that its effect
 /// is looked for in: two numbers of a memory go together, and a search along one and the other stops on the way.
-fn search(
-    design: &mut Design,
-    all: &[Series],
-    setting: &Setting,
-    member: &Member,
-    others: &[usize],
-    axes: &[usize],
-) {
+fn search(design: &mut Design, all: &[Series], setting: &Setting, member: &Member, others: &[usize]) {
     /// Shapes from which two numbers are looked for.
     const STARTS: usize = 3;
     let coefficients: Vec<usize> = member.columns.iter().map(|(_, coefficient)| *coefficient).collect();
     let Candidate { effect, shape: own, .. } = design.candidates[member.candidate];
-    let loss = |shape: &Shape| design.loss_with(all, setting, member.candidate, shape, &coefficients, others);
+    let axes = effect.spec().parameters.len();
+    let loss = |shape: &Shape| design.loss_with(all, setting, shape, &coefficients, others);
     let mut starts = vec![own];
-    if axes.len() > 1 {
+    if axes > 1 {
         let alike = |candidate: &&Candidate| candidate.effect == effect && candidate.shape != own;
         let forms = design.candidates.iter().filter(alike);
         let mut forms: Vec<(f64, Shape)> = forms.map(|form| (loss(&form.shape), form.shape)).collect();
@@ -167,17 +178,16 @@ fn search(
 }
 
 /// Goes down along one number after the other by factors that shrink; the first of them not below `shortest`.
-fn descend(start: Shape, axes: &[usize], shortest: f64, loss: &dyn Fn(&Shape) -> f64) -> (f64, Shape) {
+fn descend(start: Shape, axes: usize, shortest: f64, loss: &dyn Fn(&Shape) -> f64) -> (f64, Shape) {
     const TRIES: usize = 8;
     let (mut best, mut shape) = (loss(&start), start);
     for step in [1.5, 1.15, 1.05, SHORTEST_STEP] {
-        for &axis in axes {
+        for axis in 0..axes {
             for factor in [step, 1.0 / step] {
                 for _ in 0..TRIES {
-                    let mut tried = shape;
-                    tried[axis] *= factor;
+                    let tried = shape.scaled(axis, factor);
                     // a frequency of zero has no factor
-                    if tried[axis] == shape[axis] || (axis == 0 && tried[0] < shortest) {
+                    if tried == shape || (axis == 0 && tried.parameter(0) < shortest) {
                         break;
                     }
                     let found = loss(&tried);

@@ -52,7 +52,7 @@ pub struct NamedEffect {
     /// Which effect.
     #[serde(skip)]
     pub effect: Effect,
-    /// Nonlinear parameters.
+    /// The form of its law with the nonlinear parameters; three numbers in a file.
     pub shape: Shape,
     /// Drag of the model itself as coefficients along x, y, z, with which some effects scale.
     pub base_drag: [f64; 3],

@@ -128,7 +128,7 @@ impl Judge<'_> {
             Effect::SensorBiasStep => 2,
             // time constant, frequency, and what it remembers
             Effect::WaveMemory => 3,
-            effect => effect.shape_names().len(),
+            effect => effect.spec().parameters.len(),
         };
         member.columns.len() + shape
     }

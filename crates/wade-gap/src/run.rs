@@ -73,10 +73,7 @@ pub fn run(
     };
     let available = |effect: &Effect| unavailable(*effect, &setting, &trials.manifest, &all).is_none();
     let library: Vec<Effect> = config.library.iter().copied().filter(available).collect();
-    let forms: Vec<(Effect, Shape)> = library
-        .iter()
-        .flat_map(|&effect| shapes(effect, &all, &setting).into_iter().map(move |shape| (effect, shape)))
-        .collect();
+    let forms: Vec<Shape> = library.iter().flat_map(|&effect| shapes(effect, &all, &setting)).collect();
     let rows = Rows::new(&all, &naming, &setting.components, config.block_s);
     if rows.blocks / 2 < config.folds {
         let (blocks, block_s, folds) = (rows.blocks, config.block_s, config.folds);

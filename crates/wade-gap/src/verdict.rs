@@ -88,7 +88,7 @@ impl Found {
         let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
         let unresolved = members.iter().any(|member| {
             let candidate = &design.candidates[member.candidate];
-            is_too_short(candidate.effect, &candidate.shape, judge.setting)
+            is_too_short(&candidate.shape, judge.setting)
         });
         let missing = !members.is_empty() || is_structured(judge, gap_structure);
         // what one effect explains in a region, a sum of others can imitate everywhere; never the other way round, since a limit

@@ -235,7 +235,7 @@ pub fn batch_response(
     let model = vehicle.model();
     let rows = if with_surfaces { len * model.vehicle().surfaces.len() } else { 0 };
     let effects = vehicle.effects().map_or(&[][..], |file| &file.effects);
-    let codes: Vec<i32> = effects.iter().map(|effect| effect.name.code() as i32).collect();
+    let codes: Vec<i32> = effects.iter().map(|effect| effect.effect().code() as i32).collect();
     proto::EvaluateBatchResponse {
         surface_force_n: Vec::with_capacity(3 * rows),
         surface_point_m: Vec::with_capacity(3 * rows),
@@ -334,8 +334,8 @@ fn active_effects(file: &EffectsFile) -> Vec<proto::ActiveEffect> {
         unit: parameter.unit.clone(),
     };
     let active = |effect: &effects::ActiveEffect| proto::ActiveEffect {
-        effect: effect.name.code() as i32,
-        name: effect.name.name().into(),
+        effect: effect.effect().code() as i32,
+        name: effect.effect().name().into(),
         equation: effect.equation.clone(),
         parameters: effect.parameters.iter().map(parameter).collect(),
         provisional: effect.provisional,
@@ -388,6 +388,11 @@ mod tests {
                 .map(|effect| effect.as_str_name().to_lowercase());
             let expected = (effect.kind() == Kind::Physics).then(|| format!("effect_{}", effect.name()));
             assert_eq!(name.ok(), expected);
+        }
+        // and the other way round: far beyond the list
+        for code in (1..1000).filter(|&code| proto::Effect::try_from(code).is_ok()) {
+            let effect = Effect::from_code(code as u32).map(Effect::kind);
+            assert_eq!(effect, Some(Kind::Physics), "the proto has an effect {code}");
         }
         for reason in LeftOut::ALL {
             let name =

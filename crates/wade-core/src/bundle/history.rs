@@ -43,7 +43,7 @@ impl Kept {
     /// Reads a version, with every check.
     pub(super) fn read(source: Source) -> Result<Self, BundleError> {
         let Bundle { version, effects, trained, .. } = source.bundle()?;
-        let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.name.name()).collect();
+        let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.effect().name()).collect();
         let sums = checksums::parse(&source.file(SUMS_FILE)?).map_err(at(&source.path().join(SUMS_FILE)))?;
         let written_unix_s = match &source {
             Source::Carried(_) => None,

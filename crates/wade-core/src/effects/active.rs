@@ -9,9 +9,8 @@ use super::body::Body;
 use super::file::EffectsFile;
 use super::immersion::Immersion;
 use super::input::{BaseDrag, Input, Memory, Part};
-use super::library::{Effect, MAX_COEFFICIENTS, PHYSICS, Shape};
+use super::library::{Effect, MAX_COEFFICIENTS, MEMORIES, PHYSICS, Quantity, Shape};
 use super::validity::OutsideBox;
-use super::{added_mass_matrix, advance, basis};
 use crate::condition::Condition;
 use crate::forces::Forces;
 use crate::frame::Vec3;
@@ -36,17 +35,13 @@ pub struct Circumstances {
 /// What lasts from state to state: the memory of waves and flooding. Starts at rest and dry.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Session {
-    flooding: Memory,
-    waves: Memory,
+    /// One an effect that remembers, in the order of the library.
+    memories: [Memory; MEMORIES],
     depth: Option<f64>,
     depth_rate: Option<f64>,
 }
 
 impl Session {
-    fn memory(&mut self, effect: Effect) -> &mut Memory {
-        if effect == Effect::HullFlooding { &mut self.flooding } else { &mut self.waves }
-    }
-
     /// Takes the rate of the depth from its change.
     fn follow(&mut self, depth: f64, time_step: f64) {
         if let Some(before) = self.depth.filter(|_| time_step > 0.0) {
@@ -154,6 +149,9 @@ struct Entry {
     values: [f64; MAX_COEFFICIENTS],
     base_drag: BaseDrag,
     channel_width: Option<f64>,
+    acts_on_own_drag: bool,
+    /// Place of its memory in a session.
+    memory: Option<usize>,
 }
 
 /// What the model says of a state.
@@ -179,11 +177,13 @@ impl ActiveEffects {
     /// Prepares the hull, which takes a tenth of a second.
     pub fn new(file: EffectsFile, vehicle: &Vehicle) -> Self {
         let entries = file.effects.iter().map(|effect| Entry {
-            effect: effect.name,
+            effect: effect.effect(),
             shape: effect.shape,
             values: effect.values(),
             base_drag: effect.base_drag(),
             channel_width: effect.channel_width,
+            acts_on_own_drag: effect.effect().spec().acts_on_own_drag,
+            memory: effect.effect().memory_place(),
         });
         Self { entries: entries.collect(), body: Body::of_vehicle(vehicle), file }
     }
@@ -196,7 +196,7 @@ impl ActiveEffects {
     /// The state in which effects that act on the model's own drag are held, where it is another than that asked for: the model
     /// must be asked there as well, or its drag would be that of one state and the effect's that of another.
     pub fn edge(&self, condition: &Condition) -> Option<Condition> {
-        if !self.entries.iter().any(|entry| entry.effect.acts_on_own_drag()) {
+        if !self.entries.iter().any(|entry| entry.acts_on_own_drag) {
             return None;
         }
         Some(self.file.validity.clamped(condition)).filter(|state| state != condition)
@@ -247,31 +247,30 @@ impl ActiveEffects {
             let implicit = entry.effect == Effect::AddedMass && circumstances.implicit_added_mass;
             input.condition = if implicit { &without_rate } else { &state };
             input.predicted = match at_edge {
-                Some(wrench) if entry.effect.acts_on_own_drag() => wrench,
+                Some(wrench) if entry.acts_on_own_drag => wrench,
                 _ => forces.wrench,
             };
             (input.base_drag, input.channel_width) = (entry.base_drag, entry.channel_width);
-            let left_out = match entry.effect {
-                Effect::HullFlooding | Effect::WaveMemory if session.is_none() => Some(LeftOut::NoSession),
-                Effect::Current if current_stated => Some(LeftOut::CurrentStated),
-                Effect::Current if circumstances.heading.is_none() => Some(LeftOut::NoHeading),
-                Effect::WheelPaddleThrust if circumstances.wheel_speeds.is_none() => {
-                    Some(LeftOut::NoWheelSpeeds)
-                }
-                Effect::WaterEntrySlamming if rate.is_none() => Some(LeftOut::NoDepthRate),
+            let missing = |quantity: &Quantity| match quantity {
+                Quantity::Session if session.is_none() => Some(LeftOut::NoSession),
+                Quantity::NoStatedCurrent if current_stated => Some(LeftOut::CurrentStated),
+                Quantity::Heading if circumstances.heading.is_none() => Some(LeftOut::NoHeading),
+                Quantity::WheelSpeeds if circumstances.wheel_speeds.is_none() => Some(LeftOut::NoWheelSpeeds),
+                Quantity::DepthRate if rate.is_none() => Some(LeftOut::NoDepthRate),
                 _ => None,
             };
-            let memory = match session.as_deref_mut().filter(|_| entry.effect.has_memory()) {
-                Some(session) => {
-                    let memory = session.memory(entry.effect);
-                    advance(entry.effect, &entry.shape, memory, &input, circumstances.time_step);
+            let left_out = entry.effect.spec().inputs.iter().find_map(missing);
+            let memory = match (session.as_deref_mut(), entry.memory) {
+                (Some(session), Some(place)) => {
+                    let memory = &mut session.memories[place];
+                    entry.shape.advance(memory, &input, circumstances.time_step);
                     *memory
                 }
-                None => Memory::default(),
+                _ => Memory::default(),
             };
             let mut wrench = Wrench::default();
             if left_out.is_none() {
-                basis(entry.effect, &entry.shape, &memory, &input, |coefficient, part, load| {
+                entry.shape.basis(&memory, &input, |coefficient, part, load| {
                     let value = entry.values[coefficient];
                     wrench += load * value;
                     if let Part::Panel(panel) = part {
@@ -279,9 +278,9 @@ impl ActiveEffects {
                     }
                 });
             }
-            if entry.effect == Effect::AddedMass {
+            if let Shape::AddedMass(law) = entry.shape {
                 let k = std::array::from_fn(|axis| entry.values[axis]);
-                *added_mass = Some(added_mass_matrix(&entry.shape, &self.body, immersion, state.density, &k));
+                *added_mass = Some(law.matrix(&self.body, immersion, state.density, &k));
             }
             loads.push(EffectLoad { effect: entry.effect, wrench, left_out });
         }

@@ -4,32 +4,77 @@
 //! continuity the flow beside the hull is `1 / (1 - m)` times as fast. Qi, Eames, Johnson (JFM 2014) have
 //! `(1 + Cd0 b / 2w)^2` instead, which agrees to a few per cent for b/w of 0.1 to 0.4, where both are meant to hold. And with
 //! the model's own drag `D`, whatever law it follows, and the surface that falls where the flow is fast,
-//! [`super::channel_flow`]. `k` is about 1. The shape is 0 for the former and, for the latter, the Froude number above which
-//! the surface stays where it is.
+//! [`super::channel_flow`]. `k` is about 1.
 
 use super::channel_flow::{self, MOST};
-use super::input::{Input, Part};
-use super::library::{Effect, Shape};
+use super::input::{Input, Memory, Part};
+use super::law::{Law, Numbers, ShapeFault, amount, unused};
+use super::library::{Coefficient, EffectSpec, Parameter, Quantity};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
-pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let (velocity, immersion) = (input.condition.velocity, input.immersion);
-    if Effect::ChannelBlockage.is_in_proportion(shape) {
-        let more = channel_flow::excess(input, shape[0]).unwrap_or(0.0);
-        emit(0, Part::Hull, input.at(input.predicted_drag() * more, &immersion.center_of_buoyancy));
-        return;
+/// The law of the faster flow.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum ChannelBlockage {
+    /// By the windward areas.
+    #[default]
+    WindwardAreas,
+    /// By the model's own drag and a surface that falls.
+    FallingSurface {
+        /// Froude number above which the surface stays where it is [-]; greater than 0.
+        faded_at: f64,
+    },
+}
+
+impl Law for ChannelBlockage {
+    const SPEC: EffectSpec = EffectSpec {
+        name: "channel_blockage",
+        summary: "side walls accelerate the flow",
+        equation: "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d), or W = k D (((1 - m)(1 - s / d))^-2 - 1) with m and s of squat in a channel",
+        coefficients: &[Coefficient::published("strength", 0.0, 5.0, [0.5, 1.5])],
+        parameters: &[Parameter { name: "faded_at", unit: "1" }],
+        inputs: &[Quantity::Velocity, Quantity::ChannelWidth],
+        experiment: "repeat steady runs in a channel of another width, or in open water (channel_widths in trials.toml)",
+        ..EffectSpec::COMMON
+    };
+
+    fn from_numbers(numbers: &Numbers) -> Result<Self, ShapeFault> {
+        unused(numbers, 1)?;
+        Ok(match amount(numbers, 0)? {
+            0.0 => Self::WindwardAreas,
+            faded_at => Self::FallingSurface { faded_at },
+        })
     }
-    let Some(width) = channel_flow::width(input) else { return };
-    let wet = input.body.panels.iter().zip(&immersion.panels);
-    let front: f64 = wet.map(|(panel, wet)| panel.windward(&velocity).x * wet.fraction).sum();
-    let blockage = (front / (width * immersion.depth)).min(MOST);
-    let more = (1.0 - blockage).powi(-2) - 1.0;
-    let pressure = input.half_density() * velocity.norm() * more;
-    for (index, panel) in input.body.panels.iter().enumerate() {
-        let part = &immersion.panels[index];
-        let area = panel.windward(&velocity).component_mul(&input.base_drag) * part.fraction;
-        let force: Vec3 = area.component_mul(&velocity) * -pressure;
-        emit(0, Part::Panel(index), input.at(force, &part.point));
+
+    fn to_numbers(&self) -> Numbers {
+        match *self {
+            Self::WindwardAreas => [0.0; 3],
+            Self::FallingSurface { faded_at } => [faded_at, 0.0, 0.0],
+        }
+    }
+
+    fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+        let (velocity, immersion) = (input.condition.velocity, input.immersion);
+        if let Self::FallingSurface { faded_at } = *self {
+            let more = channel_flow::excess(input, faded_at).unwrap_or(0.0);
+            emit(0, Part::Hull, input.at(input.predicted_drag() * more, &immersion.center_of_buoyancy));
+            return;
+        }
+        let Some(width) = channel_flow::width(input) else { return };
+        let wet = input.body.panels.iter().zip(&immersion.panels);
+        let front: f64 = wet.map(|(panel, wet)| panel.windward(&velocity).x * wet.fraction).sum();
+        let blockage = (front / (width * immersion.depth)).min(MOST);
+        let more = (1.0 - blockage).powi(-2) - 1.0;
+        let pressure = input.half_density() * velocity.norm() * more;
+        for (index, panel) in input.body.panels.iter().enumerate() {
+            let part = &immersion.panels[index];
+            let area = panel.windward(&velocity).component_mul(&input.base_drag) * part.fraction;
+            let force: Vec3 = area.component_mul(&velocity) * -pressure;
+            emit(0, Part::Panel(index), input.at(force, &part.point));
+        }
+    }
+
+    fn is_in_proportion(&self) -> bool {
+        matches!(self, Self::FallingSurface { .. })
     }
 }

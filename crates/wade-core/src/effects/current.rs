@@ -2,40 +2,76 @@
 //!
 //! `f = D(v - w) - D(v)` on each wet panel, `w = R^T u`, with the drag of the model itself, `D(v) = -K |v| v`, `K` from
 //! what the model answers in the state ([`Input::own_drag`]). Exact for a uniform flow and a quadratic law. Written as `K |v - w0| w + K v ((2 v - w0) . w) / (|v - w0| + |v|)`, which is linear in
-//! `w` and exact at `w = w0`; the first two numbers of the shape are the estimate `u0`, to which fitting sets them again and
-//! again. The third is 0 for a drag with the whole speed and 1 where each axis has its own, `D_i(v) = -K_i |v_i| v_i` (the
-//! cross-flow principle; Fossen, Handbook of Marine Craft Hydrodynamics, section 6.4).
+//! `w` and exact at `w = w0`, the estimate `u0` of the law, to which fitting sets it again and again. With
+//! [`DragSpeed::PerAxis`] the drag is `D_i(v) = -K_i |v_i| v_i` (the cross-flow principle; Fossen, Handbook of Marine Craft
+//! Hydrodynamics, section 6.4).
 
-use super::input::{Input, Part};
-use super::library::Shape;
+use super::input::{DragSpeed, Input, Memory, Part};
+use super::law::{Law, Numbers, ShapeFault, finite, form};
+use super::library::{Coefficient, EffectSpec, Quantity};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
-pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let velocity = input.condition.velocity;
-    let estimate = input.body_from_world(shape[0], shape[1]);
-    let through = velocity - estimate;
-    let (fast, slow) = (through.norm(), velocity.norm());
-    let axes_apart = shape[2] > 0.5;
-    let drag = input.own_drag(axes_apart);
-    for (number, (east, north)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
-        let w = input.body_from_world(east, north);
-        let change = if axes_apart {
-            Vec3::from_fn(|i, _| w[i] * secant(velocity[i], through[i]))
-        } else {
-            let along = (velocity * 2.0 - estimate).dot(&w) / (fast + slow).max(1e-9);
-            w * fast + velocity * along
-        };
-        for (index, panel) in input.body.panels.iter().enumerate() {
-            let part = &input.immersion.panels[index];
-            let wet = part.fraction;
-            if wet == 0.0 {
-                continue;
+/// A current with the estimate about which its load is linear.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Current {
+    /// Estimate of the current to the east [m/s].
+    pub east_mps: f64,
+    /// Estimate of the current to the north [m/s].
+    pub north_mps: f64,
+    /// Speed of the drag.
+    pub speed: DragSpeed,
+}
+
+impl Law for Current {
+    const SPEC: EffectSpec = EffectSpec {
+        name: "current",
+        summary: "water that moves over ground",
+        equation: "f = D(v - R^T u) - D(v) with the model's drag D",
+        coefficients: &[
+            Coefficient::new("east", "m/s", -3.0, 3.0).up_to(1.0),
+            Coefficient::new("north", "m/s", -3.0, 3.0).up_to(1.0),
+        ],
+        inputs: &[Quantity::Velocity, Quantity::ModelWrench, Quantity::NoStatedCurrent, Quantity::Heading],
+        acts_on_own_drag: true,
+        experiment: "drive the same line in both directions, and stand still with the wheels locked",
+        ..EffectSpec::COMMON
+    };
+
+    fn from_numbers(numbers: &Numbers) -> Result<Self, ShapeFault> {
+        let (east_mps, north_mps) = (finite(numbers, 0)?, finite(numbers, 1)?);
+        Ok(Self { east_mps, north_mps, speed: form(numbers, 2, &DragSpeed::ALL)? })
+    }
+
+    fn to_numbers(&self) -> Numbers {
+        [self.east_mps, self.north_mps, f64::from(self.speed as u8)]
+    }
+
+    fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+        let velocity = input.condition.velocity;
+        let estimate = input.body_from_world(self.east_mps, self.north_mps);
+        let through = velocity - estimate;
+        let (fast, slow) = (through.norm(), velocity.norm());
+        let drag = input.own_drag(self.speed);
+        for (number, (east, north)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
+            let w = input.body_from_world(east, north);
+            let change = if self.speed == DragSpeed::PerAxis {
+                Vec3::from_fn(|i, _| w[i] * secant(velocity[i], through[i]))
+            } else {
+                let along = (velocity * 2.0 - estimate).dot(&w) / (fast + slow).max(1e-9);
+                w * fast + velocity * along
+            };
+            for (index, panel) in input.body.panels.iter().enumerate() {
+                let part = &input.immersion.panels[index];
+                let wet = part.fraction;
+                if wet == 0.0 {
+                    continue;
+                }
+                let facing = panel.windward(&through);
+                let area = facing.component_mul(&drag) * (input.half_density() * wet);
+                let force: Vec3 = area.component_mul(&change);
+                emit(number, Part::Panel(index), input.at(force, &part.point));
             }
-            let facing = panel.windward(&through);
-            let area = facing.component_mul(&drag) * (input.half_density() * wet);
-            let force: Vec3 = area.component_mul(&change);
-            emit(number, Part::Panel(index), input.at(force, &part.point));
         }
     }
 }

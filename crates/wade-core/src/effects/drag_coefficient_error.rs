@@ -3,33 +3,84 @@
 //! `f_i = -1/2 rho C_i A_i |v| v_i` on each wet panel, `A_i` the area that meets the flow. `C` is the difference to the
 //! drag that the model has already, so it may be negative. Bluff bodies lie between 0.3 and 2.1 (Qi, Eames, Johnson, JFM
 //! 2014; FEMA P-646 takes 2.0). Valid while the flow is subcritical; the local velocity of a turning hull is `rotation`.
-//! The shape is 0 for this, 1 for `|v_i| v_i`, where each axis has its own speed (the cross-flow principle), and 2 for the
-//! model's own drag `D` in proportion, `F_i = C_i / K_i D_i` with its coefficients `K`: the part of its force across
-//! gravity, whatever law it follows.
+//! [`DragLaw`] has other forms: `|v_i| v_i`, and the model's own drag `D` in proportion, `F_i = C_i / K_i D_i` with its
+//! coefficients `K`: the part of its force across gravity, whatever law it follows.
 
-use super::input::{Input, Part};
-use super::library::{Effect, Shape};
+use super::input::{Input, Memory, Part};
+use super::law::{Law, Numbers, ShapeFault, form, unused};
+use super::library::{Coefficient, EffectSpec, Quantity};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
-pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    if Effect::DragCoefficientError.is_in_proportion(shape) {
-        return of_the_model(input, emit);
+/// The drag to which the coefficients are added. The numbers are those of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DragLaw {
+    /// 0: `|v| v_i`.
+    #[default]
+    Quadratic,
+    /// 1: `|v_i| v_i`, where each axis has its own speed (the cross-flow principle).
+    CrossFlow,
+    /// 2: the model's own drag, in proportion.
+    Proportional,
+}
+
+/// An error of the drag coefficients with the law that it follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DragCoefficientError {
+    /// The drag to which the coefficients are added.
+    pub law: DragLaw,
+}
+
+impl Law for DragCoefficientError {
+    const SPEC: EffectSpec = EffectSpec {
+        name: "drag_coefficient_error",
+        summary: "quadratic drag with another coefficient",
+        equation: "f_i = -1/2 rho C_i A_i |v| v_i",
+        // the difference of two coefficients that each lie in 0 to 4
+        coefficients: &[
+            Coefficient::published("surge", -4.0, 4.0, [-1.0, 1.0]),
+            Coefficient::published("sway", -4.0, 4.0, [-1.0, 1.0]),
+            Coefficient::published("heave", -4.0, 4.0, [-1.0, 1.0]),
+        ],
+        reference: "added to the coefficient",
+        inputs: &[Quantity::Velocity],
+        experiment: "hold at least four steady speeds over the whole range at two depths",
+        ..EffectSpec::COMMON
+    };
+
+    fn from_numbers(numbers: &Numbers) -> Result<Self, ShapeFault> {
+        unused(numbers, 1)?;
+        Ok(Self { law: form(numbers, 0, &[DragLaw::Quadratic, DragLaw::CrossFlow, DragLaw::Proportional])? })
     }
-    let velocity = input.condition.velocity;
-    let whole = velocity.norm();
-    let speed = |axis: usize| if shape[0] > 0.5 { velocity[axis].abs() } else { whole };
-    for (index, panel) in input.body.panels.iter().enumerate() {
-        let part = &input.immersion.panels[index];
-        let wet = part.fraction;
-        if wet == 0.0 {
-            continue;
+
+    fn to_numbers(&self) -> Numbers {
+        [f64::from(self.law as u8), 0.0, 0.0]
+    }
+
+    fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+        if self.is_in_proportion() {
+            return of_the_model(input, emit);
         }
-        let area = panel.windward(&velocity) * wet;
-        for axis in 0..3 {
-            let force = Vec3::ith(axis, -input.half_density() * speed(axis) * area[axis] * velocity[axis]);
-            emit(axis, Part::Panel(index), input.at(force, &part.point));
+        let velocity = input.condition.velocity;
+        let whole = velocity.norm();
+        let speed = |axis: usize| if self.law == DragLaw::CrossFlow { velocity[axis].abs() } else { whole };
+        for (index, panel) in input.body.panels.iter().enumerate() {
+            let part = &input.immersion.panels[index];
+            let wet = part.fraction;
+            if wet == 0.0 {
+                continue;
+            }
+            let area = panel.windward(&velocity) * wet;
+            for axis in 0..3 {
+                let force =
+                    Vec3::ith(axis, -input.half_density() * speed(axis) * area[axis] * velocity[axis]);
+                emit(axis, Part::Panel(index), input.at(force, &part.point));
+            }
         }
+    }
+
+    fn is_in_proportion(&self) -> bool {
+        self.law == DragLaw::Proportional
     }
 }
 

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::input::BaseDrag;
+use super::law::Numbers;
 use super::library::{Effect, Kind, MAX_COEFFICIENTS, Shape};
 use super::validity::Validity;
 use crate::frame::Vec3;
@@ -70,22 +71,19 @@ pub struct Evidence {
 
 /// One effect with its numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Row", into = "Row")]
 pub struct ActiveEffect {
-    /// Which of the library.
-    pub name: Effect,
     /// Its equation, for the reader.
     pub equation: String,
     /// Seen in one condition only.
     pub provisional: bool,
     /// Share of the gap above the floor that goes when it is added to the others.
     pub share_of_gap: f64,
-    /// Nonlinear parameters and the form, in the order of the effect's source.
+    /// Which effect of the library, with the form of its law and the nonlinear parameters.
     pub shape: Shape,
     /// Drag coefficients of the model that the effect scales with, along x, y, z [-].
     pub base_drag: [f64; 3],
     /// Width of the channel in which it was seen [m].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub channel_width: Option<f64>,
     /// Names of the coefficients in the order of the covariance.
     pub coefficients: Vec<String>,
@@ -93,6 +91,63 @@ pub struct ActiveEffect {
     pub covariance: Vec<Vec<f64>>,
     /// The coefficients and the nonlinear parameters by name.
     pub parameters: BTreeMap<String, ParameterValue>,
+}
+
+/// An effect as it stands in the file, where the numbers of a shape may mean nothing.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    name: Effect,
+    equation: String,
+    provisional: bool,
+    share_of_gap: f64,
+    shape: Numbers,
+    base_drag: [f64; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    channel_width: Option<f64>,
+    coefficients: Vec<String>,
+    covariance: Vec<Vec<f64>>,
+    parameters: BTreeMap<String, ParameterValue>,
+}
+
+impl TryFrom<Row> for ActiveEffect {
+    type Error = EffectsFileError;
+
+    fn try_from(row: Row) -> Result<Self, EffectsFileError> {
+        let shape = Shape::from_numbers(row.name, row.shape).map_err(|fault| EffectsFileError::Field {
+            effect: row.name.name(),
+            field: format!("shape[{}]", fault.index),
+            expected: fault.expected,
+        })?;
+        Ok(Self {
+            equation: row.equation,
+            provisional: row.provisional,
+            share_of_gap: row.share_of_gap,
+            shape,
+            base_drag: row.base_drag,
+            channel_width: row.channel_width,
+            coefficients: row.coefficients,
+            covariance: row.covariance,
+            parameters: row.parameters,
+        })
+    }
+}
+
+impl From<ActiveEffect> for Row {
+    fn from(effect: ActiveEffect) -> Self {
+        Self {
+            name: effect.effect(),
+            equation: effect.equation,
+            provisional: effect.provisional,
+            share_of_gap: effect.share_of_gap,
+            shape: effect.shape.to_numbers(),
+            base_drag: effect.base_drag,
+            channel_width: effect.channel_width,
+            coefficients: effect.coefficients,
+            covariance: effect.covariance,
+            parameters: effect.parameters,
+        }
+    }
 }
 
 /// A value with its standard error.
@@ -212,8 +267,8 @@ impl EffectsFile {
         }
         let mut seen = BTreeSet::new();
         for effect in &self.effects {
-            if !seen.insert(effect.name) {
-                return Err(EffectsFileError::Twice { effect: effect.name.name() });
+            if !seen.insert(effect.effect()) {
+                return Err(EffectsFileError::Twice { effect: effect.effect().name() });
             }
             effect.check()?;
         }
@@ -223,7 +278,7 @@ impl EffectsFile {
     /// Both effects are there, a number each pair of their coefficients, none larger than the two allow.
     fn check_between(&self, between: &Between) -> Result<(), EffectsFileError> {
         let [first, second] = between.effects;
-        let of = |name: Effect| self.effects.iter().find(|effect| effect.name == name);
+        let of = |name: Effect| self.effects.iter().find(|effect| effect.effect() == name);
         let is_same = |other: &&Between| other.effects == [first, second] || other.effects == [second, first];
         let once = self.format > 1 && self.between.iter().filter(is_same).count() == 1;
         let sound = match (of(first), of(second)) {
@@ -254,10 +309,15 @@ impl EffectsFile {
 }
 
 impl ActiveEffect {
+    /// Which effect of the library.
+    pub fn effect(&self) -> Effect {
+        self.shape.effect()
+    }
+
     /// Value of every coefficient of the library in its order; 0 for those that were not fitted.
     pub(super) fn values(&self) -> [f64; MAX_COEFFICIENTS] {
         let mut values = [0.0; MAX_COEFFICIENTS];
-        for (value, coefficient) in values.iter_mut().zip(self.name.coefficients()) {
+        for (value, coefficient) in values.iter_mut().zip(self.effect().coefficients()) {
             if self.coefficients.iter().any(|name| name == coefficient.name) {
                 *value = self.parameters.get(coefficient.name).map_or(0.0, |parameter| parameter.value);
             }
@@ -270,8 +330,8 @@ impl ActiveEffect {
     }
 
     fn check(&self) -> Result<(), EffectsFileError> {
-        let effect = self.name.name();
-        if self.name.kind() != Kind::Physics {
+        let effect = self.effect().name();
+        if self.effect().kind() != Kind::Physics {
             return Err(EffectsFileError::NotPhysics { effect });
         }
         let must = |holds: bool, field: &str, expected: &str| match holds {
@@ -283,17 +343,10 @@ impl ActiveEffect {
             }),
         };
         must((0.0..=1.0).contains(&self.share_of_gap), "share_of_gap", "between 0 and 1")?;
-        must(self.shape.iter().all(|x| x.is_finite()), "shape", "three finite numbers")?;
         must(self.base_drag.iter().all(|x| (0.0..=10.0).contains(x)), "base_drag", "between 0 and 10")?;
         let width = self.channel_width.is_none_or(|width| width.is_finite() && width > 0.0);
         must(width, "channel_width", "greater than 0")?;
-        let walls = match self.name {
-            Effect::ChannelBlockage => true,
-            // a channel's law, and not that of open water
-            Effect::Squat => self.shape[0] > 0.0,
-            _ => false,
-        };
-        let in_channel = !walls || self.channel_width.is_some();
+        let in_channel = !self.shape.needs_channel_width() || self.channel_width.is_some();
         must(in_channel, "channel_width", "there: this effect depends on it")?;
         self.check_coefficients(&must)?;
         self.check_parameters(&must)
@@ -303,7 +356,7 @@ impl ActiveEffect {
         &self,
         must: &impl Fn(bool, &str, &str) -> Result<(), EffectsFileError>,
     ) -> Result<(), EffectsFileError> {
-        let specs = self.name.coefficients();
+        let specs = self.effect().coefficients();
         let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
         let known = self.coefficients.iter().all(|name| names.contains(&name.as_str()));
         must(
@@ -330,13 +383,16 @@ impl ActiveEffect {
         &self,
         must: &impl Fn(bool, &str, &str) -> Result<(), EffectsFileError>,
     ) -> Result<(), EffectsFileError> {
-        let shapes = self.name.shape_names();
-        let fitted =
-            self.name.coefficients().iter().filter(|spec| self.coefficients.iter().any(|c| c == spec.name));
+        let nonlinear = self.effect().spec().parameters;
+        let fitted = self
+            .effect()
+            .coefficients()
+            .iter()
+            .filter(|spec| self.coefficients.iter().any(|c| c == spec.name));
         let coefficients = fitted.map(|spec| (spec.name, spec.unit, spec.bounds));
         let limit = f64::MAX;
         let expected: Vec<(&str, &str, [f64; 2])> =
-            coefficients.chain(shapes.iter().map(|&(name, unit)| (name, unit, [0.0, limit]))).collect();
+            coefficients.chain(nonlinear.iter().map(|spec| (spec.name, spec.unit, [0.0, limit]))).collect();
         let names = expected.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ");
         let unknown = self.parameters.keys().find(|key| !expected.iter().any(|(name, ..)| name == key));
         must(
@@ -358,10 +414,10 @@ impl ActiveEffect {
             )?;
             must(parameter.std.is_finite() && parameter.std >= 0.0, &field(".std"), "0 or greater")?;
         }
-        for (axis, (name, _)) in shapes.iter().enumerate() {
-            let same =
-                self.parameters.get(*name).is_some_and(|parameter| parameter.value == self.shape[axis]);
-            must(same, &format!("shape[{axis}]"), &format!("parameters.{name}.value"))?;
+        for (index, spec) in nonlinear.iter().enumerate() {
+            let stated = self.parameters.get(spec.name).map(|parameter| parameter.value);
+            let same = stated == Some(self.shape.parameter(index));
+            must(same, &format!("shape[{index}]"), &format!("parameters.{}.value", spec.name))?;
         }
         Ok(())
     }

@@ -6,7 +6,8 @@
 //! the share. With a constant level outside the root of the difference falls linearly, which the step uses.
 
 use super::input::{Input, Memory, Part};
-use super::library::Shape;
+use super::law::{Law, Numbers, ShapeFault, amount, unused};
+use super::library::{Coefficient, EffectSpec, Parameter, Quantity};
 use crate::frame::{GRAVITY, Vec3};
 use crate::wrench::Wrench;
 
@@ -17,20 +18,58 @@ pub fn level_after(inner: f64, outer: f64, ratio: f64, dt: f64) -> f64 {
     outer - (outer - inner).signum() * left * left
 }
 
-pub(super) fn advance(shape: &Shape, memory: &mut Memory, input: &Input, dt: f64) {
-    memory.inner_level = level_after(memory.inner_level, input.immersion.depth, shape[0], dt);
+/// Flooding at a rate that its opening sets.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct HullFlooding {
+    /// `C_d A_opening / A_floor` [-].
+    pub opening_ratio: f64,
 }
 
-pub(super) fn basis(memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let (state, immersion) = (input.condition, input.immersion);
-    if immersion.depth <= 1e-6 {
-        return;
+impl Law for HullFlooding {
+    const SPEC: EffectSpec = EffectSpec {
+        name: "hull_flooding",
+        summary: "water enters the hull",
+        equation: "W = -phi rho g V h_in / h_out upwards, dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)",
+        coefficients: &[
+            Coefficient::new("flooded_share", "1", 0.0, 1.0),
+            Coefficient::new("arm_x", "m", -2.0, 2.0),
+        ],
+        parameters: &[Parameter { name: "opening_ratio", unit: "1" }],
+        inputs: &[Quantity::Session],
+        needs_its_first: true,
+        has_memory: true,
+        not_excited: "no trial is in the water",
+        experiment: "stand still in the deepest water for two minutes from the moment of entry, then empty the hull",
+        ..EffectSpec::COMMON
+    };
+
+    fn from_numbers(numbers: &Numbers) -> Result<Self, ShapeFault> {
+        unused(numbers, 1)?;
+        Ok(Self { opening_ratio: amount(numbers, 0)? })
     }
-    let share = (memory.inner_level / immersion.depth).min(1.0);
-    let weight = state.density * GRAVITY * immersion.volume * share;
-    let down = state.up.into_inner() * -weight;
-    emit(0, Part::Hull, input.at(down, &immersion.center_of_buoyancy));
-    emit(1, Part::Hull, Wrench { force: Vec3::zeros(), moment: Vec3::x().cross(&down) });
+
+    fn to_numbers(&self) -> Numbers {
+        [self.opening_ratio, 0.0, 0.0]
+    }
+
+    fn advance(&self, memory: &mut Memory, input: &Input, dt: f64) {
+        if dt > 0.0 {
+            memory.inner_level =
+                level_after(memory.inner_level, input.immersion.depth, self.opening_ratio, dt);
+        }
+    }
+
+    fn basis(&self, memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+        let (state, immersion) = (input.condition, input.immersion);
+        if immersion.depth <= 1e-6 {
+            return;
+        }
+        let share = (memory.inner_level / immersion.depth).min(1.0);
+        let weight = state.density * GRAVITY * immersion.volume * share;
+        let down = state.up.into_inner() * -weight;
+        emit(0, Part::Hull, input.at(down, &immersion.center_of_buoyancy));
+        emit(1, Part::Hull, Wrench { force: Vec3::zeros(), moment: Vec3::x().cross(&down) });
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,21 @@ use crate::wrench::Wrench;
 /// change the flow past the hull scale with it.
 pub type BaseDrag = Vec3;
 
+/// The speed that a quadratic drag has along each axis. The numbers are those of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DragSpeed {
+    /// 0: that of the whole velocity, `|v| v_i`.
+    #[default]
+    Whole,
+    /// 1: that along the axis, `|v_i| v_i` (the cross-flow principle).
+    PerAxis,
+}
+
+impl DragSpeed {
+    /// In the order of their numbers.
+    pub(super) const ALL: [Self; 2] = [Self::Whole, Self::PerAxis];
+}
+
 /// One instant; all vectors in the body frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Input<'a> {
@@ -52,9 +67,9 @@ impl Input<'_> {
 
     /// Coefficients on windward wet areas with which the hull carries the model's own drag in this state [-]: those stated,
     /// `K`, times `r = 1 + (D - P s) P s / ((P s)^2 + (P s0)^2)` along x and y, `D` the model's drag, `P s` what `K` makes of
-    /// it, and `s = |v| v`, or `|v_i| v_i` where each axis has its own speed. A model has its own law of depth, tilt and
+    /// it, and `s = |v| v` or `|v_i| v_i`. A model has its own law of depth, tilt and
     /// speed; where there is hardly a flow it says nothing of one, and `K` stands.
-    pub(super) fn own_drag(&self, axes_apart: bool) -> BaseDrag {
+    pub(super) fn own_drag(&self, speed: DragSpeed) -> BaseDrag {
         /// Square of the speed below which `K` counts more than the model's drag [m2/s2].
         const SLOW: f64 = 0.09;
         const MOST: f64 = 3.0;
@@ -70,7 +85,10 @@ impl Input<'_> {
             if axis == 2 || per_square <= 0.0 {
                 return k;
             }
-            let speed = if axes_apart { velocity[axis].abs() } else { velocity.norm() };
+            let speed = match speed {
+                DragSpeed::PerAxis => velocity[axis].abs(),
+                DragSpeed::Whole => velocity.norm(),
+            };
             let square = speed * velocity[axis];
             let off = -drag[axis] / per_square - square;
             k * (1.0 + off * square / (square * square + SLOW * SLOW)).clamp(0.0, MOST)

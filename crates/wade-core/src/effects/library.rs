@@ -1,15 +1,15 @@
-//! Names, kinds and coefficients of the library.
+//! The list of effects, and what each says of itself: an [`EffectSpec`] in its own file.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
-/// Most coefficients of one effect.
-pub const MAX_COEFFICIENTS: usize = 7;
-
-/// Physical effects in the library: the most that a model can have.
-pub const PHYSICS: usize = 14;
-
-/// Nonlinear parameters of an effect; those it has none for are 0.
-pub type Shape = [f64; 3];
+use super::input::{Input, Memory, Part};
+use super::law::{Law, Numbers, ShapeFault};
+use super::{
+    added_mass, bed_motion, channel_blockage, current, density_error, drag_coefficient_error, drive,
+    hull_flooding, linear_damping, rotation, sensor, squat, water_entry_slamming, water_level_offset,
+    wave_memory, wheel_paddle_thrust,
+};
+use crate::wrench::Wrench;
 
 /// What an effect is: a load of the water, a fault of the measuring chain, or of the drive's model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -23,56 +23,58 @@ pub enum Kind {
     Drive,
 }
 
-/// A named reason why a model and a measurement disagree. The place in this list is the wire's, see [`Effect::code`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Effect {
-    /// Inertia of the water that moves with the hull.
-    AddedMass,
-    /// Drag in proportion to speed.
-    LinearDamping,
-    /// Quadratic drag with another coefficient.
-    DragCoefficientError,
-    /// Local velocity from the angular velocity.
-    Rotation,
-    /// Water that moves over ground.
-    Current,
-    /// The water stands higher than was said.
-    WaterLevelOffset,
-    /// The water is denser than was said.
-    DensityError,
-    /// Water runs into the hull.
-    HullFlooding,
-    /// The blow of entering the water.
-    WaterEntrySlamming,
-    /// Waves that the hull has made before.
-    WaveMemory,
-    /// The channel's walls speed the flow up.
-    ChannelBlockage,
-    /// The hull is drawn down by its own speed.
-    Squat,
-    /// Turning wheels throw water.
-    WheelPaddleThrust,
-    /// The hull drives over the bed instead of standing on it in a current.
-    BedMotion,
-    /// The wrench is stamped late.
-    SensorDelay,
-    /// A constant zero error.
-    SensorBias,
-    /// A zero that jumps.
-    SensorBiasStep,
-    /// A zero that drifts with time.
-    SensorDrift,
-    /// A wrong scale of a component.
-    SensorGain,
-    /// Sensor axes turned against the body's.
-    AxisMisalignment,
-    /// Rolling resistance that was not taken off.
-    RollingResistance,
-    /// A wrong scale of the known drive force.
-    DriveGain,
-    /// A wrong mass.
-    MassError,
+/// What an effect says of itself. Fitting, serving and the documentation read it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectSpec {
+    /// Name in reports and files.
+    pub name: &'static str,
+    /// Load of the water, or whose fault.
+    pub kind: Kind,
+    /// What the model lacks or what is wrong, in a line.
+    pub summary: &'static str,
+    /// Equation of a physical effect in a line, without what is common to all: loads act on the wet hull.
+    pub equation: &'static str,
+    /// The coefficients in which the effect is linear; sensor effects have one a wrench component.
+    pub coefficients: &'static [Coefficient],
+    /// What the coefficients refer to, where their names do not say it.
+    pub reference: &'static str,
+    /// Nonlinear parameters that a fit searches for and a report states. They are the first numbers of a shape.
+    pub parameters: &'static [Parameter],
+    /// What every form of it reads beside depth, attitude and density.
+    pub inputs: &'static [Quantity],
+    /// Differentiated signals that it is proportional to: it is excited where one of them exceeds its noise.
+    pub rates: &'static [Rate],
+    /// True where the coefficients after the first say more of the same load: its arm, its trim, its torque, the blow
+    /// backwards that comes with one upwards.
+    pub needs_its_first: bool,
+    /// True where the load depends on the past, so that a server keeps a state.
+    pub has_memory: bool,
+    /// True for an effect that changes the flow which the model's own drag speaks of.
+    pub acts_on_own_drag: bool,
+    /// What a report says of trials that do not excite it.
+    pub not_excited: &'static str,
+    /// A trial that separates it from other effects.
+    pub experiment: &'static str,
+}
+
+impl EffectSpec {
+    /// What most effects have in common. Texts are empty: a test requires them of each effect.
+    pub(super) const COMMON: Self = Self {
+        name: "",
+        kind: Kind::Physics,
+        summary: "",
+        equation: "",
+        coefficients: &[],
+        reference: "",
+        parameters: &[],
+        inputs: &[],
+        rates: &[],
+        needs_its_first: false,
+        has_memory: false,
+        acts_on_own_drag: false,
+        not_excited: "no trial excites it in the components that were measured",
+        experiment: "",
+    };
 }
 
 /// A coefficient: name, unit, what it can physically be, and what the literature says.
@@ -86,76 +88,265 @@ pub struct Coefficient {
     pub bounds: [f64; 2],
     /// Band in which published values lie.
     pub literature: Option<[f64; 2]>,
+    /// Largest error that somebody makes, where it is smaller than the bounds say.
+    largest_error: Option<f64>,
 }
 
-const fn c(name: &'static str, unit: &'static str, low: f64, high: f64) -> Coefficient {
-    Coefficient { name, unit, bounds: [low, high], literature: None }
+/// Bound of a coefficient that has none [its unit].
+pub(super) const UNBOUNDED: f64 = 1e9;
+
+impl Coefficient {
+    /// A coefficient between two bounds.
+    pub(super) const fn new(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
+        Self { name, unit, bounds: [low, high], literature: None, largest_error: None }
+    }
+
+    /// A coefficient without dimension and with a published band.
+    pub(super) const fn published(name: &'static str, low: f64, high: f64, band: [f64; 2]) -> Self {
+        Self { literature: Some(band), ..Self::new(name, "1", low, high) }
+    }
+
+    /// The same with the largest error that somebody makes.
+    pub(super) const fn up_to(self, largest_error: f64) -> Self {
+        Self { largest_error: Some(largest_error), ..self }
+    }
+
+    /// Above this a coefficient is no longer an error that somebody makes.
+    pub fn largest_plausible(&self) -> f64 {
+        match self.literature {
+            Some(band) => band[1].max(-band[0]),
+            None => self.largest_error.unwrap_or(self.bounds[1]),
+        }
+    }
 }
 
-const fn l(name: &'static str, low: f64, high: f64, band: [f64; 2]) -> Coefficient {
-    Coefficient { name, unit: "1", bounds: [low, high], literature: Some(band) }
+/// A parameter in which an effect is not linear. It is 0 in laws without it, and never negative.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parameter {
+    /// Name.
+    pub name: &'static str,
+    /// Unit; 1 where it has none.
+    pub unit: &'static str,
 }
 
-const ANY: f64 = 1e9;
+/// What an effect reads beside depth, attitude and density.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Velocity through the water.
+    Velocity,
+    /// Velocity over ground.
+    GroundVelocity,
+    /// Angular velocity.
+    AngularVelocity,
+    /// Acceleration.
+    Acceleration,
+    /// Angular acceleration.
+    AngularAcceleration,
+    /// The model's own wrench.
+    ModelWrench,
+    /// Angle from the world's x to the body's x.
+    Heading,
+    /// Speeds of the wheels.
+    WheelSpeeds,
+    /// Rate at which the water rises.
+    DepthRate,
+    /// Width of the channel.
+    ChannelWidth,
+    /// The states before, with the time between them.
+    Session,
+    /// That the caller has stated no current: the effect would add it a second time.
+    NoStatedCurrent,
+    /// A wrench that a sensor measured or that was inferred, not computed.
+    MeasuredWrench,
+    /// A wrench that was inferred from mass, drive and weight.
+    InferredWrench,
+    /// A drive force, known by itself or in an inferred wrench.
+    DriveForce,
+}
+
+impl Quantity {
+    /// The quantity in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity through the water",
+            Self::GroundVelocity => "velocity over ground",
+            Self::AngularVelocity => "angular velocity",
+            Self::Acceleration => "acceleration",
+            Self::AngularAcceleration => "angular acceleration",
+            Self::ModelWrench => "the model's wrench",
+            Self::Heading => "heading",
+            Self::WheelSpeeds => "wheel speeds",
+            Self::DepthRate => "rate of the depth",
+            Self::ChannelWidth => "width of the channel",
+            Self::Session => "the earlier states of the session",
+            Self::NoStatedCurrent => "no current that the caller states",
+            Self::MeasuredWrench => "a measured wrench",
+            Self::InferredWrench => "a wrench inferred from mass and drive",
+            Self::DriveForce => "the drive force",
+        }
+    }
+}
+
+/// A differentiated signal, which may be nothing but the noise of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rate {
+    /// Acceleration.
+    Acceleration,
+    /// Angular acceleration.
+    AngularAcceleration,
+    /// Rate of the depth.
+    Depth,
+    /// Angular velocity.
+    Attitude,
+}
+
+/// Makes the closed set of effects from one list. The place of an effect in the list is its number on the wire.
+macro_rules! effects {
+    ($($module:ident::$effect:ident,)*) => {
+        /// A named reason why a model and a measurement disagree; its file says the rest.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Effect {
+            $(#[doc = concat!("See `effects::", stringify!($module), "`.")] $effect,)*
+        }
+
+        /// An effect with the form of its law and its nonlinear parameters.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum Shape {
+            $(#[doc = concat!("See `effects::", stringify!($module), "`.")] $effect($module::$effect),)*
+        }
+
+        /// In the order of the list.
+        const SPECS: &[EffectSpec] = &[$($module::$effect::SPEC,)*];
+
+        impl Effect {
+            /// The library.
+            pub const ALL: [Self; SPECS.len()] = [$(Self::$effect,)*];
+
+            /// The form that a law has where nothing is said of it: every number of its shape is 0.
+            pub fn plain(self) -> Shape {
+                match self { $(Self::$effect => Shape::$effect($module::$effect::default()),)* }
+            }
+        }
+
+        impl Shape {
+            /// The effect that it is of.
+            pub fn effect(&self) -> Effect {
+                match self { $(Self::$effect(_) => Effect::$effect,)* }
+            }
+
+            /// Reads the numbers of a file.
+            pub fn from_numbers(effect: Effect, numbers: Numbers) -> Result<Self, ShapeFault> {
+                match effect {
+                    $(Effect::$effect => $module::$effect::from_numbers(&numbers).map(Self::$effect),)*
+                }
+            }
+
+            /// The numbers of a file: first the parameters of the spec, then the form.
+            pub fn to_numbers(&self) -> Numbers {
+                match self { $(Self::$effect(law) => law.to_numbers(),)* }
+            }
+
+            /// Emits the load of each coefficient of a physical effect at 1: number of the coefficient, the part of the
+            /// hull that carries it, and the load about the center of mass, body frame [N, N m]. Effects of the measuring
+            /// chain or the drive, which are no load of the water, emit nothing.
+            pub fn basis(&self, memory: &Memory, input: &Input, mut emit: impl FnMut(usize, Part, Wrench)) {
+                match self { $(Self::$effect(law) => law.basis(memory, input, &mut emit),)* }
+            }
+
+            /// Advances the state of an effect with memory by `dt` [s], of the first state of a run by 0; the others have
+            /// none.
+            pub fn advance(&self, memory: &mut Memory, input: &Input, dt: f64) {
+                match self { $(Self::$effect(law) => law.advance(memory, input, dt),)* }
+            }
+
+            /// True for the form that takes the drag of the prediction itself, in proportion.
+            pub fn is_in_proportion(&self) -> bool {
+                match self { $(Self::$effect(law) => law.is_in_proportion(),)* }
+            }
+
+            /// True for a law of a channel, which has no meaning without a width.
+            pub fn needs_channel_width(&self) -> bool {
+                match self { $(Self::$effect(law) => law.needs_channel_width(),)* }
+            }
+        }
+    };
+}
+
+// a new effect comes last: those before it keep their numbers
+effects! {
+    added_mass::AddedMass,
+    linear_damping::LinearDamping,
+    drag_coefficient_error::DragCoefficientError,
+    rotation::Rotation,
+    current::Current,
+    water_level_offset::WaterLevelOffset,
+    density_error::DensityError,
+    hull_flooding::HullFlooding,
+    water_entry_slamming::WaterEntrySlamming,
+    wave_memory::WaveMemory,
+    channel_blockage::ChannelBlockage,
+    squat::Squat,
+    wheel_paddle_thrust::WheelPaddleThrust,
+    bed_motion::BedMotion,
+    sensor::SensorDelay,
+    sensor::SensorBias,
+    sensor::SensorBiasStep,
+    sensor::SensorDrift,
+    sensor::SensorGain,
+    sensor::AxisMisalignment,
+    drive::RollingResistance,
+    drive::DriveGain,
+    drive::MassError,
+}
+
+/// Most coefficients of one effect.
+pub const MAX_COEFFICIENTS: usize = {
+    let (mut most, mut effect) = (0, 0);
+    while effect < SPECS.len() {
+        if SPECS[effect].coefficients.len() > most {
+            most = SPECS[effect].coefficients.len();
+        }
+        effect += 1;
+    }
+    most
+};
+
+/// Physical effects in the library: the most that a model can have.
+pub const PHYSICS: usize = {
+    let (mut count, mut effect) = (0, 0);
+    while effect < SPECS.len() {
+        count += matches!(SPECS[effect].kind, Kind::Physics) as usize;
+        effect += 1;
+    }
+    count
+};
+
+/// Effects with memory.
+pub(super) const MEMORIES: usize = memories_before(SPECS.len());
+
+/// Effects with memory among the first of the list.
+const fn memories_before(end: usize) -> usize {
+    let (mut count, mut effect) = (0, 0);
+    while effect < end {
+        count += SPECS[effect].has_memory as usize;
+        effect += 1;
+    }
+    count
+}
 
 impl Effect {
-    /// The library.
-    pub const ALL: [Self; 23] = [
-        Self::AddedMass,
-        Self::LinearDamping,
-        Self::DragCoefficientError,
-        Self::Rotation,
-        Self::Current,
-        Self::WaterLevelOffset,
-        Self::DensityError,
-        Self::HullFlooding,
-        Self::WaterEntrySlamming,
-        Self::WaveMemory,
-        Self::ChannelBlockage,
-        Self::Squat,
-        Self::WheelPaddleThrust,
-        Self::BedMotion,
-        Self::SensorDelay,
-        Self::SensorBias,
-        Self::SensorBiasStep,
-        Self::SensorDrift,
-        Self::SensorGain,
-        Self::AxisMisalignment,
-        Self::RollingResistance,
-        Self::DriveGain,
-        Self::MassError,
-    ];
+    /// What it says of itself.
+    pub fn spec(self) -> &'static EffectSpec {
+        &SPECS[self as usize]
+    }
 
     /// The name in reports and files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::AddedMass => "added_mass",
-            Self::LinearDamping => "linear_damping",
-            Self::DragCoefficientError => "drag_coefficient_error",
-            Self::Rotation => "rotation",
-            Self::Current => "current",
-            Self::WaterLevelOffset => "water_level_offset",
-            Self::DensityError => "density_error",
-            Self::HullFlooding => "hull_flooding",
-            Self::WaterEntrySlamming => "water_entry_slamming",
-            Self::WaveMemory => "wave_memory",
-            Self::ChannelBlockage => "channel_blockage",
-            Self::Squat => "squat",
-            Self::WheelPaddleThrust => "wheel_paddle_thrust",
-            Self::BedMotion => "bed_motion",
-            Self::SensorDelay => "sensor_delay",
-            Self::SensorBias => "sensor_bias",
-            Self::SensorBiasStep => "sensor_bias_step",
-            Self::SensorDrift => "sensor_drift",
-            Self::SensorGain => "sensor_gain",
-            Self::AxisMisalignment => "axis_misalignment",
-            Self::RollingResistance => "rolling_resistance",
-            Self::DriveGain => "drive_gain",
-            Self::MassError => "mass_error",
-        }
+        self.spec().name
     }
 
-    /// Number on the wire, from 1; new effects come last.
+    /// Number on the wire, from 1.
     pub fn code(self) -> u32 {
         self as u32 + 1
     }
@@ -165,209 +356,50 @@ impl Effect {
         Self::ALL.into_iter().find(|effect| effect.code() == code)
     }
 
-    /// Equation of a physical effect in a line, without what is common to all: loads act on the wet hull.
-    pub fn equation(self) -> &'static str {
-        match self {
-            Self::AddedMass => {
-                "W = -(M_A nu_dot + C_A(nu) nu), M_A = rho V diag(surge, sway, heave, roll (b2+d2)/12, pitch (l2+d2)/12, yaw (l2+b2)/12), or heave, roll, pitch with rho pi b A_wp / 8 for rho V"
-            }
-            Self::LinearDamping => "f_i = -c_i rho sqrt(g L) A_i u_i, u = v + omega x r",
-            Self::DragCoefficientError => "f_i = -1/2 rho C_i A_i |v| v_i",
-            Self::Rotation => "f = D(v + omega x r) - D(v), D_i(u) = -1/2 rho C A_i |u| u_i",
-            Self::Current => "f = D(v - R^T u) - D(v) with the model's drag D",
-            Self::WaterLevelOffset => {
-                "W = offset dF/dd: rho g A_wp upwards, and the model's drag in proportion to the depth"
-            }
-            Self::DensityError => "W = e W_model",
-            Self::HullFlooding => {
-                "W = -phi rho g V h_in / h_out upwards, dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)"
-            }
-            Self::WaterEntrySlamming => {
-                "F = C rho dV/dd w^2 upwards and -C_h rho dV/dd w u across, w the rate of the depth d, on entry only; V the water displaced, or pi l (b d / h)^2 / 8 until d = h, wet_at, on each strip of length l with its own d and w"
-            }
-            Self::WaveMemory => {
-                "f_i = -k_i rho V sqrt(g / L) Re z_i, or -k_i rho V (g / (L W)) Im z_i, z' = -(1/T - i W) z + dv/dt in body axes"
-            }
-            Self::ChannelBlockage => {
-                "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d), or W = k D (((1 - m)(1 - s / d))^-2 - 1) with m and s of squat in a channel"
-            }
-            Self::Squat => {
-                "Fz = -c rho g A_wp s, s = v^2 / 2g (or / sqrt(|1 - Fr_h^2|), at most twice), in a channel s / d = Fr_h^2 / 2 (((1 - m)(1 - s / d))^-2 - 1) up to Schijf's limit and from there to 0 at faded_at, m = V / (L w d) but at most b / w, and a trim"
-            }
-            Self::WheelPaddleThrust => {
-                "F = 1/2 rho C pi r^2 wet |omega r| (omega r - v_x) on each wheel, or F = 1/2 rho C r^2 int |u| u cos(phi) dphi over its wet lugs, u = omega r - v_x cos(phi); torque -1/2 rho C_t r^3 of the same without the cosine"
-            }
-            Self::BedMotion => {
-                "F = 1/2 rho A |v_g| (-C_D v_g - C_S v_gy y + C_L |v_g| up), A the wet front or underside or |D| / (1/2 rho K v^2) with the model's drag D; the drag and the side force at the bed, the lift under the center of buoyancy"
-            }
-            _ => "",
-        }
+    /// The effect of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|effect| effect.name() == name)
     }
 
     /// Whose fault it is.
     pub fn kind(self) -> Kind {
-        match self {
-            Self::SensorDelay
-            | Self::SensorBias
-            | Self::SensorBiasStep
-            | Self::SensorDrift
-            | Self::SensorGain
-            | Self::AxisMisalignment => Kind::Sensor,
-            Self::RollingResistance | Self::DriveGain | Self::MassError => Kind::Drive,
-            _ => Kind::Physics,
-        }
+        self.spec().kind
     }
 
-    /// True where the coefficients after the first say more of the same load: its arm, its trim, its torque, the blow backwards
-    /// that comes with one upwards.
-    pub fn needs_its_first(self) -> bool {
-        matches!(self, Self::HullFlooding | Self::Squat | Self::WheelPaddleThrust | Self::WaterEntrySlamming)
+    /// Its equation; empty for a fault of sensors or drive.
+    pub fn equation(self) -> &'static str {
+        self.spec().equation
     }
 
-    /// True where the load depends on the past, so that a server keeps a state.
-    pub fn has_memory(self) -> bool {
-        matches!(self, Self::HullFlooding | Self::WaveMemory)
-    }
-
-    /// The coefficients in which the effect is linear; sensor effects have one a wrench component.
+    /// Its coefficients.
     pub fn coefficients(self) -> &'static [Coefficient] {
-        match self {
-            // surge, sway, heave and roll, pitch, yaw over the displaced water's mass and inertia; sway and heave in
-            // shallow water reach a few times the deep-water value (Zhou, Lo, Tan 2005)
-            Self::AddedMass => {
-                const {
-                    &[
-                        l("surge", 0.0, 6.0, [0.05, 1.5]),
-                        l("sway", 0.0, 8.0, [0.2, 2.5]),
-                        l("heave", 0.0, 10.0, [0.3, 3.0]),
-                        l("roll", 0.0, 10.0, [0.02, 2.0]),
-                        l("pitch", 0.0, 10.0, [0.05, 2.0]),
-                        l("yaw", 0.0, 10.0, [0.05, 2.0]),
-                    ]
-                }
-            }
-            Self::LinearDamping => {
-                const {
-                    &[
-                        l("surge", 0.0, 5.0, [0.0, 0.5]),
-                        l("sway", 0.0, 5.0, [0.0, 0.5]),
-                        l("heave", 0.0, 5.0, [0.0, 0.5]),
-                    ]
-                }
-            }
-            // the difference of two coefficients that each lie in 0 to 4
-            Self::DragCoefficientError => {
-                const {
-                    &[
-                        l("surge", -4.0, 4.0, [-1.0, 1.0]),
-                        l("sway", -4.0, 4.0, [-1.0, 1.0]),
-                        l("heave", -4.0, 4.0, [-1.0, 1.0]),
-                    ]
-                }
-            }
-            Self::Rotation => const { &[l("drag_coefficient", 0.0, 6.0, [0.4, 2.1])] },
-            Self::Current => const { &[c("east", "m/s", -3.0, 3.0), c("north", "m/s", -3.0, 3.0)] },
-            Self::WaterLevelOffset => const { &[c("offset", "m", -0.2, 0.2)] },
-            Self::DensityError => const { &[c("relative_error", "1", -0.3, 1.0)] },
-            Self::HullFlooding => const { &[c("flooded_share", "1", 0.0, 1.0), c("arm_x", "m", -2.0, 2.0)] },
-            // von Karman's blow has no reserve: Wagner's is pi/2 of it
-            Self::WaterEntrySlamming => {
-                const { &[l("vertical", 0.0, 8.0, [0.3, 2.0]), l("horizontal", 0.0, 8.0, [0.3, 2.0])] }
-            }
-            Self::WaveMemory => {
-                const { &[c("surge", "1", -10.0, 10.0), c("sway", "1", -10.0, 10.0), c("heave", "1", -10.0, 10.0)] }
-            }
-            Self::ChannelBlockage => const { &[l("strength", 0.0, 5.0, [0.5, 1.5])] },
-            Self::Squat => const { &[l("sinkage", 0.0, 4.0, [0.1, 1.5]), c("trim", "1", -2.0, 2.0)] },
-            Self::WheelPaddleThrust => {
-                const { &[l("thrust", 0.0, 6.0, [0.1, 2.0]), c("torque", "1", -12.0, 12.0)] }
-            }
-            Self::BedMotion => {
-                const { &[c("drag", "1", -4.0, 4.0), c("lift", "1", -4.0, 4.0), c("side", "1", -4.0, 4.0)] }
-            }
-            Self::SensorDelay => const { &[c("delay", "s", 0.0, 1.0)] },
-            Self::SensorBias | Self::SensorBiasStep => {
-                const {
-                    &[
-                        c("fx", "N", -ANY, ANY),
-                        c("fy", "N", -ANY, ANY),
-                        c("fz", "N", -ANY, ANY),
-                        c("mx", "N m", -ANY, ANY),
-                        c("my", "N m", -ANY, ANY),
-                        c("mz", "N m", -ANY, ANY),
-                    ]
-                }
-            }
-            Self::SensorDrift => {
-                const {
-                    &[
-                        c("fx", "N/s", -ANY, ANY),
-                        c("fy", "N/s", -ANY, ANY),
-                        c("fz", "N/s", -ANY, ANY),
-                        c("mx", "N m/s", -ANY, ANY),
-                        c("my", "N m/s", -ANY, ANY),
-                        c("mz", "N m/s", -ANY, ANY),
-                    ]
-                }
-            }
-            Self::SensorGain => {
-                const {
-                    // farther off it is no error of a scale: such a channel was zeroed in the water, or holds something else
-                    &[
-                        c("fx", "1", -0.5, 1.0),
-                        c("fy", "1", -0.5, 1.0),
-                        c("fz", "1", -0.5, 1.0),
-                        c("mx", "1", -0.5, 1.0),
-                        c("my", "1", -0.5, 1.0),
-                        c("mz", "1", -0.5, 1.0),
-                        // one calibration factor of the whole sensor
-                        c("all", "1", -0.5, 1.0),
-                    ]
-                }
-            }
-            Self::AxisMisalignment => {
-                const {
-                    &[
-                        c("about_x", "rad", -0.5, 0.5),
-                        c("about_y", "rad", -0.5, 0.5),
-                        c("about_z", "rad", -0.5, 0.5),
-                    ]
-                }
-            }
-            Self::RollingResistance => const { &[l("coefficient", 0.0, 0.5, [0.01, 0.15])] },
-            Self::DriveGain => const { &[c("relative_error", "1", -0.9, 3.0)] },
-            Self::MassError => const { &[c("relative_error", "1", -0.5, 1.0)] },
-        }
+        self.spec().coefficients
     }
 
-    /// True for the form that takes the drag of the prediction itself, in proportion.
-    pub fn is_in_proportion(self, shape: &Shape) -> bool {
-        match self {
-            Self::DragCoefficientError | Self::BedMotion => shape[0] > 1.5,
-            Self::ChannelBlockage => shape[0] > 0.0,
-            _ => false,
-        }
+    /// Place of its memory in a session; none where it has no memory.
+    pub(super) fn memory_place(self) -> Option<usize> {
+        self.spec().has_memory.then(|| memories_before(self as usize))
+    }
+}
+
+impl Shape {
+    /// Value of a parameter of the spec; 0 where this law has no place for it.
+    pub fn parameter(&self, index: usize) -> f64 {
+        self.to_numbers()[index]
     }
 
-    /// True for an effect that changes the flow which the model's own drag speaks of.
-    pub(super) fn acts_on_own_drag(self) -> bool {
-        matches!(self, Self::Current | Self::WaterLevelOffset)
+    /// The same with a parameter of the spec times a factor; unchanged where the law does not allow the product.
+    pub fn scaled(&self, index: usize, factor: f64) -> Self {
+        let mut numbers = self.to_numbers();
+        numbers[index] *= factor;
+        Self::from_numbers(self.effect(), numbers).unwrap_or(*self)
     }
+}
 
-    /// Names and units of the nonlinear parameters that a report states.
-    pub fn shape_names(self) -> &'static [(&'static str, &'static str)] {
-        match self {
-            Self::HullFlooding => &[("opening_ratio", "1")],
-            Self::Squat | Self::ChannelBlockage => &[("faded_at", "1")],
-            Self::WaterEntrySlamming => &[("wet_at", "m")],
-            Self::WaveMemory => &[("time_constant", "s"), ("frequency", "rad/s")],
-            _ => &[],
-        }
-    }
-
-    /// The effect of that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|effect| effect.name() == name)
+/// As its numbers.
+impl Serialize for Shape {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_numbers().serialize(serializer)
     }
 }
 
@@ -378,33 +410,67 @@ mod tests {
     #[test]
     fn names_are_those_of_the_reports_and_coefficients_have_room() {
         for effect in Effect::ALL {
-            assert_eq!(Effect::from_name(effect.name()), Some(effect));
+            assert_eq!(Effect::from_name(effect.name()), Some(effect), "names are unique");
             assert_eq!(serde_json::to_value(effect).ok(), Some(effect.name().into()));
-            let coefficients = effect.coefficients();
-            assert!((1..=MAX_COEFFICIENTS).contains(&coefficients.len()));
-            assert!(coefficients.iter().all(|c| c.bounds[0] < c.bounds[1] && c.bounds[0] <= 0.0));
             assert_eq!(Effect::from_code(effect.code()), Some(effect));
-            assert_eq!(effect.equation().is_empty(), effect.kind() != Kind::Physics);
+            assert_eq!(effect.plain().effect(), effect);
+            assert!((1..=MAX_COEFFICIENTS).contains(&effect.coefficients().len()));
         }
         let physics = Effect::ALL.into_iter().filter(|effect| effect.kind() == Kind::Physics);
         assert_eq!(physics.count(), PHYSICS);
     }
 
+    /// What is missing in a spec.
+    fn incomplete(spec: &EffectSpec) -> Option<&'static str> {
+        let is_physics = spec.kind == Kind::Physics;
+        let names = || spec.coefficients.iter().map(|c| c.name).chain(spec.parameters.iter().map(|p| p.name));
+        let is_twice = |name: &str| names().filter(|other| *other == name).count() > 1;
+        let is_ordered = |c: &Coefficient| {
+            let band = c.literature.is_none_or(|band| band[0] < band[1]);
+            c.bounds[0] < c.bounds[1] && c.bounds[0] <= 0.0 && band && c.largest_plausible() > 0.0
+        };
+        let read = |rate: &Rate| match rate {
+            Rate::Acceleration => Quantity::Acceleration,
+            Rate::AngularAcceleration => Quantity::AngularAcceleration,
+            Rate::Depth => Quantity::DepthRate,
+            Rate::Attitude => Quantity::AngularVelocity,
+        };
+        let units = spec.coefficients.iter().map(|c| c.unit).chain(spec.parameters.iter().map(|p| p.unit));
+        [
+            (spec.name.is_empty() || spec.summary.is_empty(), "name or summary"),
+            (spec.equation.is_empty() == is_physics, "an equation for physics, and none for a fault"),
+            (spec.coefficients.is_empty(), "coefficients"),
+            (!spec.coefficients.iter().all(is_ordered), "bounds in order, about 0"),
+            (names().any(|name| name.is_empty() || is_twice(name)), "different names"),
+            (units.into_iter().any(str::is_empty), "units"),
+            (spec.inputs.is_empty(), "inputs"),
+            (!spec.rates.iter().all(|rate| spec.inputs.contains(&read(rate))), "inputs that have its rates"),
+            (spec.has_memory != spec.inputs.contains(&Quantity::Session), "a session for its memory"),
+            (spec.not_excited.is_empty(), "what does not excite it"),
+            (spec.experiment.is_empty(), "an experiment"),
+        ]
+        .into_iter()
+        .find_map(|(lacks, what)| lacks.then_some(what))
+    }
+
     #[test]
-    fn the_documentation_lists_every_effect_with_its_parameters() {
-        let page = include_str!("../../../../docs/src/concepts/effects.md");
+    fn every_effect_describes_itself() {
         for effect in Effect::ALL {
-            let row = format!("| `{}` |", effect.name());
-            let row = page.lines().find(|line| line.starts_with(&row)).unwrap_or_default();
-            let coefficients = effect.coefficients().iter().map(|c| c.name);
-            for name in coefficients.chain(effect.shape_names().iter().map(|(name, _)| *name)) {
-                let is_component = matches!(name, "fy" | "fz" | "mx" | "my");
-                assert!(
-                    is_component || row.contains(&format!("`{name}`")),
-                    "{}: {name} in {row}",
-                    effect.name()
-                );
-            }
+            assert_eq!(incomplete(effect.spec()), None, "{}", effect.name());
+        }
+        const REVERSED: &[Coefficient] = &[Coefficient::new("surge", "1", 1.0, 0.0)];
+        let whole = *Effect::AddedMass.spec();
+        for broken in [
+            EffectSpec { equation: "", ..whole },
+            EffectSpec { kind: Kind::Sensor, ..whole },
+            EffectSpec { inputs: &[], ..whole },
+            EffectSpec { inputs: &[Quantity::Velocity], ..whole },
+            EffectSpec { experiment: "", ..whole },
+            EffectSpec { has_memory: true, ..whole },
+            EffectSpec { parameters: &[Parameter { name: "surge", unit: "1" }], ..whole },
+            EffectSpec { coefficients: REVERSED, ..whole },
+        ] {
+            assert!(incomplete(&broken).is_some(), "{broken:?}");
         }
     }
 }

@@ -1,37 +1,85 @@
 //! Impact on entering the water: momentum of the water that starts to move with the hull.
 //!
 //! `F = C w^2 dM/dd` upwards and `-C u w dM/dd` across, on entry only, with the rate `w` at which the water rises there and the
-//! water `M(d)` that moves with the hull. The shape is 0 for `M = rho V`, the water displaced; else it is the depth `h` at
-//! which the bottom is wet from side to side, and `M = rho pi c^2 / 2` on each meter of the length (von Karman) with the half
+//! water `M(d)` that moves with the hull: `M = rho V`, the water displaced; or, with the depth `h` at which the bottom is
+//! wet from side to side, `M = rho pi c^2 / 2` on each meter of the length (von Karman) with the half
 //! beam `c = (B / 2) min(d / h, 1)` of a wedge, in strips: one that pitches or runs down a ramp gets wet from an end, each
 //! strip at a depth and a rate of its own. Wagner's splash makes `h` smaller by pi/2; above about 30 degrees of deadrise
 //! theory fails (Constantinescu 2008).
 
 use std::f64::consts::PI;
 
-use super::input::{Input, Part};
-use super::library::Shape;
+use super::input::{Input, Memory, Part};
+use super::law::{Law, Numbers, ShapeFault, amount, unused};
+use super::library::{Coefficient, EffectSpec, Parameter, Quantity, Rate};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
 /// Strips of the length.
 const STRIPS: usize = 9;
 
-pub(super) fn basis(shape: &Shape, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let (state, immersion, body) = (input.condition, input.immersion, input.body);
-    let wet_at = shape[0];
-    if wet_at <= 0.0 {
-        return blow(input, &immersion.waterplane_center, immersion.waterplane_area, emit);
+/// The water `M(d)` that starts to move with the hull.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum WaterEntrySlamming {
+    /// The water displaced.
+    #[default]
+    Displaced,
+    /// That of a wedge.
+    Wedge {
+        /// Depth at which the bottom is wet from side to side [m]; greater than 0.
+        wet_at_m: f64,
+    },
+}
+
+impl Law for WaterEntrySlamming {
+    const SPEC: EffectSpec = EffectSpec {
+        name: "water_entry_slamming",
+        summary: "impact on entering the water",
+        equation: "F = C rho dV/dd w^2 upwards and -C_h rho dV/dd w u across, w the rate of the depth d, on entry only; V the water displaced, or pi l (b d / h)^2 / 8 until d = h, wet_at, on each strip of length l with its own d and w",
+        // von Karman's impact has no reserve: Wagner's is pi/2 of it
+        coefficients: &[
+            Coefficient::published("vertical", 0.0, 8.0, [0.3, 2.0]),
+            Coefficient::published("horizontal", 0.0, 8.0, [0.3, 2.0]),
+        ],
+        parameters: &[Parameter { name: "wet_at", unit: "m" }],
+        inputs: &[Quantity::Velocity, Quantity::AngularVelocity, Quantity::DepthRate],
+        rates: &[Rate::Depth],
+        needs_its_first: true,
+        not_excited: "no trial enters the water",
+        experiment: "enter the water at three speeds over one ramp, and leave it again at the same speeds",
+        ..EffectSpec::COMMON
+    };
+
+    fn from_numbers(numbers: &Numbers) -> Result<Self, ShapeFault> {
+        unused(numbers, 1)?;
+        Ok(match amount(numbers, 0)? {
+            0.0 => Self::Displaced,
+            wet_at_m => Self::Wedge { wet_at_m },
+        })
     }
-    let up = state.up.into_inner();
-    let length = body.length / STRIPS as f64;
-    let half = 0.5 * body.width;
-    for strip in 0..STRIPS {
-        let along = (strip as f64 + 0.5) * length - 0.5 * body.length;
-        let depth = state.depth - up.x * along;
-        if depth > 0.0 && depth < wet_at {
-            let surface = Vec3::new(along, 0.0, body.z0) + up * depth;
-            blow(input, &surface, PI * half * half * length * depth / (wet_at * wet_at), emit);
+
+    fn to_numbers(&self) -> Numbers {
+        match *self {
+            Self::Displaced => [0.0; 3],
+            Self::Wedge { wet_at_m } => [wet_at_m, 0.0, 0.0],
+        }
+    }
+
+    fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
+        let (state, immersion, body) = (input.condition, input.immersion, input.body);
+        let Self::Wedge { wet_at_m: wet_at } = *self else {
+            return blow(input, &immersion.waterplane_center, immersion.waterplane_area, emit);
+        };
+        let up = state.up.into_inner();
+        let length = body.length / STRIPS as f64;
+        let half = 0.5 * body.width;
+        for strip in 0..STRIPS {
+            let along = (strip as f64 + 0.5) * length - 0.5 * body.length;
+            let depth = state.depth - up.x * along;
+            if depth > 0.0 && depth < wet_at {
+                let surface = Vec3::new(along, 0.0, body.z0) + up * depth;
+                blow(input, &surface, PI * half * half * length * depth / (wet_at * wet_at), emit);
+            }
         }
     }
 }
@@ -76,7 +124,8 @@ mod tests {
             wheel_speeds: [None; 4],
         };
         let mut sum = Wrench::default();
-        basis(&[wet_at, 0.0, 0.0], &input, &mut |index, _, wrench| {
+        let law = WaterEntrySlamming::Wedge { wet_at_m: wet_at };
+        law.basis(&Memory::default(), &input, &mut |index, _, wrench| {
             if index == coefficient {
                 sum += wrench;
             }

@@ -149,6 +149,16 @@ fn a_damaged_kept_version_is_not_put_back() {
     assert_eq!(version(&husky), first + 1);
 }
 
+/// Files that the program wrote when `shape` was three plain numbers: every effect, and the other forms of their laws.
+#[test]
+fn files_of_both_formats_are_written_as_they_were() {
+    for text in
+        [include_str!("fixtures/effects/format_1.toml"), include_str!("fixtures/effects/format_2.toml")]
+    {
+        assert_eq!(EffectsFile::parse(text.as_bytes(), "husky").expect("sound").to_toml(), text);
+    }
+}
+
 #[test]
 fn a_file_comes_back_as_it_was_written() {
     let file = every_effect("warthog");
@@ -202,6 +212,9 @@ fn a_damaged_file_refuses_the_bundle_and_names_the_field() {
         ("covariance = [[0.0001", "covariance = [[-0.0001", "covariance"),
         ("covariance = [[0.0001, 0.0", "covariance = [[0.0001, 0.5", "symmetric"),
         ("shape = [0.8,", "shape = [0.9,", "parameters.time_constant.value"),
+        ("shape = [0.8,", "shape = [nan,", "wave_memory: shape[0] must be finite and 0 or greater"),
+        ("shape = [0.8, 2.0, 0.0]", "shape = [0.8, 2.0, 2.0]", "wave_memory: shape[2] must be 0 or 1"),
+        ("shape = [0.0, 0.0, 0.0]", "shape = [0.0, 1.0, 0.0]", "added_mass: shape[1] must be 0"),
         ("channel_width = 4.0\n", "", "channel_blockage: channel_width"),
         ("speed_mps = [0.0, 10.0]", "speed_mps = [10.0, 0.0]", "validity.speed_mps"),
     ] {

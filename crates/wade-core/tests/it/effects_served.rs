@@ -4,8 +4,10 @@
 use crate::common::{Numbers, VEHICLES, effect, effects_file, every_effect, model, served_with};
 use nalgebra::Vector6;
 use wade_core::condition::Condition;
+use wade_core::effects::channel_blockage::ChannelBlockage;
+use wade_core::effects::current::Current;
 use wade_core::effects::{
-    self, BaseDrag, Body, Circumstances, Effect, EffectLoad, Immersion, Input, LeftOut, Memory, Session,
+    BaseDrag, Body, Circumstances, Effect, EffectLoad, Immersion, Input, LeftOut, Memory, Session, Shape,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_roll_pitch};
@@ -146,10 +148,10 @@ fn as_fitted(served: &ServedVehicle, motion: &[(Condition, f64)], told: &Circums
                 wheel_speeds: told.wheel_speeds.unwrap().map(Some),
             };
             let since = if sample > 0 { *step } else { 0.0 };
-            effects::advance(effect.name, &effect.shape, memory, &input, since);
+            effect.shape.advance(memory, &input, since);
             let mut sum = Wrench::default();
-            effects::basis(effect.name, &effect.shape, memory, &input, |coefficient, _, load| {
-                sum += load * effect.parameters[effect.name.coefficients()[coefficient].name].value;
+            effect.shape.basis(memory, &input, |coefficient, _, load| {
+                sum += load * effect.parameters[effect.effect().coefficients()[coefficient].name].value;
             });
             sum
         });
@@ -279,7 +281,7 @@ fn a_current_acts_as_the_velocity_that_it_takes_off() {
     let east = |heading: f64| {
         let mut one = effect(Effect::Current, 0.0);
         one.parameters.get_mut("east").unwrap().value = 0.4;
-        one.shape = [0.4, 0.0, 0.0];
+        one.shape = Shape::Current(Current { east_mps: 0.4, ..Current::default() });
         let served = served_with("warthog", effects_file("warthog", vec![one]));
         let told = Circumstances { heading: Some(heading), ..Circumstances::default() };
         load(&evaluate(&served, &Condition::level(Vec3::zeros(), 0.25), &told), Effect::Current).wrench.force
@@ -305,7 +307,7 @@ fn a_density_error_scales_the_model() {
 fn a_channel_multiplies_the_drag_by_continuity_and_more_where_the_surface_falls() {
     let (width, depth, faded_at) = (4.0, 0.17, 0.8);
     let mut blockage = effect(Effect::ChannelBlockage, 1.0);
-    blockage.shape = [faded_at, 0.0, 0.0];
+    blockage.shape = Shape::ChannelBlockage(ChannelBlockage::FallingSurface { faded_at });
     blockage.parameters.get_mut("faded_at").unwrap().value = faded_at;
     let served = served_with("husky", effects_file("husky", vec![blockage]));
     let vehicle = served.model().vehicle();

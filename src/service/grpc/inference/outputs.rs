@@ -105,7 +105,7 @@ pub fn of(vehicle: &ServedVehicle, rows: i64) -> impl Iterator<Item = (Output, V
     let surfaces = vehicle.model().vehicle().surfaces.len() as i64;
     let effects = vehicle.effects().map_or(&[][..], |file| &file.effects);
     let count = effects.len() as i64;
-    let has_added_mass = effects.iter().any(|effect| effect.name == Effect::AddedMass);
+    let has_added_mass = effects.iter().any(|effect| effect.effect() == Effect::AddedMass);
     let there = move |output: &Output| match output {
         Output::EffectForce
         | Output::EffectMoment
