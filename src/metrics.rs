@@ -25,60 +25,25 @@ const BUCKETS_S: [f64; 22] = [
     500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3,
 ];
 
-/// The way a request came in: gRPC over TCP, gRPC over the Unix socket, shared memory, or JSON over HTTP. `other` are the
-/// calls that ask for no forces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EncodeLabelValue)]
-#[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
-pub enum Transport {
-    grpc_unary,
-    grpc_batch,
-    grpc_stream,
-    uds_unary,
-    uds_batch,
-    uds_stream,
-    shm,
-    shm_batch,
-    http,
-    grpc_infer,
-    uds_infer,
-    grpc_other,
-    uds_other,
-}
-
-impl Transport {
-    const ALL: [Self; 13] = [
-        Self::grpc_unary,
-        Self::grpc_batch,
-        Self::grpc_stream,
-        Self::uds_unary,
-        Self::uds_batch,
-        Self::uds_stream,
-        Self::shm,
-        Self::shm_batch,
-        Self::http,
-        Self::grpc_infer,
-        Self::uds_infer,
-        Self::grpc_other,
-        Self::uds_other,
-    ];
-
-    /// The value of the label.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::grpc_unary => "grpc_unary",
-            Self::grpc_batch => "grpc_batch",
-            Self::grpc_stream => "grpc_stream",
-            Self::uds_unary => "uds_unary",
-            Self::uds_batch => "uds_batch",
-            Self::uds_stream => "uds_stream",
-            Self::shm => "shm",
-            Self::shm_batch => "shm_batch",
-            Self::http => "http",
-            Self::grpc_infer => "grpc_infer",
-            Self::uds_infer => "uds_infer",
-            Self::grpc_other => "grpc_other",
-            Self::uds_other => "uds_other",
-        }
+wade_core::named_enum! {
+    /// The way a request came in: gRPC over TCP, gRPC over the Unix socket, shared memory, or JSON over HTTP. `other` are the
+    /// calls that ask for no forces.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EncodeLabelValue)]
+    #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
+    pub enum Transport {
+        grpc_unary,
+        grpc_batch,
+        grpc_stream,
+        uds_unary,
+        uds_batch,
+        uds_stream,
+        shm,
+        shm_batch,
+        http,
+        grpc_infer,
+        uds_infer,
+        grpc_other,
+        uds_other,
     }
 }
 

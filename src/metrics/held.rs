@@ -10,74 +10,33 @@ use prometheus_client::registry::Registry;
 
 use super::Metrics;
 
-/// What a connection makes the server hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, EncodeLabelValue)]
-#[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
-pub enum Resource {
-    connections,
-    http_connections,
-    requests,
-    probes,
-    streams,
-    bytes,
-}
-
-impl Resource {
-    /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 6] =
-        [Self::connections, Self::http_connections, Self::requests, Self::probes, Self::streams, Self::bytes];
-
-    /// The value of the label.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::connections => "connections",
-            Self::http_connections => "http_connections",
-            Self::requests => "requests",
-            Self::probes => "probes",
-            Self::streams => "streams",
-            Self::bytes => "bytes",
-        }
+wade_core::named_enum! {
+    /// What a connection makes the server hold.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, EncodeLabelValue)]
+    #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
+    pub enum Resource {
+        connections,
+        http_connections,
+        requests,
+        probes,
+        streams,
+        bytes,
     }
 }
 
-/// Why the server closed a connection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, EncodeLabelValue)]
-#[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
-pub enum Closed {
-    no_handshake,
-    no_request,
-    idle,
-    answer_not_read,
-    control_frames,
-    broke_protocol,
-    made_room,
-    no_room,
-}
-
-impl Closed {
-    const ALL: [Self; 8] = [
-        Self::no_handshake,
-        Self::no_request,
-        Self::idle,
-        Self::answer_not_read,
-        Self::control_frames,
-        Self::broke_protocol,
-        Self::made_room,
-        Self::no_room,
-    ];
-
-    /// The value of the label.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::no_handshake => "no_handshake",
-            Self::no_request => "no_request",
-            Self::idle => "idle",
-            Self::answer_not_read => "answer_not_read",
-            Self::control_frames => "control_frames",
-            Self::broke_protocol => "broke_protocol",
-            Self::made_room => "made_room",
-            Self::no_room => "no_room",
-        }
+wade_core::named_enum! {
+    /// Why the server closed a connection.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, EncodeLabelValue)]
+    #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
+    pub enum Closed {
+        no_handshake,
+        no_request,
+        idle,
+        answer_not_read,
+        control_frames,
+        broke_protocol,
+        made_room,
+        no_room,
     }
 }
 

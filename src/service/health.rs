@@ -8,29 +8,17 @@ use tokio::sync::watch;
 
 use crate::metrics::Metrics;
 
-/// A transport that can be up or down by itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Part {
-    /// gRPC over TCP and the Unix socket.
-    Grpc,
-    /// HTTP.
-    Http,
-    /// Shared memory.
-    Shm,
-}
-
-impl Part {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Grpc, Self::Http, Self::Shm];
-
-    /// Its name in `/readyz` and in the metric.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Grpc => "grpc",
-            Self::Http => "http",
-            Self::Shm => "shared_memory",
-        }
+wade_core::named_enum! {
+    /// A transport that can be up or down by itself.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Part {
+        /// gRPC over TCP and the Unix socket.
+        Grpc => "grpc",
+        /// HTTP.
+        Http => "http",
+        /// Shared memory.
+        Shm => "shared_memory",
     }
 }
 

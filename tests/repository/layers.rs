@@ -25,7 +25,7 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
     (
         "crates/wade-core/src",
         &[
-            &["condition", "digest", "domain", "forces", "frame", "wrench"],
+            &["at", "condition", "digest", "domain", "forces", "frame", "named", "wrench"],
             &["geometry", "vehicle"],
             &["analytic", "anchor", "effects", "features"],
             &["bundle", "model", "served"],

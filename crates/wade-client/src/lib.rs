@@ -1,85 +1,27 @@
 //! Clients of the library's own: in process, gRPC, shared memory; one call and one reply for all.
 
 mod address;
+mod error;
 mod grpc;
 mod grpc_link;
 mod shm;
 mod shm_link;
 
+pub use error::ClientError;
 use std::sync::Arc;
-use std::time::Duration;
 
 pub use address::{Address, AddressError};
 pub use grpc::{GrpcClient, Method, reload, replies};
 pub use grpc_link::GrpcLink;
 pub use shm::ShmClient;
 pub use shm_link::{Asked, Lost, ShmLink};
-use tonic::Code;
 
 use wade_core::domain::Outside;
 use wade_core::effects::{Effect, LeftOut, OutsideBox, Session};
 use wade_core::served::ServedVehicle;
+use wade_wire::State;
 use wade_wire::{Evaluated, Evaluator};
-use wade_wire::{InvalidState, State};
 use wade_wire::{added_mass, single};
-
-/// Why a call got no forces.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ClientError {
-    /// No answer came in time. The next call connects again.
-    #[error("no answer within {} ms", .0.as_millis())]
-    Timeout(Duration),
-    /// Nobody serves there.
-    #[error("no server at {at}: {reason}")]
-    NoServer {
-        /// Address or service.
-        at: String,
-        /// What happened.
-        reason: String,
-    },
-    /// The server serves no such vehicle.
-    #[error("vehicle \"{vehicle}\" is not served; there are: {}", .served.join(", "))]
-    UnknownVehicle {
-        /// The vehicle.
-        vehicle: String,
-        /// What is served instead.
-        served: Vec<String>,
-    },
-    /// The server's shared memory has another layout.
-    #[error(
-        "shared memory of layout {expected} expected, found {found}; client and server must be of one version"
-    )]
-    Layout {
-        /// The client's.
-        expected: String,
-        /// The server's.
-        found: String,
-    },
-    /// The server refused the request.
-    #[error("{code:?}: {message}")]
-    Refused {
-        /// What kind of refusal.
-        code: Code,
-        /// What the server said.
-        message: String,
-    },
-    /// The state is wrong.
-    #[error(transparent)]
-    Invalid(#[from] InvalidState),
-    /// A batch of states that differ in what the message carries once.
-    #[error(
-        "the states of a batch must agree in ground contact, in implicit added mass, and in what is given of heading, depth rate and wheel speeds"
-    )]
-    MixedBatch,
-    /// A batch longer than the transport carries.
-    #[error("a batch of {len}, the limit of this transport is {limit}")]
-    BatchTooLong {
-        /// States in the batch.
-        len: usize,
-        /// The limit.
-        limit: usize,
-    },
-}
 
 /// Nobody answers at a URL, for what an error and its causes say: each reason once, since some repeat their source.
 fn nobody_at(url: &str, error: &dyn std::error::Error) -> ClientError {

@@ -7,53 +7,27 @@ use crate::condition::Condition;
 /// Below this speed the flow has no direction, and the flow angle is not judged [m/s].
 const DIRECTION_SPEED: f64 = 1e-6;
 
-/// A quantity of which the domain states a range. The discriminants are the wire's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Quantity {
-    /// Horizontal speed through the water [m/s].
-    Speed = 1,
-    /// Flow angle [rad]: pi/2 head-on or from behind, 0 from the side.
-    Angle = 2,
-    /// Fluid density [kg/m3].
-    Density = 3,
-    /// Water depth [m].
-    Depth = 4,
-    /// Angle between body z and up [rad].
-    Tilt = 5,
-    /// Speed along body z [m/s].
-    VerticalSpeed = 6,
-    /// Magnitude of the angular velocity [rad/s].
-    AngularSpeed = 7,
-    /// Distance to the nearest state that was learnt from, in units of what is usual among these [-].
-    Distance = 8,
-}
-
-impl Quantity {
-    /// Every quantity, in the order of the wire.
-    pub const ALL: [Self; 8] = [
-        Self::Speed,
-        Self::Angle,
-        Self::Density,
-        Self::Depth,
-        Self::Tilt,
-        Self::VerticalSpeed,
-        Self::AngularSpeed,
-        Self::Distance,
-    ];
-
-    /// The name with its unit, as bundles and reports spell it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Speed => "speed_mps",
-            Self::Angle => "angle_rad",
-            Self::Density => "density_kgpm3",
-            Self::Depth => "depth_m",
-            Self::Tilt => "tilt_rad",
-            Self::VerticalSpeed => "vertical_speed_mps",
-            Self::AngularSpeed => "angular_speed_radps",
-            Self::Distance => "distance",
-        }
+crate::named_enum! {
+    /// A quantity of which the domain states a range. The discriminants are the wire's.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Quantity {
+        /// Horizontal speed through the water [m/s].
+        Speed = 1 => "speed_mps",
+        /// Flow angle [rad]: pi/2 head-on or from behind, 0 from the side.
+        Angle = 2 => "angle_rad",
+        /// Fluid density [kg/m3].
+        Density = 3 => "density_kgpm3",
+        /// Water depth [m].
+        Depth = 4 => "depth_m",
+        /// Angle between body z and up [rad].
+        Tilt = 5 => "tilt_rad",
+        /// Speed along body z [m/s].
+        VerticalSpeed = 6 => "vertical_speed_mps",
+        /// Magnitude of the angular velocity [rad/s].
+        AngularSpeed = 7 => "angular_speed_radps",
+        /// Distance to the nearest state that was learnt from, in units of what is usual among these [-].
+        Distance = 8 => "distance",
     }
 }
 

@@ -6,15 +6,17 @@
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:
-//! values ([`frame`], [`wrench`], [`condition`], [`domain`], [`digest`], [`forces`]), the body ([`geometry`], [`vehicle`]),
+//! values ([`at`], [`frame`], [`wrench`], [`condition`], [`domain`], [`digest`], [`forces`]), the body ([`geometry`], [`vehicle`]),
 //! the inputs of the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]), the network ([`model`]),
 //! with the effects added to it ([`served`]), and its files ([`bundle`]).
 
+pub mod at;
 pub mod condition;
 pub mod digest;
 pub mod domain;
 pub mod forces;
 pub mod frame;
+mod named;
 pub mod wrench;
 
 pub mod geometry;

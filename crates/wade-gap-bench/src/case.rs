@@ -7,40 +7,28 @@ use super::schedule::Maneuver::{self, *};
 use super::{Feature, NoiseKind, Plan, Region};
 use wade_learn::random::Random;
 
-/// Sort of a case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Family {
-    /// Nothing is hidden: nothing may be named.
-    Null,
-    /// One effect of the library at 0.3, 1 or 3 times the floor.
-    Single,
-    /// Two or three effects, each at 3 times the floor.
-    Set,
-    /// One of two effects that the trials cannot tell apart; where a further trial can, a second case holds it.
-    Confounded,
-    /// One effect that acts in a region only.
-    Gated,
-    /// An effect that no library has.
-    Outside,
-    /// Trials that do not excite some effects.
-    NotExcited,
-    /// 65 trials of 1,000 samples, for the time that a tool takes.
-    Timing,
-}
-
-impl Family {
-    /// All of them.
-    pub const ALL: [Self; 8] = [
-        Self::Null,
-        Self::Single,
-        Self::Set,
-        Self::Confounded,
-        Self::Gated,
-        Self::Outside,
-        Self::NotExcited,
-        Self::Timing,
-    ];
+wade_core::named_enum! {
+    /// Sort of a case.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Family {
+        /// Nothing is hidden: nothing may be named.
+        Null => "null",
+        /// One effect of the library at 0.3, 1 or 3 times the floor.
+        Single => "single",
+        /// Two or three effects, each at 3 times the floor.
+        Set => "set",
+        /// One of two effects that the trials cannot tell apart; where a further trial can, a second case holds it.
+        Confounded => "confounded",
+        /// One effect that acts in a region only.
+        Gated => "gated",
+        /// An effect that no library has.
+        Outside => "outside",
+        /// Trials that do not excite some effects.
+        NotExcited => "not_excited",
+        /// 65 trials of 1,000 samples, for the time that a tool takes.
+        Timing => "timing",
+    }
 }
 
 /// A case: all that is needed to generate its trials again.

@@ -35,28 +35,24 @@ impl Gaussian {
     }
 }
 
-/// How the noise of the wrench behaves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoiseKind {
-    /// Independent from sample to sample.
-    White,
-    /// An autoregression of order 1 with a time constant of 0.1 s.
-    Colored,
-    /// White, rounded to two standard deviations.
-    Quantized,
-    /// White; one sample in thirty is missing, in holes of up to half a second.
-    Dropouts,
-    /// White, and a smooth function of depth, velocity and yaw rate of half its size: a surrogate's own error.
-    SurrogateError,
-    /// White, and a zero that differs from trial to trial by as much.
-    Offsets,
-}
-
-impl NoiseKind {
-    /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::White, Self::Colored, Self::Quantized, Self::Dropouts, Self::SurrogateError, Self::Offsets];
+wade_core::named_enum! {
+    /// How the noise of the wrench behaves.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum NoiseKind {
+        /// Independent from sample to sample.
+        White => "white",
+        /// An autoregression of order 1 with a time constant of 0.1 s.
+        Colored => "colored",
+        /// White, rounded to two standard deviations.
+        Quantized => "quantized",
+        /// White; one sample in thirty is missing, in holes of up to half a second.
+        Dropouts => "dropouts",
+        /// White, and a smooth function of depth, velocity and yaw rate of half its size: a surrogate's own error.
+        SurrogateError => "surrogate_error",
+        /// White, and a zero that differs from trial to trial by as much.
+        Offsets => "offsets",
+    }
 }
 
 /// Standard deviation of one sample of a load cell [N, N m]: chosen, 0.5 % of a range of 600 N and 150 N m.

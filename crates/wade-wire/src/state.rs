@@ -60,102 +60,55 @@ impl Default for State {
     }
 }
 
-/// A field of a state. The discriminants are the codes of the shared-memory layout.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Field {
-    /// `velocity_mps`
-    Velocity = 1,
-    /// `current_mps`
-    Current = 2,
-    /// `angular_velocity_radps`
-    AngularVelocity = 3,
-    /// `acceleration_mps2`
-    Acceleration = 4,
-    /// `angular_acceleration_radps2`
-    AngularAcceleration = 5,
-    /// `gravity_direction`
-    Gravity = 6,
-    /// `depth_m`
-    Depth = 7,
-    /// `density_kgpm3`
-    Density = 8,
-    /// `world_from_body`
-    Quaternion = 9,
-    /// `roll_pitch`
-    RollPitch = 10,
-    /// `ground_contact`
-    GroundContact = 11,
-    /// `heading_rad`
-    Heading = 12,
-    /// `depth_rate_mps`
-    DepthRate = 13,
-    /// `wheel_speed_radps`
-    WheelSpeed = 14,
-    /// `time_step_s`
-    TimeStep = 15,
-    /// `water_level_m`
-    WaterLevel = 16,
-    /// `bed_clearance_m`
-    BedClearance = 17,
-    /// `bed`
-    Bed = 18,
-    /// `wheel_water_level_m`
-    WheelWaterLevel = 19,
-    /// `flags`
-    Flags = 20,
+wade_core::named_enum! {
+    /// A field of a state. The discriminants are the codes of the shared-memory layout.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u32)]
+    pub enum Field {
+        /// `velocity_mps`
+        Velocity = 1 => "velocity_mps",
+        /// `current_mps`
+        Current = 2 => "current_mps",
+        /// `angular_velocity_radps`
+        AngularVelocity = 3 => "angular_velocity_radps",
+        /// `acceleration_mps2`
+        Acceleration = 4 => "acceleration_mps2",
+        /// `angular_acceleration_radps2`
+        AngularAcceleration = 5 => "angular_acceleration_radps2",
+        /// `gravity_direction`
+        Gravity = 6 => "gravity_direction",
+        /// `depth_m`
+        Depth = 7 => "depth_m",
+        /// `density_kgpm3`
+        Density = 8 => "density_kgpm3",
+        /// `world_from_body`
+        Quaternion = 9 => "world_from_body",
+        /// `roll_pitch`
+        RollPitch = 10 => "roll_pitch",
+        /// `ground_contact`
+        GroundContact = 11 => "ground_contact",
+        /// `heading_rad`
+        Heading = 12 => "heading_rad",
+        /// `depth_rate_mps`
+        DepthRate = 13 => "depth_rate_mps",
+        /// `wheel_speed_radps`
+        WheelSpeed = 14 => "wheel_speed_radps",
+        /// `time_step_s`
+        TimeStep = 15 => "time_step_s",
+        /// `water_level_m`
+        WaterLevel = 16 => "water_level_m",
+        /// `bed_clearance_m`
+        BedClearance = 17 => "bed_clearance_m",
+        /// `bed`
+        Bed = 18 => "bed",
+        /// `wheel_water_level_m`
+        WheelWaterLevel = 19 => "wheel_water_level_m",
+        /// `flags`
+        Flags = 20 => "flags",
+    }
 }
 
 impl Field {
-    const ALL: [Self; 20] = [
-        Self::Velocity,
-        Self::Current,
-        Self::AngularVelocity,
-        Self::Acceleration,
-        Self::AngularAcceleration,
-        Self::Gravity,
-        Self::Depth,
-        Self::Density,
-        Self::Quaternion,
-        Self::RollPitch,
-        Self::GroundContact,
-        Self::Heading,
-        Self::DepthRate,
-        Self::WheelSpeed,
-        Self::TimeStep,
-        Self::WaterLevel,
-        Self::BedClearance,
-        Self::Bed,
-        Self::WheelWaterLevel,
-        Self::Flags,
-    ];
-
-    /// The name that the wire gives it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Velocity => "velocity_mps",
-            Self::Current => "current_mps",
-            Self::AngularVelocity => "angular_velocity_radps",
-            Self::Acceleration => "acceleration_mps2",
-            Self::AngularAcceleration => "angular_acceleration_radps2",
-            Self::Gravity => "gravity_direction",
-            Self::Depth => "depth_m",
-            Self::Density => "density_kgpm3",
-            Self::Quaternion => "world_from_body",
-            Self::RollPitch => "roll_pitch",
-            Self::GroundContact => "ground_contact",
-            Self::Heading => "heading_rad",
-            Self::DepthRate => "depth_rate_mps",
-            Self::WheelSpeed => "wheel_speed_radps",
-            Self::TimeStep => "time_step_s",
-            Self::WaterLevel => "water_level_m",
-            Self::BedClearance => "bed_clearance_m",
-            Self::Bed => "bed",
-            Self::WheelWaterLevel => "wheel_water_level_m",
-            Self::Flags => "flags",
-        }
-    }
-
     /// The field of a code of the shared-memory layout.
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|&field| field as u32 == code)

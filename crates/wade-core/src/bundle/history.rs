@@ -11,9 +11,10 @@ use std::path::{Path, PathBuf};
 use super::place::{self, copy_folder, move_folder, sync_folder, write_synced};
 use super::source::{Source, read_bounded};
 use super::{
-    Bundle, BundleError, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, at, checksums, lock,
-    read, stage, staging_of, tensors,
+    Bundle, BundleError, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, checksums, lock, read,
+    stage, staging_of, tensors,
 };
+use crate::at::At;
 use crate::digest::sha256;
 use crate::effects::EffectsFile;
 
@@ -44,7 +45,8 @@ impl Kept {
     pub(super) fn read(source: Source) -> Result<Self, BundleError> {
         let Bundle { version, effects, trained, .. } = source.bundle()?;
         let names = |file: EffectsFile| file.effects.iter().map(|effect| effect.effect().name()).collect();
-        let sums = checksums::parse(&source.file(SUMS_FILE)?).map_err(at(&source.path().join(SUMS_FILE)))?;
+        let sums =
+            checksums::parse(&source.file(SUMS_FILE)?).map_err(At::path(&source.path().join(SUMS_FILE)))?;
         let written_unix_s = match &source {
             Source::Carried(_) => None,
             Source::Folder(folder) => fs::metadata(folder.join(SUMS_FILE)).ok().map(|file| file.mtime()),
@@ -79,7 +81,7 @@ pub(super) fn numbers(directory: &Path) -> Result<Vec<u32>, BundleError> {
     let versions = versions_of(directory);
     let entries = match fs::read_dir(&versions) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries.map_err(|error| at(&versions)(error.into()))?,
+        entries => entries.map_err(|error| At::path(&versions)(error.into()))?,
     };
     let number = |entry: std::io::Result<fs::DirEntry>| entry.ok()?.file_name().to_str()?.parse().ok();
     let mut numbers: Vec<u32> = entries.filter_map(number).collect();
@@ -98,7 +100,7 @@ pub fn kept(directory: &Path) -> Result<Vec<Kept>, BundleError> {
 
 /// Puts effects in the place of those of a bundle, as its next version, and keeps the version before. Gives the new version.
 pub fn apply(directory: &Path, effects: EffectsFile) -> Result<u32, BundleError> {
-    let bundle = with_effects(read(directory)?, effects).map_err(at(directory))?;
+    let bundle = with_effects(read(directory)?, effects).map_err(At::path(directory))?;
     succeed(directory, bundle)
 }
 
@@ -155,8 +157,10 @@ impl Next {
     fn stage(directory: &Path, bundle: Bundle) -> Result<Self, BundleError> {
         let before = if directory.exists() { version_in(directory)? } else { bundle.version };
         let last = numbers(directory)?.last().copied().unwrap_or(0).max(before);
-        let version =
-            last.checked_add(1).ok_or(Fault::NoVersion { last }).map_err(at(&versions_of(directory)))?;
+        let version = last
+            .checked_add(1)
+            .ok_or(Fault::NoVersion { last })
+            .map_err(At::path(&versions_of(directory)))?;
         let staged = stage(directory, &Bundle { version, ..bundle })?;
         let keeps = directory.join(NETWORK_FILE).exists().then_some(before);
         Ok(Self { directory: directory.to_owned(), staged, version, keeps })
@@ -166,9 +170,8 @@ impl Next {
     fn put(&self) -> Result<(), BundleError> {
         match self.keeps {
             Some(before) => put(&self.staged, &self.directory, before),
-            None => {
-                place::place(&self.staged, &self.directory).map_err(|error| at(&self.directory)(error.into()))
-            }
+            None => place::place(&self.staged, &self.directory)
+                .map_err(|error| At::path(&self.directory)(error.into())),
         }
     }
 
@@ -196,18 +199,18 @@ pub fn roll_back(directory: &Path, to: Option<u32>) -> Result<u32, BundleError> 
     let _lock = lock::exclusive(directory)?;
     let current = if directory.exists() { Some(version_in(directory)?) } else { None };
     let version =
-        choice(directory, current, to)?.ok_or(Fault::NotKept { asked: to }).map_err(at(directory))?;
+        choice(directory, current, to)?.ok_or(Fault::NotKept { asked: to }).map_err(At::path(directory))?;
     let kept = place_of(directory, version);
     // what is damaged must not come into service
     let bundle = read(&kept)?;
     if bundle.version != version {
-        return Err(at(&kept)(Fault::KeptVersion { found: bundle.version }));
+        return Err(At::path(&kept)(Fault::KeptVersion { found: bundle.version }));
     }
     let staged = staging_of(directory, &bundle.vehicle.name);
-    copy_folder(&kept, &staged).map_err(|error| at(&staged)(error.into()))?;
+    copy_folder(&kept, &staged).map_err(|error| At::path(&staged)(error.into()))?;
     match current {
         Some(current) => put(&staged, directory, current)?,
-        None => place::place(&staged, directory).map_err(|error| at(directory)(error.into()))?,
+        None => place::place(&staged, directory).map_err(|error| At::path(directory)(error.into()))?,
     }
     mark(directory, version)?;
     Ok(version)
@@ -239,7 +242,7 @@ pub(super) fn withdraw(directory: &Path, behind: u32) -> Result<(), BundleError>
         move_folder(directory, &kept)?;
         sync_folder(directory.parent().unwrap_or(Path::new("")))
     };
-    withdraw().map_err(|error| at(&kept)(error.into()))?;
+    withdraw().map_err(|error| At::path(&kept)(error.into()))?;
     mark(directory, behind)
 }
 
@@ -252,14 +255,16 @@ fn mark(directory: &Path, version: u32) -> Result<(), BundleError> {
             number if number == version && mark.exists() => fs::remove_file(&mark),
             _ => Ok(()),
         };
-        marked.map_err(|error| at(&mark)(error.into()))?;
+        marked.map_err(|error| At::path(&mark)(error.into()))?;
     }
     Ok(())
 }
 
 pub(super) fn version_in(directory: &Path) -> Result<u32, BundleError> {
     let path = directory.join(VEHICLE_FILE);
-    Ok(VehicleFile::parse(&read_bounded(directory, VEHICLE_FILE)?, directory).map_err(at(&path))?.version)
+    Ok(VehicleFile::parse(&read_bounded(directory, VEHICLE_FILE)?, directory)
+        .map_err(At::path(&path))?
+        .version)
 }
 
 /// Exchanges a staged bundle with the one in place, and moves the latter, of version `before`, to the others. An error
@@ -285,6 +290,6 @@ fn put(staged: &Path, directory: &Path, before: u32) -> Result<(), BundleError> 
     };
     move_all().map_err(|fault| {
         let _ = fs::remove_dir_all(staged);
-        at(&kept)(fault)
+        At::path(&kept)(fault)
     })
 }

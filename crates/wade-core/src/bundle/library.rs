@@ -12,6 +12,7 @@ use super::history::{self, Kept};
 use super::place::aside_of;
 use super::source::Source;
 use super::{Bundle, BundleError, Fault, SUMS_FILE, lock, names_in, vehicle_file};
+use crate::at::At;
 use crate::digest::sha256;
 use crate::effects::EffectsFile;
 use crate::model::Model;
@@ -273,7 +274,7 @@ impl Library {
     pub fn apply(&self, name: &str, effects: EffectsFile) -> Result<(PathBuf, u32), LibraryError> {
         let source = self.source(name)?;
         let with_effects = history::with_effects(source.bundle()?, effects);
-        let bundle = with_effects.map_err(super::at(&source.path()))?;
+        let bundle = with_effects.map_err(At::path(&source.path()))?;
         let mut placed = self.succeed_together(vec![bundle])?;
         Ok(placed.remove(0))
     }

@@ -8,7 +8,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{BundleError, Fault, at};
+use super::{BundleError, Fault};
+use crate::at::At;
 
 /// Pause between two attempts.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -44,7 +45,7 @@ pub fn exclusive(directory: &Path) -> Result<Lock, BundleError> {
         writeln!(file, "process {}", std::process::id())?;
         Ok(Lock { _file: file })
     };
-    lock().map_err(at(&path))
+    lock().map_err(At::path(&path))
 }
 
 /// Waits for a writer of a bundle, and keeps writers out. `None` where there never was one, or where it takes too long.

@@ -14,6 +14,7 @@
 
 mod carried;
 mod checksums;
+mod fault;
 mod history;
 mod library;
 mod lock;
@@ -22,21 +23,23 @@ mod source;
 mod tensors;
 mod vehicle_file;
 
+pub use fault::Fault;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::at::At;
 use crate::digest::sha256;
 use crate::domain::Domain;
 use crate::effects::{EffectsFile, EffectsFileError};
 use crate::geometry::distance::SignedDistanceGrid;
-use crate::geometry::stl::{StlError, read_stl, write_stl};
-use crate::geometry::submergence::{Samples, SamplesError};
+use crate::geometry::stl::{read_stl, write_stl};
+use crate::geometry::submergence::Samples;
 use crate::geometry::surfaces::Hull;
 use crate::model::kernel::Isa;
 use crate::model::{Model, Weights};
 use crate::served::ServedVehicle;
-use crate::vehicle::{Vehicle, VehicleError};
+use crate::vehicle::Vehicle;
 use vehicle_file::VehicleFile;
 
 pub use carried::Carried;
@@ -90,156 +93,7 @@ pub struct Bundle {
 }
 
 /// Why a bundle was refused. The message names the file and what is wrong with it.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {fault}", .path.display())]
-pub struct BundleError {
-    /// The file or folder.
-    pub path: PathBuf,
-    /// What is wrong.
-    pub fault: Fault,
-}
-
-/// What is wrong with a file of a bundle.
-#[derive(Debug, thiserror::Error)]
-pub enum Fault {
-    /// Missing or unreadable.
-    #[error("{0}")]
-    Io(#[from] std::io::Error),
-    /// Larger than any bundle's file is.
-    #[error("{bytes} bytes, more than the {most} that are read of such a file")]
-    TooLarge {
-        /// Its size.
-        bytes: u64,
-        /// The most.
-        most: u64,
-    },
-    /// A pipe, a socket, a device or a folder.
-    #[error("is no regular file")]
-    NotAFile,
-    /// A link out of the bundle.
-    #[error("is a link to {}, outside the bundle: copy the file in its place", .to.display())]
-    LeadsOut {
-        /// What it leads to.
-        to: PathBuf,
-    },
-    /// Another process writes the bundle.
-    #[error("{} is writing this bundle: wait for it to end", if .by.is_empty() { "another process" } else { .by.as_str() })]
-    Locked {
-        /// The process, as it said.
-        by: String,
-    },
-    /// Written by a newer program.
-    #[error("format {found} is newer than {FORMAT}, the newest that this program reads: update wade")]
-    NewerFormat {
-        /// The format of the file.
-        found: u32,
-    },
-    /// Not TOML, or a key is missing, unknown or of the wrong type.
-    #[error("{0}")]
-    Toml(#[from] toml::de::Error),
-    /// The bundle's name is not its folder's.
-    #[error("name = \"{name}\" differs from the folder's name")]
-    Name {
-        /// The name in the file.
-        name: String,
-    },
-    /// A name that could not be part of a path or of a service's name.
-    #[error("name = \"{name}\" must be 1 to 64 of a-z, 0-9, - and _")]
-    NameSyntax {
-        /// The name in the file.
-        name: String,
-    },
-    /// A file that is no part of a bundle, in a folder that a bundle would replace.
-    #[error("holds {name}, which is no part of a bundle: writing a bundle here would delete it")]
-    ForeignFile {
-        /// The file.
-        name: String,
-    },
-    /// A line that is no checksum and file name.
-    #[error("line {line} is not a checksum, two spaces and a file name")]
-    ChecksumSyntax {
-        /// Number of the line, from 1.
-        line: usize,
-    },
-    /// A file of the bundle without a checksum.
-    #[error("no checksum in {SUMS_FILE}")]
-    NoChecksum,
-    /// Bytes that are not those that were written.
-    #[error("damaged: its SHA-256 is not the one in {SUMS_FILE}")]
-    Checksum,
-    /// A tensor file.
-    #[error("{0}")]
-    Tensor(#[from] TensorError),
-    /// The hull.
-    #[error("{0}")]
-    Stl(#[from] StlError),
-    /// The samples.
-    #[error("{0}")]
-    Samples(#[from] SamplesError),
-    /// Values that make no vehicle.
-    #[error("{0}")]
-    Vehicle(#[from] VehicleError),
-    /// A reference to a surface that does not exist.
-    #[error("there is no surface called \"{name}\"")]
-    UnknownSurface {
-        /// The name.
-        name: String,
-    },
-    /// A range whose ends are not finite and in order.
-    #[error("domain.{quantity} is no range")]
-    Domain {
-        /// The quantity.
-        quantity: &'static str,
-    },
-    /// The two places that state where the weights come from disagree.
-    #[error("provenance \"{weights}\" in {NETWORK_FILE}, \"{vehicle}\" here")]
-    Provenance {
-        /// In the weights.
-        weights: String,
-        /// In the vehicle file.
-        vehicle: String,
-    },
-    /// The vehicle file speaks of weights that are not there, or the other way round.
-    #[error("provenance and domain are stated where there are weights, and only there")]
-    Untrained,
-    /// The effects.
-    #[error(
-        "{0}; write it again with wade gap --apply, or restore the previous version with wade vehicle rollback"
-    )]
-    Effects(#[from] EffectsFileError),
-    /// A folder of kept versions that holds another.
-    #[error("holds version {found}")]
-    KeptVersion {
-        /// The version in it.
-        found: u32,
-    },
-    /// A version of the same number that is another.
-    #[error("is another version {version} than the one that would be kept there: move it away")]
-    KeptOther {
-        /// The number of both.
-        version: u32,
-    },
-    /// There is no number above that of a kept version.
-    #[error("version {last} is the last that can be numbered: move it away")]
-    NoVersion {
-        /// The highest number there is.
-        last: u32,
-    },
-    /// Nothing to go back to.
-    #[error("{}", .asked.map_or_else(|| "no version before this one was kept".to_owned(), |version| format!("version {version} was not kept")))]
-    NotKept {
-        /// The version asked for.
-        asked: Option<u32>,
-    },
-    /// Serving needs weights.
-    #[error("the bundle has no weights yet: train it first")]
-    NoWeights,
-}
-
-fn at(path: &Path) -> impl FnOnce(Fault) -> BundleError {
-    let path = path.to_owned();
-    move |fault| BundleError { path, fault }
-}
+pub type BundleError = At<Fault>;
 
 /// The files of a bundle in memory, their checksums verified.
 struct Files {
@@ -255,9 +109,9 @@ impl Files {
         let _lock = lock::shared(&directory);
         let path = directory.join(VEHICLE_FILE);
         let bytes = source.file(VEHICLE_FILE)?;
-        let vehicle_file = VehicleFile::parse(&bytes, &directory).map_err(at(&path))?;
+        let vehicle_file = VehicleFile::parse(&bytes, &directory).map_err(At::path(&path))?;
         let sums_path = directory.join(SUMS_FILE);
-        let sums = checksums::parse(&source.file(SUMS_FILE)?).map_err(at(&sums_path))?;
+        let sums = checksums::parse(&source.file(SUMS_FILE)?).map_err(At::path(&sums_path))?;
         let mut files = BTreeMap::from([(VEHICLE_FILE, bytes)]);
         for name in FILES.into_iter().filter(|name| ![VEHICLE_FILE, SUMS_FILE].contains(name)) {
             if OPTIONAL.contains(&name) && !source.has(name) && !sums.contains_key(name) {
@@ -266,7 +120,7 @@ impl Files {
             files.insert(name, source.file(name)?);
         }
         for (name, bytes) in &files {
-            checksums::verify(&sums, name, bytes).map_err(at(&directory.join(name)))?;
+            checksums::verify(&sums, name, bytes).map_err(At::path(&directory.join(name)))?;
         }
         Ok((Self { directory, files }, vehicle_file))
     }
@@ -278,7 +132,7 @@ impl Files {
         parse: impl FnOnce(&[u8]) -> Result<T, E>,
     ) -> Result<T, BundleError> {
         let bytes = self.files.get(name).map(Vec::as_slice).unwrap_or_default();
-        parse(bytes).map_err(|error| at(&self.directory.join(name))(error.into()))
+        parse(bytes).map_err(|error| At::path(&self.directory.join(name))(error.into()))
     }
 
     fn vehicle(&self, file: &VehicleFile) -> Result<Vehicle, BundleError> {
@@ -383,7 +237,7 @@ impl Source {
         let (files, vehicle_file) = Files::read(self)?;
         let vehicle = files.vehicle(&vehicle_file)?;
         let trained = files.trained(&vehicle_file)?.ok_or(Fault::NoWeights);
-        let (weights, domain) = trained.map_err(at(&files.directory))?;
+        let (weights, domain) = trained.map_err(At::path(&files.directory))?;
         let effects = files.effects(&vehicle.name)?;
         Ok((Model::new(vehicle, vehicle_file.version, domain, weights, isa), effects))
     }
@@ -426,7 +280,7 @@ pub fn check_place(directory: &Path, name: &str) -> Result<(), BundleError> {
         }
         Ok(())
     };
-    placed().map_err(at(directory))
+    placed().map_err(At::path(directory))
 }
 
 /// Writes a bundle beside its place and then puts it there, so that a reader sees the one before or this one. The one
@@ -434,7 +288,7 @@ pub fn check_place(directory: &Path, name: &str) -> Result<(), BundleError> {
 pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
     let _lock = lock::exclusive(directory)?;
     let staged = stage(directory, bundle)?;
-    place::place(&staged, directory).map_err(|error| at(directory)(error.into()))?;
+    place::place(&staged, directory).map_err(|error| At::path(directory)(error.into()))?;
     // the one before
     let _ = fs::remove_dir_all(staged);
     Ok(())
@@ -471,7 +325,7 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
         files.iter().try_for_each(|(name, bytes)| place::write_synced(&staged.join(name), bytes))?;
         place::sync_folder(&staged)
     };
-    stage().map_err(|error| at(&staged)(error.into()))?;
+    stage().map_err(|error| At::path(&staged)(error.into()))?;
     Ok(staged)
 }
 

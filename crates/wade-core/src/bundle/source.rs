@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use nix::fcntl::OFlag;
 
 use super::carried::Carried;
-use super::{BundleError, EFFECTS_FILE, Fault, SPEC_FILE, SUMS_FILE, VEHICLE_FILE, at};
+use super::{BundleError, EFFECTS_FILE, Fault, SPEC_FILE, SUMS_FILE, VEHICLE_FILE};
+use crate::at::At;
 
 /// Largest mesh or tensor file [bytes]: a hull of five million faces.
 const MAX_BINARY_BYTES: u64 = 256 << 20;
@@ -54,7 +55,7 @@ impl Source {
             Self::Carried(carried) => {
                 let missing = || std::io::Error::from(std::io::ErrorKind::NotFound);
                 let bytes = carried.file(name).ok_or_else(|| Fault::Io(missing()));
-                bytes.map(<[u8]>::to_vec).map_err(at(&self.path().join(name)))
+                bytes.map(<[u8]>::to_vec).map_err(At::path(&self.path().join(name)))
             }
             Self::Folder(folder) => read_bounded(folder, name),
         }
@@ -90,7 +91,7 @@ pub(super) fn read_bounded(directory: &Path, name: &str) -> Result<Vec<u8>, Bund
             _ => Ok(bytes),
         }
     };
-    read().map_err(at(&path))
+    read().map_err(At::path(&path))
 }
 
 fn max_bytes(name: &str) -> u64 {

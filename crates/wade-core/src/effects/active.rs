@@ -51,38 +51,25 @@ impl Session {
     }
 }
 
-/// Why an effect gave no load. The discriminants are the wire's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub enum LeftOut {
-    /// It remembers, and the state belongs to no session: as at rest and dry.
-    NoSession = 1,
-    /// The heading was not given.
-    NoHeading = 2,
-    /// The wheel speeds were not given.
-    NoWheelSpeeds = 3,
-    /// The rate of the depth was not given.
-    NoDepthRate = 4,
-    /// The caller stated a current himself.
-    CurrentStated = 5,
+crate::named_enum! {
+    /// Why an effect gave no load. The discriminants are the wire's.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u32)]
+    pub enum LeftOut {
+        /// It remembers, and the state belongs to no session: as at rest and dry.
+        NoSession = 1 => "no_session",
+        /// The heading was not given.
+        NoHeading = 2 => "no_heading",
+        /// The wheel speeds were not given.
+        NoWheelSpeeds = 3 => "no_wheel_speeds",
+        /// The rate of the depth was not given.
+        NoDepthRate = 4 => "no_depth_rate",
+        /// The caller stated a current himself.
+        CurrentStated = 5 => "current_stated",
+    }
 }
 
 impl LeftOut {
-    /// Every reason, in the order of the wire.
-    pub const ALL: [Self; 5] =
-        [Self::NoSession, Self::NoHeading, Self::NoWheelSpeeds, Self::NoDepthRate, Self::CurrentStated];
-
-    /// The reason in words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NoSession => "no_session",
-            Self::NoHeading => "no_heading",
-            Self::NoWheelSpeeds => "no_wheel_speeds",
-            Self::NoDepthRate => "no_depth_rate",
-            Self::CurrentStated => "current_stated",
-        }
-    }
-
     /// The reason of a code of the wire.
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|&reason| reason as u32 == code)

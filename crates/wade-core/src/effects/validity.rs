@@ -8,38 +8,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 
-/// A quantity of the box. The discriminants are the wire's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub enum BoxQuantity {
-    /// Water depth [m].
-    Depth = 1,
-    /// Speed through the water [m/s].
-    Speed = 2,
-    /// Acceleration [m/s2].
-    Acceleration = 3,
-    /// Angular speed [rad/s].
-    AngularSpeed = 4,
-    /// Density [kg/m3].
-    Density = 5,
+crate::named_enum! {
+    /// A quantity of the box. The discriminants are the wire's.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u32)]
+    pub enum BoxQuantity {
+        /// Water depth [m].
+        Depth = 1 => "depth_m",
+        /// Speed through the water [m/s].
+        Speed = 2 => "speed_mps",
+        /// Acceleration [m/s2].
+        Acceleration = 3 => "acceleration_mps2",
+        /// Angular speed [rad/s].
+        AngularSpeed = 4 => "angular_speed_radps",
+        /// Density [kg/m3].
+        Density = 5 => "density_kgpm3",
+    }
 }
 
 impl BoxQuantity {
-    /// Every quantity in the order of the wire.
-    pub const ALL: [Self; 5] =
-        [Self::Depth, Self::Speed, Self::Acceleration, Self::AngularSpeed, Self::Density];
-
-    /// The name with its unit.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Depth => "depth_m",
-            Self::Speed => "speed_mps",
-            Self::Acceleration => "acceleration_mps2",
-            Self::AngularSpeed => "angular_speed_radps",
-            Self::Density => "density_kgpm3",
-        }
-    }
-
     /// Its value in a state.
     pub fn of(self, condition: &Condition) -> f64 {
         match self {

@@ -16,33 +16,22 @@ use columns::TERMS;
 use regression::{Normal, Selection};
 use wade_learn::trials::Trials;
 
-/// A way to select terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// Sequentially thresholded least squares (Brunton, Proctor, Kutz, PNAS 2016), its threshold by cross-validation.
-    ThresholdedSparse,
-    /// LASSO by coordinate descent, its penalty by cross-validation and the rule of one standard error.
-    Lasso,
-    /// Forward and backward by the Bayesian information criterion.
-    StepwiseBic,
-    /// The one effect that explains most.
-    BestR2,
+wade_core::named_enum! {
+    /// A way to select terms.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Method {
+        /// Sequentially thresholded least squares (Brunton, Proctor, Kutz, PNAS 2016), its threshold by cross-validation.
+        ThresholdedSparse => "thresholded sparse",
+        /// LASSO by coordinate descent, its penalty by cross-validation and the rule of one standard error.
+        Lasso => "LASSO",
+        /// Forward and backward by the Bayesian information criterion.
+        StepwiseBic => "stepwise BIC",
+        /// The one effect that explains most.
+        BestR2 => "best R2",
+    }
 }
 
 impl Method {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::ThresholdedSparse, Self::Lasso, Self::StepwiseBic, Self::BestR2];
-
-    /// Name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ThresholdedSparse => "thresholded sparse",
-            Self::Lasso => "LASSO",
-            Self::StepwiseBic => "stepwise BIC",
-            Self::BestR2 => "best R2",
-        }
-    }
-
     /// The answer to trials of a simulator's body. The last fifth of the trials is held out.
     pub fn answer(self, trials: &Trials, simulator: &Simulator) -> Result<Answer, ToolError> {
         let folds = columns::folds(trials, simulator);

@@ -5,7 +5,8 @@
 use std::cell::Cell;
 use std::fs::File;
 use std::panic::{self, AssertUnwindSafe};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use wade_core::at::At;
 
 use parquet::errors::ParquetError;
 use parquet::file::reader::SerializedFileReader;
@@ -22,14 +23,7 @@ pub(super) const FORMAT_KEY: &str = "wade.format";
 pub(super) const META_KEY: &str = "wade.meta";
 
 /// Why a data set could not be read or written. The message names the file and what is wrong with it.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {fault}", .path.display())]
-pub struct DatasetError {
-    /// The file.
-    pub path: PathBuf,
-    /// What is wrong.
-    pub fault: Fault,
-}
+pub type DatasetError = At<Fault>;
 
 /// What is wrong with a file. Rows are counted from 0, as pandas and DuckDB do.
 #[derive(Debug, thiserror::Error)]

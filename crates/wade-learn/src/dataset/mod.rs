@@ -111,37 +111,19 @@ pub struct Rest {
     pub moment: Vec3,
 }
 
-/// Which mirror image of a case a sample is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Image {
-    /// As it was computed.
-    Original,
-    /// Reflected across the plane y = 0.
-    LeftRight,
-    /// Reflected across the plane x = 0.
-    FrontRear,
-    /// Reflected across both.
-    Both,
-}
-
-impl Image {
-    /// Every image.
-    pub const ALL: [Self; 4] = [Self::Original, Self::LeftRight, Self::FrontRear, Self::Both];
-
-    /// The name in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Original => "original",
-            Self::LeftRight => "left_right",
-            Self::FrontRear => "front_rear",
-            Self::Both => "both",
-        }
-    }
-
-    /// The image of that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|image| image.name() == name)
+wade_core::named_enum! {
+    /// Which mirror image of a case a sample is.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Image {
+        /// As it was computed.
+        Original => "original",
+        /// Reflected across the plane y = 0.
+        LeftRight => "left_right",
+        /// Reflected across the plane x = 0.
+        FrontRear => "front_rear",
+        /// Reflected across both.
+        Both => "both",
     }
 }
 

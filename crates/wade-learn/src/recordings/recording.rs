@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::signal::FilterError;
 use crate::trials::{Table, TrialError, csv_text};
+use wade_core::at::At;
 use wade_core::condition::FRESH_WATER;
 use wade_core::frame::Vec3;
 
@@ -84,13 +85,8 @@ pub enum RecordingError {
     #[error(transparent)]
     Table(#[from] TrialError),
     /// Anything else, with the file.
-    #[error("{}: {fault}", .path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// What is wrong.
-        fault: RecordingFault,
-    },
+    #[error(transparent)]
+    File(#[from] At<RecordingFault>),
 }
 
 /// What is wrong with a recording or its description.
@@ -177,8 +173,8 @@ pub enum RecordingFault {
 }
 
 pub(super) fn at(path: &Path) -> impl FnOnce(RecordingFault) -> RecordingError {
-    let path = path.to_owned();
-    move |fault| RecordingError::File { path, fault }
+    let at = At::path(path);
+    move |fault| at(fault).into()
 }
 
 impl Recordings {

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use wade_core::at::At;
 
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -12,14 +13,7 @@ use super::layers::{Layers, Sizes};
 use crate::files::write_whole;
 
 /// Why a checkpoint was refused. The message names the file.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {fault}", .path.display())]
-pub struct CheckpointError {
-    /// The file.
-    pub path: PathBuf,
-    /// What is wrong.
-    pub fault: Fault,
-}
+pub type CheckpointError = At<Fault>;
 
 /// What is wrong with a checkpoint.
 #[derive(Debug, thiserror::Error)]

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::{Fault, TrialError, at};
+use super::{Fault, TrialError};
+use wade_core::at::At;
 
 /// The numbers of a CSV file, every one finite, with the rows they stand in.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +28,7 @@ const VEHICLE: &str = "vehicle";
 impl Table {
     /// Reads the columns of a file by name; lines that start with # are comments.
     pub fn read(path: &Path, required: &[&str], optional: &[&str]) -> Result<Self, TrialError> {
-        Self::read_columns(path, required, optional).map_err(at(path))
+        Self::read_columns(path, required, optional).map_err(At::path(path))
     }
 
     fn read_columns(path: &Path, required: &[&str], optional: &[&str]) -> Result<Self, Fault> {
@@ -84,11 +85,11 @@ impl Table {
     pub fn check_time(&self, least: usize) -> Result<(), TrialError> {
         let t = self.column("t");
         if t.len() < least {
-            return Err(at(&self.path)(Fault::TooShort { rows: t.len(), least }));
+            return Err(At::path(&self.path)(Fault::TooShort { rows: t.len(), least }));
         }
         match (1..t.len()).find(|&row| t[row] <= t[row - 1]) {
             Some(row) => {
-                Err(at(&self.path)(Fault::Time { row: self.rows[row], t: t[row], before: t[row - 1] }))
+                Err(At::path(&self.path)(Fault::Time { row: self.rows[row], t: t[row], before: t[row - 1] }))
             }
             None => Ok(()),
         }
@@ -97,7 +98,7 @@ impl Table {
     /// The fault of having no such column.
     pub(super) fn missing(&self, column: &str) -> TrialError {
         let present = self.columns.keys().chain(&self.unknown_columns).cloned().collect::<Vec<_>>();
-        at(&self.path)(Fault::MissingColumn { column: column.into(), present: present.join(", ") })
+        At::path(&self.path)(Fault::MissingColumn { column: column.into(), present: present.join(", ") })
     }
 }
 

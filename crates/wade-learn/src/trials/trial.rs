@@ -8,8 +8,9 @@ use super::glitch::{Glitch, glitches};
 use super::manifest::{Manifest, Measured};
 use super::table::Table;
 use super::units::{check_accelerometer, check_angles, check_limits};
-use super::{Fault, Remark, TrialError, at, stem};
+use super::{Fault, Remark, TrialError, stem};
 use crate::signal::{median_step, pieces};
+use wade_core::at::At;
 use wade_core::condition::{Condition, FRESH_WATER, GroundContact};
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 
@@ -199,7 +200,7 @@ fn check_vehicle(table: &Table, manifest: &Manifest) -> Result<(), TrialError> {
     let other = table.vehicles.iter().zip(&table.rows).find(|(name, _)| **name != manifest.vehicle);
     other.map_or(Ok(()), |(name, row)| {
         let (row, found, expected) = (*row, name.clone(), manifest.vehicle.clone());
-        Err(at(&table.path)(Fault::Vehicle { row, found, expected }))
+        Err(At::path(&table.path)(Fault::Vehicle { row, found, expected }))
     })
 }
 
@@ -242,7 +243,7 @@ fn without_glitches(table: &mut Table, manifest: &Manifest) -> Result<Vec<Glitch
     let rows = table.rows.len();
     match found.first() {
         Some((_, first)) if found.len() as f64 > f64::max(MOST * rows as f64, 1.0) => {
-            Err(at(&table.path)(Fault::Glitches { count: found.len(), rows, first: *first }))
+            Err(At::path(&table.path)(Fault::Glitches { count: found.len(), rows, first: *first }))
         }
         _ => {
             table.leave_out(&found.iter().map(|(at, _)| *at).collect::<Vec<_>>());

@@ -3,7 +3,8 @@
 use super::manifest::component_of;
 use super::table::Table;
 use super::trial::WRENCH;
-use super::{Fault, TrialError, at};
+use super::{Fault, TrialError};
+use wade_core::at::At;
 use wade_core::frame::{GRAVITY, Vec3};
 
 /// Least and largest plausible value of a column, and its unit.
@@ -60,7 +61,7 @@ fn check_column(
     match table.column(name).iter().position(|value| !(min..=max).contains(value)) {
         Some(row) => {
             let (value, row, column) = (table.column(name)[row], table.rows[row], name.to_owned());
-            Err(at(&table.path)(Fault::Implausible { row, column, value, min, max, unit }))
+            Err(At::path(&table.path)(Fault::Implausible { row, column, value, min, max, unit }))
         }
         None => Ok(()),
     }
@@ -83,7 +84,7 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
         } else {
             continue;
         };
-        return Err(at(&table.path)(fault));
+        return Err(At::path(&table.path)(fault));
     }
     Ok(())
 }
@@ -91,7 +92,7 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
 /// Refuses accelerations in g and accelerations with gravity in them, against the derivative of the velocity [m/s2].
 pub(super) fn check_accelerometer(table: &Table, from_velocity: &[Vec3]) -> Result<(), TrialError> {
     let names = ["ax", "ay", "az"];
-    let fault = |fault| Err(at(&table.path)(fault));
+    let fault = |fault| Err(At::path(&table.path)(fault));
     for (axis, column) in names.into_iter().enumerate() {
         let derived: Vec<f64> = from_velocity.iter().map(|a| a[axis]).collect();
         if let Some(ratio) = factor(&derived, table.column(column)).filter(|r| near(*r, 1.0 / GRAVITY)) {

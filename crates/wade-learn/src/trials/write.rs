@@ -3,18 +3,19 @@
 use std::fs;
 use std::path::Path;
 
+use super::TrialError;
 use super::manifest::{MANIFEST_FILE, Manifest};
 use super::table::csv_text;
 use super::trial::REQUIRED;
-use super::{TrialError, at};
+use wade_core::at::At;
 
 /// Name of a trial and its columns, of equal length, by name.
 pub type Columns = (String, Vec<(&'static str, Vec<f64>)>);
 
 /// Writes a folder, which is made; columns that a trial must have and that are not given are 0.
 pub fn write(folder: &Path, manifest: &Manifest, trials: &[Columns]) -> Result<(), TrialError> {
-    let put = |path: &Path, text: String| fs::write(path, text).map_err(|error| at(path)(error.into()));
-    fs::create_dir_all(folder).map_err(|error| at(folder)(error.into()))?;
+    let put = |path: &Path, text: String| fs::write(path, text).map_err(|error| At::path(path)(error.into()));
+    fs::create_dir_all(folder).map_err(|error| At::path(folder)(error.into()))?;
     put(&folder.join(MANIFEST_FILE), manifest.to_toml())?;
     for (name, columns) in trials {
         let still = vec![0.0; columns.first().map_or(0, |(_, values)| values.len())];
