@@ -76,7 +76,8 @@ impl Predict {
             let time_step = time_step(row.t, before, session.is_some()).with_context(at)?;
             before = row.t;
             let state = State { time_step, ..row.state() };
-            let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut()).with_context(at)?;
+            let state = state.check().with_context(at)?;
+            let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut());
             far.count(&evaluated.forces.outside);
             let added = self.values(&evaluated);
             writer.write_record(record.iter().map(str::to_owned).chain(added))?;

@@ -44,9 +44,9 @@ pub(super) fn answer_state(
     state: Option<&proto::State>,
     session: Option<&mut Session>,
 ) -> Result<(proto::EvaluateResponse, Answered), Refusal> {
-    let state = wade_wire::state(state.ok_or(Refusal::MissingState)?)?;
+    let state = wade_wire::state(state.ok_or(Refusal::MissingState)?)?.check()?;
     EVALUATOR.with_borrow_mut(|evaluator| {
-        let evaluated = evaluator.evaluate(vehicle, &state, session)?;
+        let evaluated = evaluator.evaluate(vehicle, &state, session);
         let response = wade_wire::response(vehicle, &evaluated);
         let out_of_domain = u64::from(!response.in_domain);
         Ok((response, Answered { vehicle: Arc::clone(vehicle), out_of_domain }))

@@ -373,18 +373,12 @@ impl Desk {
         answer: &mut Answer,
     ) -> Result<(), InvalidState> {
         let run = Run { client, ports: at.ports, session: query.session };
-        let outcome = query.state().and_then(|state| {
-            // a query that is refused begins no session
-            let known = match query.session {
-                0 => None,
-                _ => {
-                    state.check().and_then(|_| state.circumstances()).map(|_| Some(self.sessions.get(run)))?
-                }
-            };
+        let outcome = query.state().and_then(|state| state.check()).map(|state| {
+            // a query that was refused has begun no session
+            let known = (query.session != 0).then(|| self.sessions.get(run));
             let (session, begins) = known.map_or((None, false), |(session, begins)| (Some(session), begins));
-            answer.fill(at.vehicle, &self.evaluator.evaluate(at.vehicle, &state, session)?);
+            answer.fill(at.vehicle, &self.evaluator.evaluate(at.vehicle, &state, session));
             answer.flags |= if begins { SESSION_BEGINS } else { 0 };
-            Ok(())
         });
         if let Err(invalid) = outcome {
             answer.refuse(invalid);

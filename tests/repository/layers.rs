@@ -25,7 +25,7 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
     (
         "crates/wade-core/src",
         &[
-            &["at", "condition", "digest", "domain", "forces", "frame", "named", "wrench"],
+            &["at", "condition", "digest", "domain", "forces", "frame", "named_enum", "wrench"],
             &["geometry", "vehicle"],
             &["analytic", "anchor", "effects", "features"],
             &["bundle", "model", "served"],

@@ -40,7 +40,6 @@ impl From<&WadeState> for State {
 pub fn checked(state: &WadeState) -> Result<State, InvalidState> {
     let state = State::from(state);
     state.check()?;
-    state.circumstances()?;
     Ok(state)
 }
 

@@ -16,7 +16,7 @@ pub mod digest;
 pub mod domain;
 pub mod forces;
 pub mod frame;
-mod named;
+mod named_enum;
 pub mod wrench;
 
 pub mod geometry;

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::state::{InvalidState, State};
+use super::state::CheckedState;
 use wade_core::effects::{EffectLoads, Session};
 use wade_core::forces::Forces;
 use wade_core::served::{Loads, ServedVehicle};
@@ -25,19 +25,17 @@ pub struct Evaluated<'e> {
 }
 
 impl Evaluator {
-    /// Checks a state and answers it. Effects that remember live in the session; without one they are left out.
+    /// Answers a state. Effects that remember live in the session; without one they are left out.
     pub fn evaluate(
         &mut self,
         vehicle: &ServedVehicle,
-        state: &State,
+        state: &CheckedState,
         session: Option<&mut Session>,
-    ) -> Result<Evaluated<'_>, InvalidState> {
-        let condition = state.check()?;
-        let circumstances = state.circumstances()?;
+    ) -> Evaluated<'_> {
         let start = Instant::now();
-        vehicle.evaluate(&condition, &circumstances, session, &mut self.loads);
+        vehicle.evaluate(state.condition(), state.circumstances(), session, &mut self.loads);
         let Loads { forces, effects, .. } = &self.loads;
-        Ok(Evaluated { forces, effects, compute_ns: nanoseconds_since(start) })
+        Evaluated { forces, effects, compute_ns: nanoseconds_since(start) }
     }
 }
 

@@ -12,5 +12,5 @@ mod tensor_fault;
 pub use convert::{added_mass, batch, batch_response, push, response, single, state, summary, vehicle};
 pub use evaluator::{Evaluated, Evaluator, nanoseconds_since};
 pub use refusal::{Overloaded, Refusal, UnknownVehicle};
-pub use state::{Field, InvalidState, Problem, State, UNIT_TOLERANCE, limit};
+pub use state::{CheckedState, Field, InvalidState, Problem, State, UNIT_TOLERANCE, limit};
 pub use tensor_fault::TensorFault;

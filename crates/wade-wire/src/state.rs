@@ -205,9 +205,32 @@ pub fn limit(field: Field) -> f64 {
     }
 }
 
+/// A state that has been checked: [`State::check`] alone makes one, and what evaluates takes nothing else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CheckedState {
+    condition: Condition,
+    circumstances: Circumstances,
+}
+
+impl CheckedState {
+    /// The condition that the state describes.
+    pub fn condition(&self) -> &Condition {
+        &self.condition
+    }
+
+    /// What effects need to know beside the condition.
+    pub fn circumstances(&self) -> &Circumstances {
+        &self.circumstances
+    }
+}
+
 impl State {
-    /// What effects need to know beside the condition, or the first field that is wrong.
-    pub fn circumstances(&self) -> Result<Circumstances, InvalidState> {
+    /// The state with every field checked, or the first field that is wrong.
+    pub fn check(&self) -> Result<CheckedState, InvalidState> {
+        Ok(CheckedState { condition: self.condition()?, circumstances: self.circumstances()? })
+    }
+
+    fn circumstances(&self) -> Result<Circumstances, InvalidState> {
         let optional = |field: Field, value: Option<f32>| value.map(|value| scalar(field, value)).transpose();
         let time_step = scalar(Field::TimeStep, self.time_step)?;
         if time_step < 0.0 {
@@ -226,8 +249,7 @@ impl State {
         })
     }
 
-    /// The condition that this state describes, or the first field that is wrong.
-    pub fn check(&self) -> Result<Condition, InvalidState> {
+    fn condition(&self) -> Result<Condition, InvalidState> {
         let velocity = vector(Field::Velocity, &self.velocity)?;
         let current = vector(Field::Current, &self.current)?;
         let density = scalar(Field::Density, self.density)?;
@@ -285,8 +307,7 @@ mod tests {
     use super::*;
 
     fn problem(state: State) -> (Field, Problem) {
-        let checked = state.check().and_then(|_| state.circumstances());
-        let invalid = checked.expect_err("the state is invalid");
+        let invalid = state.check().expect_err("the state is invalid");
         (invalid.field, invalid.problem)
     }
 
@@ -318,7 +339,8 @@ mod tests {
     #[test]
     fn a_current_is_subtracted() {
         let state = State { velocity: [1.0, 0.0, 0.0], current: [0.25, 0.5, 0.0], ..State::default() };
-        let condition = state.check().expect("valid");
+        let checked = state.check().expect("valid");
+        let condition = checked.condition();
         assert_eq!(condition.velocity, Vec3::new(0.75, -0.5, 0.0));
         assert_eq!(condition.ground_velocity, Vec3::new(1.0, 0.0, 0.0));
     }

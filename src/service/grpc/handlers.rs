@@ -144,9 +144,10 @@ impl Handlers {
                 for (i, state) in states.iter().enumerate() {
                     let index = turn * STATES_PER_TURN + i;
                     call.check_deadline(Some(index))?;
-                    let evaluated = evaluator
-                        .evaluate(&vehicle, state, None)
-                        .map_err(|invalid| Refusal::Invalid { invalid, index: Some(index) })?;
+                    let checked = state.check();
+                    let checked =
+                        checked.map_err(|invalid| Refusal::Invalid { invalid, index: Some(index) })?;
+                    let evaluated = evaluator.evaluate(&vehicle, &checked, None);
                     wade_wire::push(&mut response, &evaluated, index as u32, with_surfaces);
                 }
                 Ok::<(), Refusal>(())

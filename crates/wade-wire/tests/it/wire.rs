@@ -47,7 +47,7 @@ proptest! {
     fn an_answer_is_finite_or_an_error_that_names_a_field(state in state()) {
         let mut evaluator = Evaluator::default();
         let mut session = Session::default();
-        match evaluator.evaluate(&HUSKY, &state, Some(&mut session)) {
+        match state.check().map(|checked| evaluator.evaluate(&HUSKY, &checked, Some(&mut session))) {
             Ok(evaluated) => {
                 let forces = evaluated.forces;
                 let effects = evaluated.effects;
