@@ -210,8 +210,13 @@ fn effects(vehicle: &str) -> Vec<Subject> {
         model.evaluate(&condition, &mut Workspace::new(), &mut forces);
         let (mut session, mut loads) = (Session::default(), EffectLoads::default());
         let work = move || {
-            let answer = Answer { forces: &forces, wet_parts_known: true, at_edge: None };
-            active.evaluate(black_box(&condition), &told, &answer, Some(&mut session), &mut loads);
+            let answer = Answer {
+                condition: black_box(&condition),
+                forces: &forces,
+                wet_parts_known: true,
+                at_edge: None,
+            };
+            active.evaluate(&told, &answer, Some(&mut session), &mut loads);
         };
         subjects.push((Row::new(format!("{vehicle} all 14 effects {name}"), 0), Box::new(work)));
     }

@@ -3,7 +3,7 @@
 
     python3 tests/real_measurements.py target/release/wade MEASUREMENTS [OUT]
 
-MEASUREMENTS holds the folders named below as they were published (sources and licenses: src/gap_bench/real). None of them is
+MEASUREMENTS holds the folders named below as they were published (sources and licenses: crates/wade-gap-bench/src/real). None of them is
 part of this repository; a folder that is not there is skipped, and the script says so. It is no part of the test suite.
 """
 

@@ -72,8 +72,8 @@ impl ServedVehicle {
                     self.model.evaluate(&state, workspace, edge);
                     edge.wrench
                 });
-                let answer = Answer { forces, wet_parts_known: known, at_edge };
-                effects.evaluate(condition, circumstances, &answer, session, added);
+                let answer = Answer { condition, forces, wet_parts_known: known, at_edge };
+                effects.evaluate(circumstances, &answer, session, added);
                 forces.wrench += added.sum();
             }
             None => added.clear(),

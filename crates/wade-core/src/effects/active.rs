@@ -144,6 +144,8 @@ struct Entry {
 /// What the model says of a state.
 #[derive(Debug, Clone, Copy)]
 pub struct Answer<'a> {
+    /// The state.
+    pub condition: &'a Condition,
     /// Its forces.
     pub forces: &'a Forces,
     /// True where wetted fractions and points are those of the hull's samples.
@@ -194,13 +196,12 @@ impl ActiveEffects {
     /// The memory of a session moves on by the time step with the state at its end, as it does along a trial in fitting.
     pub fn evaluate(
         &self,
-        condition: &Condition,
         circumstances: &Circumstances,
         answer: &Answer,
         mut session: Option<&mut Session>,
         out: &mut EffectLoads,
     ) {
-        let Answer { forces, wet_parts_known, at_edge } = *answer;
+        let Answer { condition, forces, wet_parts_known, at_edge } = *answer;
         out.clear();
         out.outside = self.file.validity.outside(condition);
         out.surface_forces.resize(forces.surfaces.len(), Vec3::zeros());

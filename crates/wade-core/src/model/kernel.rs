@@ -15,6 +15,7 @@
     clippy::needless_range_loop,
     reason = "lanes in lock step, by index, are what the compiler vectorizes"
 )]
+#![allow(clippy::too_many_arguments, reason = "the arguments of a tile are registers")]
 
 use super::network::{Network, WIDTH};
 

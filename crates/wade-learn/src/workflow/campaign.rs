@@ -128,7 +128,7 @@ impl Folder<'_> {
         let known = Config::default().analytic.tables;
         let no_table = || CampaignError::NoTable { vehicle: vehicle.clone() };
         let table = beginning.table.or_else(|| known.get(vehicle).copied()).ok_or_else(no_table)?;
-        let settings = beginning.settings.clone().unwrap_or_default();
+        let settings = beginning.settings.unwrap_or_default();
         let hull_sha256 = plan::hull_hash(self.vehicle);
         let campaign =
             Campaign { format: plan::FORMAT, vehicle: vehicle.clone(), hull_sha256, table, settings };

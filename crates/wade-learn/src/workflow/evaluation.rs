@@ -28,6 +28,15 @@ pub struct Evaluation<'a> {
     pub program: &'a str,
 }
 
+/// What was trained for one part of a split.
+#[derive(Debug, Default)]
+struct OfKinds {
+    /// Models of each vehicle, in the order of the kinds.
+    models: BTreeMap<String, Vec<Model>>,
+    /// Settings of each kind, by its name.
+    settings: BTreeMap<String, Config>,
+}
+
 impl Evaluation<'_> {
     /// Judges the weights of the bundles by the states that their training held out, which the record in `trained` names.
     pub fn of_bundles(
@@ -95,7 +104,7 @@ impl Evaluation<'_> {
         for split in &splits {
             let sides = Sides { split, by };
             let run = Run { source: &source, sides, config: &of_paper, checkpoint: None };
-            let (models, of_kinds) = self.train_kinds(&loaded, run, kinds, hear)?;
+            let OfKinds { models, settings: of_kinds } = self.train_kinds(&loaded, run, kinds, hear)?;
             settings.extend(of_kinds);
             self.enter(&mut contest, run, &models, hear)?;
         }
@@ -105,15 +114,15 @@ impl Evaluation<'_> {
         Ok(Report::new(&contest, &source.vehicles, about, self.program)?)
     }
 
-    /// Models of each vehicle in the order of the kinds, and the settings of each kind by its name.
+    /// Trains a model of each kind for each vehicle.
     fn train_kinds(
         &self,
         loaded: &TrainingData,
         run: Run<'_>,
         kinds: &[ModelKind],
         hear: &dyn Fn(Event<'_>),
-    ) -> Result<(BTreeMap<String, Vec<Model>>, BTreeMap<String, Config>), WorkflowError> {
-        let (mut models, mut settings) = (BTreeMap::<String, Vec<Model>>::new(), BTreeMap::new());
+    ) -> Result<OfKinds, WorkflowError> {
+        let OfKinds { mut models, mut settings } = OfKinds::default();
         let origin = Origin { part: 1, program: self.program };
         for kind in kinds {
             let config = self.data.settings(*kind, self.settings)?;
@@ -125,7 +134,7 @@ impl Evaluation<'_> {
                 models.entry(name).or_default().push(model);
             }
         }
-        Ok((models, settings))
+        Ok(OfKinds { models, settings })
     }
 
     /// Settings of the ablations, by their names.
