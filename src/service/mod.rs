@@ -9,7 +9,6 @@ pub mod health;
 pub mod http;
 pub mod intake;
 pub mod occupant;
-mod sessions;
 pub mod shm;
 pub(crate) mod shm_owner;
 pub(crate) mod shm_probe;

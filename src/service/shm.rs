@@ -18,7 +18,6 @@ use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, MessagingPatt
 use iceoryx2::service::port_factory::event;
 use serde::{Deserialize, Serialize};
 
-use super::sessions::{CAPACITY, Sessions};
 use super::shm_probe::Own;
 use super::shm_remains::{self, Remains, ServiceFiles};
 use crate::engine::Engine;
@@ -30,7 +29,7 @@ use wade_wire::shm::layout::{
 use wade_wire::shm::{
     Exchange, MAX_CLIENTS, NAMESPACE, ShmError, Wait, events, in_place, node, open, served as shm_served,
 };
-use wade_wire::{Evaluator, InvalidState, Refusal, nanoseconds_since};
+use wade_wire::{Evaluator, InvalidState, Refusal, Sessions, nanoseconds_since};
 
 /// Settings of the shared-memory server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -191,7 +190,7 @@ impl ShmServer {
             engine,
             metrics,
             evaluator: Evaluator::default(),
-            sessions: Sessions::new(CAPACITY),
+            sessions: Sessions::new(Sessions::<Run>::CAPACITY),
             flags: if config.wait == Wait::Spin { SERVER_POLLS } else { 0 },
             done: done.map_err(|error| ShmError::new("the notifier")(&error))?,
             sleepers: HashMap::new(),

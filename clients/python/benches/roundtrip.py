@@ -1,4 +1,4 @@
-"""Round trips from Python, one after the other, each beside a bare grpcio echo in the same run.
+"""Round trips from Python and calls in process, each beside a bare grpcio echo in the same run.
 
     python clients/python/benches/roundtrip.py --out benches/results/DATE/python-client.json
 
@@ -192,6 +192,7 @@ def cases(stack: ExitStack, binary: Path, placement: str) -> dict[str, Case]:
         return stack.enter_context(of)
 
     rpc, shm = client(wade.GrpcClient(address, timeout_s=60)), client(wade.ShmClient(namespace, timeout_s=60))
+    own = client(wade.InProcess(ROOT / "vehicles"))
     loop = asyncio.new_event_loop()
 
     async def open_stream() -> Any:
@@ -208,6 +209,8 @@ def cases(stack: ExitStack, binary: Path, placement: str) -> dict[str, Case]:
     found |= {
         "gRPC stream, asyncio": awaited(loop.run_until_complete(open_stream()), loop),
         "shared memory, blocking": timed(lambda: shm.evaluate(VEHICLE, STATE)),
+        "in process": timed(lambda: own.evaluate(VEHICLE, STATE)),
+        f"in process batch of {BATCH}": timed(lambda: own.evaluate_batch(VEHICLE, STATES)),
         f"gRPC batch of {BATCH}": timed(lambda: rpc.evaluate_batch(VEHICLE, STATES)),
         f"shared memory batch of {BATCH}": timed(lambda: shm.evaluate_batch(VEHICLE, STATES)),
     }

@@ -11,7 +11,9 @@ from servers import Server
 import wade
 import wade.aio
 
+#: Clients of a server, and all of them.
 CLIENTS = ("tcp", "unix", "shm_block", "shm_spin", "asyncio")
+EVERY_CLIENT = (*CLIENTS, "in_process")
 
 
 class Awaited:
@@ -61,7 +63,9 @@ def loop() -> Iterator[asyncio.AbstractEventLoop]:
 
 
 def connect(kind: str, server: Server, loop: asyncio.AbstractEventLoop, **settings: Any) -> Any:
-    """A client of a kind of `CLIENTS`."""
+    """A client of a kind of `EVERY_CLIENT`; the one in process reads the vehicles of the server."""
+    if kind == "in_process":
+        return wade.InProcess(server.vehicles)
     if kind == "tcp":
         return wade.GrpcClient(server.address, **settings)
     if kind == "unix":
@@ -71,9 +75,9 @@ def connect(kind: str, server: Server, loop: asyncio.AbstractEventLoop, **settin
     return wade.ShmClient(server.namespace, wait="spin" if kind == "shm_spin" else "block", **settings)
 
 
-@pytest.fixture(params=CLIENTS)
+@pytest.fixture(params=EVERY_CLIENT)
 def client(request: pytest.FixtureRequest, server: Server, loop: asyncio.AbstractEventLoop) -> Iterator[Any]:
-    """Each client in turn, at the shared server. A loaded machine may take its time."""
+    """Each client in turn, with the vehicles of the shared server. A loaded machine may take its time."""
     with connect(request.param, server, loop, timeout_s=20.0) as client:
         yield client
 

@@ -1,4 +1,4 @@
-"""What the README's ten lines print, and how it gets there: after new weights,
+"""What the README's blocks of ten lines print, and how it gets there: after new weights,
 
     python clients/python/tests/readme.py
 
@@ -17,35 +17,40 @@ from servers import Server
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 _LINES = re.compile(r"(```python\n)(.*?)(```\n\n```\n)(.*?)(```)", re.DOTALL)
-#: Where the README's lines look for the server.
-_AT = 'GrpcClient("127.0.0.1:50051"'
+#: What the README's lines open, at a server and in process.
+SERVED = 'GrpcClient("127.0.0.1:50051"'
+IN_PROCESS = "InProcess("
 
 
-def ten_lines() -> tuple[str, str]:
-    """The code, and what the README says it prints."""
-    match = _LINES.search(README.read_text())
-    assert match, "the README has a block of Python with what it prints below"
-    return match.group(2), match.group(4)
+def ten_lines(opened: str) -> tuple[str, str]:
+    """The code that opens such a client, and what the README says it prints."""
+    found = [(code, shown) for _, code, _, shown, _ in _LINES.findall(README.read_text()) if opened in code]
+    assert len(found) == 1, f"the README has one block that opens {opened}) with what it prints below"
+    return found[0]
 
 
-def printed(code: str, client: str) -> str:
+def printed(code: str, opened: str, client: str) -> str:
     """What the lines print with a client opened otherwise, such as `ShmClient("name"`."""
-    assert code.count(_AT) == 1, f"the README's lines open {_AT})"
-    command = [sys.executable, "-c", code.replace(_AT, client)]
+    assert code.count(opened) == 1, f"the README's lines open {opened})"
+    command = [sys.executable, "-c", code.replace(opened, client)]
     return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
 
 
 def main() -> None:
-    """Writes the README anew."""
+    """Writes what the lines print into the README."""
     with tempfile.TemporaryDirectory() as folder:
         server = Server(Path(folder))
         server.start()
         try:
-            shown = printed(ten_lines()[0], f'GrpcClient("{server.address}"')
+            clients = {SERVED: f'GrpcClient("{server.address}"', IN_PROCESS: f'InProcess("{server.vehicles}"'}
+            shown = {opened: printed(ten_lines(opened)[0], opened, client) for opened, client in clients.items()}
         finally:
             server.stop()
     text = README.read_text()
-    README.write_text(_LINES.sub(lambda match: "".join((*match.group(1, 2, 3), shown, match.group(5))), text, count=1))
+    for opened, lines in shown.items():
+        code, before = ten_lines(opened)
+        text = text.replace(f"{code}```\n\n```\n{before}", f"{code}```\n\n```\n{lines}")
+    README.write_text(text)
 
 
 if __name__ == "__main__":

@@ -71,6 +71,7 @@ class Server:
 
     def start(self, vehicles: Path = VEHICLES) -> None:
         """Returns when it answers."""
+        self.vehicles = vehicles
         command: list[str | Path] = [binary(), "serve", "--config", self.folder / "wade.toml", "--vehicles", vehicles]
         with (self.folder / "log").open("ab") as log:
             self.process = subprocess.Popen(command, env=environment(), stderr=log)

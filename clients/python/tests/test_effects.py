@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import CLIENTS, connect
+from conftest import EVERY_CLIENT, connect
 from servers import VEHICLES, Server, binary, environment
 
 import wade
@@ -44,7 +44,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     server.stop()
 
 
-@pytest.fixture(params=CLIENTS)
+@pytest.fixture(params=EVERY_CLIENT)
 def client(request: pytest.FixtureRequest, server: Server, loop: asyncio.AbstractEventLoop) -> Iterator[Any]:
     with connect(request.param, server, loop, timeout_s=20.0) as client:
         yield client
@@ -182,11 +182,12 @@ def test_a_stream_remembers_and_another_does_not_reach_it(client: Any, server: S
         assert stream.evaluate(first[1]).session_begins and not stream.evaluate(first[2]).session_begins
 
 
-def test_a_batch_over_shared_memory_steps_many_runs_at_once(server: Server) -> None:
-    count = 300  # more than one load
+@pytest.mark.parametrize("kind", ["shm_block", "in_process"])
+def test_a_batch_steps_many_runs_at_once(kind: str, server: Server, loop: asyncio.AbstractEventLoop) -> None:
+    count = 300  # more than one load of shared memory
     phases = np.linspace(0, 2, count)
     runs = [run_in_time(phase)[:3] for phase in phases]
-    with over_shm(server) as client, client.stream("husky") as stream:
+    with connect(kind, server, loop) as client, client.stream("husky") as stream:
         expected = [stream.evaluate(state) for state in runs[-1]]
         for step in range(3):
             now = [run[step] for run in runs]
@@ -201,7 +202,7 @@ def test_a_batch_over_shared_memory_steps_many_runs_at_once(server: Server) -> N
             assert (forces.session_begins == (step == 0)).all()
             for array in ARRAYS:
                 np.testing.assert_array_equal(getattr(forces, array)[-1], getattr(expected[step], array))
-        # single calls go by a port of their own, of which the server keeps the runs apart
+        # the numbers of single calls are apart from those of batches
         alone = wade.State(depth_m=0.15, session=7, time_step_s=0.05)
         assert client.evaluate("husky", alone).session_begins and not client.evaluate("husky", alone).session_begins
 

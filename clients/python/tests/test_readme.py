@@ -1,4 +1,4 @@
-"""The README's ten lines work over every transport, and print what the server says, in the form that it shows.
+"""The README's ten lines work with every client, and print what the server says, in the form that it shows.
 
 So do the lines of Python in the README of the repository.
 """
@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 
 import numpy as np
-from readme import printed, ten_lines
+from readme import IN_PROCESS, SERVED, printed, ten_lines
 from servers import Server
 from test_values import query
 
@@ -22,7 +22,7 @@ def form(text: str) -> list[str]:
 
 
 def test_the_ten_lines(server: Server) -> None:
-    code, shown = ten_lines()
+    code, shown = ten_lines(SERVED)
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
     expected = query("husky", ["--speed=0.8", "--depth=0.18"])
     for client in (
@@ -30,7 +30,7 @@ def test_the_ten_lines(server: Server) -> None:
         f'GrpcClient("unix:{server.socket}"',
         f'ShmClient("{server.namespace}"',
     ):
-        text = printed(code, client)
+        text = printed(code, SERVED, client)
         assert form(text) == form(shown), "the README shows another form: run clients/python/tests/readme.py"
         numbers = [float(number) for number in NUMBER.findall(text)]
         np.testing.assert_allclose(numbers[:3], expected["wrench"]["force"], atol=0.051)
@@ -39,10 +39,19 @@ def test_the_ten_lines(server: Server) -> None:
         assert str(expected["in_domain"]) in text
 
 
+def test_the_ten_lines_in_process(server: Server) -> None:
+    code, shown = ten_lines(IN_PROCESS)
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    text = printed(code, IN_PROCESS, f'InProcess("{server.vehicles}"')
+    assert form(text) == form(shown), "the README shows another form: run clients/python/tests/readme.py"
+    served, _ = ten_lines(SERVED)
+    assert text == printed(served, SERVED, f'GrpcClient("{server.address}"')
+
+
 def test_the_lines_of_the_repositorys_readme(server: Server) -> None:
     readme = (Path(__file__).resolve().parents[3] / "README.md").read_text()
     code = readme.split("```python\n")[1].split("```")[0]
-    text = printed(code, f'GrpcClient("{server.address}"')
+    text = printed(code, SERVED, f'GrpcClient("{server.address}"')
     expected = query("husky", ["--speed=0.8", "--depth=0.18"])
     numbers = [float(number) for number in NUMBER.findall(text)]
     np.testing.assert_allclose(numbers, expected["wrench"]["force"], atol=0.051)

@@ -20,8 +20,9 @@ from wade.state import SCALARS, TOLD, VECTORS
 from wade.v1 import hydrodynamics_pb2
 
 PACKAGE = Path(__file__).resolve().parents[1]
-LAYOUT = (ROOT / "src" / "service" / "shm_layout.rs").read_text()
-WIRE = (ROOT / "src" / "service" / "wire.rs").read_text()
+CRATES = ROOT / "crates"
+LAYOUT = (CRATES / "wade-wire" / "src" / "shm" / "layout.rs").read_text()
+WIRE = (CRATES / "wade-wire" / "src" / "state.rs").read_text()
 
 
 def test_the_generated_files_are_those_of_proto(tmp_path: Path) -> None:
@@ -156,8 +157,7 @@ def rust_numbers(pattern: str, text: str) -> dict[str, int]:
 def test_the_codes_and_limits_are_the_servers() -> None:
     constants = rust_numbers(r"pub const (\w+): \w+ = (\d+);", LAYOUT)
     assert {name: getattr(shm_layout, name) for name in constants} == constants
-    surfaces = (ROOT / "src" / "vehicle.rs", ROOT / "src" / "vehicle" / "mod.rs")
-    text = "".join(path.read_text() for path in surfaces if path.exists())
+    text = (CRATES / "wade-core" / "src" / "vehicle" / "mod.rs").read_text()
     assert rust_numbers(r"pub const (MAX_SURFACES): \w+ = (\d+);", text) == {"MAX_SURFACES": shm_layout.MAX_SURFACES}
     status = rust_numbers(r"    (\w+) = (\d+),", LAYOUT)
     ours = (shm_layout.STATUS_OK, shm_layout.STATUS_INVALID_STATE, shm_layout.STATUS_NOT_SERVED)

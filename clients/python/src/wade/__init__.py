@@ -1,7 +1,7 @@
 """What the water does to a ground vehicle that drives into it, asked of a `wade` server.
 
 `connect(address)` gives a client: `GrpcClient` or `ShmClient`, which have the same methods and types;
-`wade.aio.GrpcClient` is for asyncio. A `State` goes in,
+`wade.aio.GrpcClient` is for asyncio, and `InProcess` needs no server. A `State` goes in,
 `Forces` come out, each for one vehicle or as arrays for N. Body frame: x forward, y left, z up; SI units, radians; the
 fields are named as on the wire, with their unit. Errors are `WadeError`s.
 """
@@ -24,6 +24,7 @@ from .errors import (
     WadeError,
 )
 from .forces import BoxQuantity, Effect, Forces, LeftOut, Quantity
+from .in_process import InProcess
 from .latency import Latency, Percentiles
 from .rpc import GrpcClient
 from .state import GroundContact, State
@@ -42,6 +43,7 @@ __all__ = [
     "Forces",
     "GroundContact",
     "GrpcClient",
+    "InProcess",
     "InvalidState",
     "Latency",
     "LayoutMismatch",

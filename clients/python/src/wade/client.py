@@ -37,7 +37,7 @@ class Stream(Protocol):
 
 
 class Client(Protocol):
-    """`GrpcClient` or `ShmClient`. Every call ends within its timeout, with forces or a `WadeError`."""
+    """`GrpcClient`, `ShmClient` or `InProcess`. Every call ends within its timeout, with forces or a `WadeError`."""
 
     def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces on one vehicle in one state."""

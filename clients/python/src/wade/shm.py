@@ -7,7 +7,6 @@ ends without an answer gives up the ports: the next call opens new ones and find
 from __future__ import annotations
 
 import ctypes
-import itertools
 import math
 import threading
 import time
@@ -20,8 +19,9 @@ from . import shm_layout as layout
 from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
 from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
+from .local import SessionStream, flags, session_numbers
 from .shm_link import Link, Lost, memory, vehicles
-from .state import TOLD, TOLD_AT, GroundContact, State
+from .state import TOLD, TOLD_AT, State
 
 _T = TypeVar("_T")
 
@@ -49,8 +49,7 @@ class ShmClient:
         self._lock = threading.Lock()
         self._link: Link | None = None
         self._sequence = 0
-        # numbers of streams, above those that a caller is likely to choose
-        self._runs = itertools.count(1 << 63)
+        self._sessions = session_numbers()
 
     def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces on one vehicle in one state."""
@@ -58,10 +57,10 @@ class ShmClient:
 
     def _evaluate(self, vehicle: str, state: State, session: int, timeout_s: float | None) -> Forces:
         timeout_s, end = self._end(timeout_s)
-        floats, flags = state.floats(), _flags(state)
+        floats, flagged = state.floats(), flags(state)
 
         def write(address: int, wake_key: int) -> None:
-            ctypes.memmove(address, _query(self._sequence, wake_key, session, flags, floats), layout.QUERY.itemsize)
+            ctypes.memmove(address, _query(self._sequence, wake_key, session, flagged, floats), layout.QUERY.itemsize)
 
         with self._lock:
             answer = self._exchange(vehicle, False, write, _read, end, timeout_s)
@@ -73,7 +72,7 @@ class ShmClient:
     ) -> Forces:
         """The forces in N states of one vehicle, which travel 256 at a time."""
         timeout_s, end = self._end(timeout_s)
-        rows, flags = states.rows(), _flags(states)
+        rows, flagged = states.rows(), flags(states)
         length = len(rows["depth_m"])
         sessions = np.broadcast_to(states.sessions(length), length)
         with self._lock:
@@ -83,7 +82,7 @@ class ShmClient:
                 chunk = slice(start, min(start + layout.MAX_BATCH, length))
 
                 def write(address: int, wake_key: int, chunk: slice = chunk) -> None:
-                    _write_batch(address, (self._sequence, wake_key), flags, sessions, rows, chunk)
+                    _write_batch(address, (self._sequence, wake_key), flagged, sessions, rows, chunk)
 
                 def read(address: int, forces: Forces | None = forces, chunk: slice = chunk) -> Forces:
                     return _read_batch(address, forces, length, chunk, surfaces)
@@ -100,9 +99,9 @@ class ShmClient:
         assert forces is not None, "rows() refuses an empty batch"
         return forces
 
-    def stream(self, vehicle: str) -> ShmStream:
+    def stream(self, vehicle: str) -> SessionStream:
         """A stream of states of one vehicle: a run of its own, whose states need no session. As fast as a call."""
-        return ShmStream(self, vehicle)
+        return SessionStream(self, vehicle)
 
     def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
         """Names of the vehicles that are served. This asks the system, not the server, and does not wait."""
@@ -156,48 +155,6 @@ class ShmClient:
         if self._link is None:
             self._link = Link(self.namespace, self._blocks)
         return self._link
-
-
-class ShmStream:
-    """One answer a state, in order: a run, in which effects remember.
-
-    A call that fails ends the run, and the next begins it anew.
-    """
-
-    def __init__(self, client: ShmClient, vehicle: str):
-        self._client, self._vehicle = client, vehicle
-        self._session = next(client._runs)
-
-    def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
-        """The forces in one state."""
-        try:
-            return self._client._evaluate(self._vehicle, state, state.sessions(None) or self._session, timeout_s)
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """Ends the run; the server forgets it in time."""
-        self._session = next(self._client._runs)
-
-    def __enter__(self) -> ShmStream:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
-
-
-def _flags(state: State) -> int:
-    flags = layout.DRY_CONTACT if state.ground_contact == GroundContact.DRY else 0
-    if state.implicit_added_mass:
-        flags |= layout.IMPLICIT_ADDED_MASS
-    if state.heading_rad is not None:
-        flags |= layout.HAS_HEADING
-    if state.depth_rate_mps is not None:
-        flags |= layout.HAS_DEPTH_RATE
-    if state.wheel_speed_radps is not None:
-        flags |= layout.HAS_WHEEL_SPEEDS
-    return flags
 
 
 _NAN = (math.nan,)

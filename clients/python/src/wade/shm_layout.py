@@ -1,4 +1,4 @@
-"""What lies in shared memory: the counterpart of the server's src/service/shm_layout.rs, to which the tests hold it.
+"""What lies in shared memory: the counterpart of crates/wade-wire/src/shm/layout.rs, to which the tests hold it.
 
 Little-endian as the machine is. The version is part of the services' names.
 """

@@ -1,16 +1,13 @@
 //! What effects remember of the runs of many clients: bounded, without allocating once it is made.
 //!
 //! Two generations: a run that asks moves to the younger one, and when that is full the older one is forgotten. So the last
-//! [`CAPACITY`] runs that asked are always known, at most twice as many are held, and a run that comes back after it was
-//! forgotten begins anew, which its answer says.
+//! [`Sessions::CAPACITY`] runs that asked are always known, at most twice as many are held, and a run that comes back after
+//! it was forgotten begins anew, which its answer says.
 
 use std::collections::HashMap;
 use std::hash::Hash;
 
 use wade_core::effects::Session;
-
-/// Runs that are surely known.
-pub const CAPACITY: usize = 4096;
 
 /// Sessions by key.
 #[derive(Debug)]
@@ -18,6 +15,11 @@ pub struct Sessions<K> {
     young: HashMap<K, Session>,
     old: HashMap<K, Session>,
     capacity: usize,
+}
+
+impl<K> Sessions<K> {
+    /// Runs that are surely known, unless a caller wants another number.
+    pub const CAPACITY: usize = 4096;
 }
 
 impl<K: Hash + Eq> Sessions<K> {

@@ -1,0 +1,69 @@
+//! States as the client passes them: single-precision numbers in the order of `State.floats`, and flags.
+
+use wade_wire::State;
+use wade_wire::shm::layout::{
+    DRY_CONTACT, HAS_DEPTH_RATE, HAS_HEADING, HAS_WHEEL_SPEEDS, IMPLICIT_ADDED_MASS,
+};
+
+/// Numbers of a state.
+pub const NUMBERS: usize = 27;
+
+/// Bytes that are no rows of states.
+#[derive(Debug, thiserror::Error)]
+#[error("{len} bytes of {what} are not {expected}: module and client differ in version")]
+pub struct Misshapen {
+    what: &'static str,
+    len: usize,
+    expected: &'static str,
+}
+
+/// A state of its numbers and of the flags of shared memory.
+pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
+    let &[
+        depth,
+        density,
+        ref vectors @ ..,
+        heading,
+        depth_rate,
+        front_left,
+        front_right,
+        rear_left,
+        rear_right,
+        time_step,
+    ] = numbers;
+    let vector = |i: usize| [vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]];
+    let has = |flag: u64| flags & flag != 0;
+    State {
+        velocity: vector(0),
+        current: vector(1),
+        angular_velocity: vector(2),
+        acceleration: vector(3),
+        angular_acceleration: vector(4),
+        gravity: vector(5),
+        depth,
+        density,
+        dry_contact: has(DRY_CONTACT),
+        heading: has(HAS_HEADING).then_some(heading),
+        depth_rate: has(HAS_DEPTH_RATE).then_some(depth_rate),
+        wheel_speeds: has(HAS_WHEEL_SPEEDS).then_some([front_left, front_right, rear_left, rear_right]),
+        time_step,
+        implicit_added_mass: has(IMPLICIT_ADDED_MASS),
+    }
+}
+
+/// The states of a batch, and the number of the session of each: none, or one a state.
+pub fn batch(numbers: &[u8], flags: u64, sessions: &[u8]) -> Result<(Vec<State>, Vec<u64>), Misshapen> {
+    let misshapen = |what, len, expected| Misshapen { what, len, expected };
+    let (words, rest) = numbers.as_chunks::<4>();
+    let words: Vec<f32> = words.iter().map(|&word| f32::from_le_bytes(word)).collect();
+    let (rows, beyond) = words.as_chunks::<NUMBERS>();
+    if !rest.is_empty() || !beyond.is_empty() {
+        return Err(misshapen("numbers", numbers.len(), "whole states"));
+    }
+    let (numbered, rest) = sessions.as_chunks::<8>();
+    if !rest.is_empty() || !(numbered.is_empty() || numbered.len() == rows.len()) {
+        return Err(misshapen("sessions", sessions.len(), "one a state"));
+    }
+    let numbered = numbered.iter().map(|&word| u64::from_le_bytes(word)).collect();
+    Ok((rows.iter().map(|row| state(row, flags)).collect(), numbered))
+}

@@ -1,0 +1,194 @@
+"""The model in this process: no server, no transport.
+
+The compiled module `wade_native` evaluates it with the code of the server, so that the answers have the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .client import checked_timeout
+from .errors import DeadlineExceeded, InvalidState, UnknownVehicle, Violation, WadeError
+from .forces import Array, Effect, Forces, named_effect
+from .local import SessionStream, flags, session_numbers
+from .state import SCALARS, TOLD, VECTORS, State
+
+if TYPE_CHECKING:
+    import wade_native
+
+#: Version of the compiled module that this client is written for.
+_VERSION = "0.2.0"
+_INSTALL = "in a checkout of wade, with Rust: pip install ./clients/python/native"
+
+#: How many numbers each field has in a state, in the order of `State.floats`.
+_WIDTHS = dict.fromkeys(SCALARS, 1) | dict.fromkeys(VECTORS, 3) | TOLD | {"time_step_s": 1}
+_NUMBERS = sum(_WIDTHS.values())
+
+
+class InProcess:
+    """Evaluates the vehicles of a folder; without one, those of wade's usual folder or those that wade carries.
+
+    A vehicle is read with its first call. Several threads may share a client, but a vehicle answers one call at a
+    time; a batch leaves the other threads of Python running. `timeout_s` is there for the other clients: nothing is
+    waited for here, and 0 alone is refused as by them.
+    """
+
+    def __init__(self, vehicles: str | PathLike[str] | None = None):
+        self._native = _native()
+        try:
+            self._library = self._native.Library(vehicles)
+        except self._native.UnreadableVehicle as error:
+            raise WadeError(str(error)) from None
+        self._vehicles: dict[str, _Vehicle] = {}
+        self._sessions = session_numbers()
+
+    def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
+        """The forces on one vehicle in one state."""
+        return self._evaluate(vehicle, state, state.sessions(None), timeout_s)
+
+    def _evaluate(self, vehicle: str, state: State, session: int, timeout_s: float | None) -> Forces:
+        _check(timeout_s)
+        numbers, known = state.floats(), self._vehicle(vehicle)
+        try:
+            answer = known.native.evaluate(numbers, flags(state), session)
+        except self._native.InvalidState as invalid:
+            raise InvalidState([Violation(*invalid.args)]) from None
+        return known.forces(np.frombuffer(answer, known.row)[0], _as_it_is)
+
+    def evaluate_batch(
+        self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
+    ) -> Forces:
+        """The forces in N states of one vehicle, any number of them."""
+        _check(timeout_s)
+        rows = states.rows()
+        length = len(rows["depth_m"])
+        # a number that is not given is not read
+        numbers = np.zeros((length, _NUMBERS), "<f4")
+        start = 0
+        for name, width in _WIDTHS.items():
+            if name in rows:
+                numbers[:, start : start + width] = rows[name].reshape(length, width)
+            start += width
+        sessions = b""
+        if not states.is_default("session"):
+            sessions = np.broadcast_to(states.sessions(length), length).astype("<u8").tobytes()
+        known = self._vehicle(vehicle)
+        try:
+            answer = known.native.evaluate_batch(numbers.tobytes(), flags(states), sessions, surfaces)
+        except self._native.InvalidState as invalid:
+            raise InvalidState([Violation(*invalid.args)]) from None
+        return known.forces(np.frombuffer(answer, known.row if surfaces else known.net_row), np.ascontiguousarray)
+
+    def stream(self, vehicle: str) -> SessionStream:
+        """A stream of states of one vehicle: a run of its own, whose states need no session. As fast as a call."""
+        return SessionStream(self, vehicle)
+
+    def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
+        """Names of the vehicles there are."""
+        _check(timeout_s)
+        try:
+            names: list[str] = self._library.names()
+        except self._native.UnreadableVehicle as error:
+            raise WadeError(str(error)) from None
+        return names
+
+    def close(self) -> None:
+        """Drops the vehicles and their sessions. A call after it reads them again."""
+        self._vehicles = {}
+
+    def __enter__(self) -> InProcess:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def _vehicle(self, name: str) -> _Vehicle:
+        known = self._vehicles.get(name)
+        if known is None:
+            try:
+                # of two threads that come first, both get the one that was there first
+                known = self._vehicles.setdefault(name, _Vehicle.of(self._library.vehicle(name)))
+            except self._native.UnknownVehicle as error:
+                raise UnknownVehicle(name, str(error)) from None
+            except self._native.UnreadableVehicle as error:
+                raise WadeError(str(error)) from None
+        return known
+
+
+@dataclass(frozen=True, slots=True)
+class _Vehicle:
+    """A vehicle, and what all of its answers have in common."""
+
+    native: wade_native.Vehicle
+    #: A state's answer, with and without the arrays per surface.
+    row: np.dtype[Any]
+    net_row: np.dtype[Any]
+    has_added_mass: bool
+    effects: tuple[Effect | int, ...]
+    about_m: Array
+    version: int
+    provenance: str
+
+    @classmethod
+    def of(cls, native: wade_native.Vehicle) -> _Vehicle:
+        row = np.dtype(native.columns(True))
+        about = np.array(native.about_m, np.float32)
+        about.flags.writeable = False
+        return cls(
+            native=native,
+            row=row,
+            net_row=np.dtype(native.columns(False)),
+            has_added_mass="added_mass" in (row.names or ()),
+            effects=tuple(named_effect(code) for code in native.effects),
+            about_m=about,
+            version=native.version,
+            provenance=native.provenance,
+        )
+
+    def forces(self, answer: Any, array: Callable[[Any], Any]) -> Forces:
+        """A row, or N of them."""
+        return Forces(
+            force_n=array(answer["force_n"]),
+            moment_nm=array(answer["moment_nm"]),
+            about_m=self.about_m,
+            uncertainty_n=array(answer["uncertainty_n"]),
+            surface_force_n=array(answer["surface_force_n"]),
+            surface_point_m=array(answer["surface_point_m"]),
+            wetted_fraction=array(answer["wetted_fraction"]),
+            outside=array(answer["outside"]),
+            effects=self.effects,
+            effect_force_n=array(answer["effect_force_n"]),
+            effect_moment_nm=array(answer["effect_moment_nm"]),
+            effect_left_out=answer["effect_left_out"].astype(np.uint8),
+            effect_surface_force_n=array(answer["effect_surface_force_n"]),
+            effects_outside=array(answer["effects_outside"]),
+            added_mass=array(answer["added_mass"]) if self.has_added_mass else None,
+            session_begins=answer["session_begins"] != 0,
+            bundle_version=self.version,
+            provenance=self.provenance,
+            compute_ns=int(np.sum(answer["compute_ns"])),
+        )
+
+
+def _as_it_is(column: Any) -> Any:
+    return column
+
+
+def _check(timeout_s: float | None) -> None:
+    if timeout_s is not None and checked_timeout(timeout_s) == 0.0:
+        raise DeadlineExceeded(0.0)
+
+
+def _native() -> Any:
+    try:
+        import wade_native
+    except ImportError as error:
+        raise ImportError(f"wade.InProcess needs the compiled module wade_native ({error}); {_INSTALL}") from None
+    if wade_native.VERSION != _VERSION:
+        raise ImportError(f"wade_native is of version {wade_native.VERSION}, this client needs {_VERSION}; {_INSTALL}")
+    return wade_native
