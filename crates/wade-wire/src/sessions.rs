@@ -2,7 +2,7 @@
 //!
 //! Two generations: a run that asks moves to the younger one, and when that is full the older one is forgotten. So the last
 //! [`Sessions::CAPACITY`] runs that asked are always known, at most twice as many are held, and a run that comes back after
-//! it was forgotten begins anew, which its answer says.
+//! it was forgotten begins again, which its answer says.
 
 use std::collections::HashMap;
 use std::hash::Hash;

@@ -17,7 +17,7 @@ use super::body::Body;
 use super::immersion::Immersion;
 use super::input::{Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, form, unused};
-use super::library::{Coefficient, EffectSpec, Quantity, Rate};
+use super::spec::{Coefficient, EffectSpec, Quantity, Rate};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 

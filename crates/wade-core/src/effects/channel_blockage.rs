@@ -4,12 +4,12 @@
 //! continuity the flow beside the hull is `1 / (1 - m)` times as fast. Qi, Eames, Johnson (JFM 2014) have
 //! `(1 + Cd0 b / 2w)^2` instead, which agrees to a few per cent for b/w of 0.1 to 0.4, where both are meant to hold. And with
 //! the model's own drag `D`, whatever law it follows, and the surface that falls where the flow is fast,
-//! [`super::channel_flow`]. `k` is about 1.
+//! `channel_flow`. `k` is about 1.
 
 use super::channel_flow::{self, MOST};
 use super::input::{Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, amount, unused};
-use super::library::{Coefficient, EffectSpec, Parameter, Quantity};
+use super::spec::{Coefficient, EffectSpec, Parameter, Quantity};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 

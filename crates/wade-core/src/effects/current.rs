@@ -1,14 +1,14 @@
 //! Water that moves over ground with `u`, fixed in the world.
 //!
 //! `f = D(v - w) - D(v)` on each wet panel, `w = R^T u`, with the drag of the model itself, `D(v) = -K |v| v`, `K` from
-//! what the model answers in the state ([`Input::own_drag`]). Exact for a uniform flow and a quadratic law. Written as `K |v - w0| w + K v ((2 v - w0) . w) / (|v - w0| + |v|)`, which is linear in
+//! what the model answers in the state (`Input::own_drag`). Exact for a uniform flow and a quadratic law. Written as `K |v - w0| w + K v ((2 v - w0) . w) / (|v - w0| + |v|)`, which is linear in
 //! `w` and exact at `w = w0`, the estimate `u0` of the law, to which fitting sets it again and again. With
 //! [`DragSpeed::PerAxis`] the drag is `D_i(v) = -K_i |v_i| v_i` (the cross-flow principle; Fossen, Handbook of Marine Craft
 //! Hydrodynamics, section 6.4).
 
 use super::input::{DragSpeed, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, finite, form};
-use super::library::{Coefficient, EffectSpec, Quantity};
+use super::spec::{Coefficient, EffectSpec, Quantity};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 

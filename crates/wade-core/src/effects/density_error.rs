@@ -4,7 +4,7 @@
 
 use super::input::{Input, Memory, Part};
 use super::law::Law;
-use super::library::{Coefficient, EffectSpec, Quantity};
+use super::spec::{Coefficient, EffectSpec, Quantity};
 use crate::wrench::Wrench;
 
 /// An error of the stated density; its law has one form.

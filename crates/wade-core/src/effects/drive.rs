@@ -2,7 +2,7 @@
 //! fitted, and they are never part of a model.
 
 use super::law::Law;
-use super::library::{Coefficient, EffectSpec, Kind, Quantity, Rate};
+use super::spec::{Coefficient, EffectSpec, Kind, Quantity, Rate};
 
 /// What these faults have in common.
 const DRIVE: EffectSpec = EffectSpec { kind: Kind::Drive, ..EffectSpec::COMMON };

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::input::BaseDrag;
 use super::law::Numbers;
-use super::library::{Effect, Kind, MAX_COEFFICIENTS, Shape};
+use super::library::{Effect, MAX_COEFFICIENTS, Shape};
+use super::spec::Kind;
 use super::validity::Validity;
 use crate::frame::Vec3;
 

@@ -7,7 +7,7 @@
 
 use super::input::{Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, amount, unused};
-use super::library::{Coefficient, EffectSpec, Parameter, Quantity};
+use super::spec::{Coefficient, EffectSpec, Parameter, Quantity};
 use crate::frame::{GRAVITY, Vec3};
 use crate::wrench::Wrench;
 

@@ -1,7 +1,7 @@
 //! What every effect's file defines, and how typed parameters become the three numbers of `shape` in a file and back.
 
 use super::input::{Input, Memory, Part};
-use super::library::EffectSpec;
+use super::spec::EffectSpec;
 use crate::wrench::Wrench;
 
 /// `shape` in `effects.toml` and in reports: the nonlinear parameters, then the form of the law by number.

@@ -7,7 +7,7 @@
 
 use super::input::{Input, Memory, Part};
 use super::law::Law;
-use super::library::{Coefficient, EffectSpec, Quantity};
+use super::spec::{Coefficient, EffectSpec, Quantity};
 use crate::frame::{GRAVITY, Vec3};
 use crate::wrench::Wrench;
 

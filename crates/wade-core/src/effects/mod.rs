@@ -10,9 +10,9 @@
 //! An effect describes itself: its file implements `Law` with an [`EffectSpec`], and everything else reads that. A new effect
 //! is a file here, a line in the list of `library`, and a number in the proto where it is a load of the water.
 //!
-//! Reading order: `library` (what an effect says of itself, and the list), `law` (what its file defines), `body` (what an
-//! effect needs to know of a hull), `immersion` (where the water reaches), `input` (a state), then the effects. `file` is
-//! `effects.toml`, `validity` the box in which they were seen, `active` the request path.
+//! Reading order: `spec` (what an effect says of itself), `law` (what its file defines), `body` (what an effect needs to
+//! know of a hull), `immersion` (where the water reaches), `input` (a state), then the effects and `library`, their list. `file`
+//! is `effects.toml`, `validity` the box in which they were seen, `active` the request path.
 
 pub mod form_drag;
 pub mod skin_friction;
@@ -28,6 +28,7 @@ pub mod hull_flooding;
 pub mod linear_damping;
 pub mod rotation;
 pub mod sensor;
+mod spec;
 pub mod squat;
 pub mod water_entry_slamming;
 pub mod water_level_offset;
@@ -53,7 +54,6 @@ pub use hull_flooding::level_after;
 pub use immersion::{Immersion, WetPanel};
 pub use input::{BaseDrag, DragSpeed, Input, Memory, Part};
 pub use law::{Numbers, ShapeFault};
-pub use library::{
-    Coefficient, Effect, EffectSpec, Kind, MAX_COEFFICIENTS, PHYSICS, Parameter, Quantity, Rate, Shape,
-};
+pub use library::{Effect, MAX_COEFFICIENTS, PHYSICS, Shape};
+pub use spec::{Coefficient, EffectSpec, Kind, Parameter, Quantity, Rate};
 pub use validity::{BoxQuantity, OutsideBox, Validity};

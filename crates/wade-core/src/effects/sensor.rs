@@ -2,7 +2,7 @@
 //! never part of a model.
 
 use super::law::{Law, Numbers, ShapeFault, amount, form, unused};
-use super::library::{Coefficient, EffectSpec, Kind, Quantity, UNBOUNDED};
+use super::spec::{Coefficient, EffectSpec, Kind, Quantity, UNBOUNDED};
 
 /// What the faults of sensors have in common.
 const SENSOR: EffectSpec =

@@ -4,14 +4,14 @@
 //! coefficient trims. Three laws:
 //!
 //! - open water, `s = v^2 / 2g` (Bernoulli), or `s = v^2 / 2g / sqrt(|1 - Fr_h^2|)` (Tuck), cut at twice the former;
-//! - a channel of known width: Bernoulli and continuity in one dimension, [`super::channel_flow`].
+//! - a channel of known width: Bernoulli and continuity in one dimension, `channel_flow`.
 //!
 //! All are laws of ships at Fr_h below 0.7: low confidence for us.
 
 use super::channel_flow::{LEAST_DEPTH, depression, froude_squared};
 use super::input::{Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, amount, form, unused};
-use super::library::{Coefficient, EffectSpec, Parameter, Quantity};
+use super::spec::{Coefficient, EffectSpec, Parameter, Quantity};
 use crate::frame::{GRAVITY, Vec3};
 use crate::wrench::Wrench;
 

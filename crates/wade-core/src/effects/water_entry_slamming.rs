@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 use super::input::{Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, amount, unused};
-use super::library::{Coefficient, EffectSpec, Parameter, Quantity, Rate};
+use super::spec::{Coefficient, EffectSpec, Parameter, Quantity, Rate};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 

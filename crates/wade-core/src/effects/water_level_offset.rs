@@ -6,7 +6,7 @@
 
 use super::input::{DragSpeed, Input, Memory, Part};
 use super::law::Law;
-use super::library::{Coefficient, EffectSpec, Quantity};
+use super::spec::{Coefficient, EffectSpec, Quantity};
 use crate::frame::GRAVITY;
 use crate::wrench::Wrench;
 

@@ -9,7 +9,7 @@
 
 use super::input::{Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, amount, form};
-use super::library::{Coefficient, EffectSpec, Parameter, Quantity, Rate};
+use super::spec::{Coefficient, EffectSpec, Parameter, Quantity, Rate};
 use crate::frame::{GRAVITY, Vec3};
 use crate::wrench::Wrench;
 

@@ -8,7 +8,7 @@
 
 use super::input::{Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, form, unused};
-use super::library::{Coefficient, EffectSpec, Quantity};
+use super::spec::{Coefficient, EffectSpec, Quantity};
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
