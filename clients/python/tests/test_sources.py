@@ -162,11 +162,10 @@ def test_the_codes_and_limits_are_the_servers() -> None:
     status = rust_numbers(r"    (\w+) = (\d+),", LAYOUT)
     ours = (shm_layout.STATUS_OK, shm_layout.STATUS_INVALID_STATE, shm_layout.STATUS_NOT_SERVED)
     assert (status["Ok"], status["InvalidState"], status["NotServed"]) == ours
-    fields = re.search(r"pub enum Field \{(.*?)\n\}", WIRE, re.DOTALL)
+    fields = re.search(r"pub enum Field \{(.*?)\n    \}", WIRE, re.DOTALL)
     assert fields
-    assert shm_layout.FIELDS == {
-        int(n): name for name, n in re.findall(r"/// `(\w+)`\n    \w+ = (\d+),", fields.group(1))
-    }
+    named = re.findall(r"^ +\w+ = (\d+) => \"(\w+)\",$", fields.group(1), re.MULTILINE)
+    assert shm_layout.FIELDS == {int(number): name for number, name in named}
     problems = re.search(r"pub enum Problem \{(.*?)\n\}", WIRE, re.DOTALL)
     assert problems
     assert list(shm_layout.PROBLEMS) == [int(n) for n in re.findall(r"\w+ = (\d+),", problems.group(1))]
