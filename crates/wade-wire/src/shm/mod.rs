@@ -4,10 +4,12 @@
 #![allow(unsafe_code)]
 
 mod convert;
+mod error;
 pub mod layout;
 pub mod room;
 pub mod served;
 
+pub use error::{OpenError, ShmError};
 use std::mem::MaybeUninit;
 
 use iceoryx2::config::Config;
@@ -38,24 +40,6 @@ pub const NAMESPACE: &str = "wade";
 
 /// Most clients of all vehicles together: each has a place among those that wake and are woken.
 pub const MAX_CLIENTS: usize = 64;
-
-/// The shared memory could not be set up.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("shared memory: cannot create {what}: {reason}")]
-pub struct ShmError {
-    /// Node, service or port.
-    pub what: String,
-    /// The reason that iceoryx2 gives.
-    pub reason: String,
-}
-
-impl ShmError {
-    /// An error about `what`, once its reason is known.
-    pub fn new(what: impl Into<String>) -> impl FnOnce(&dyn std::fmt::Display) -> Self {
-        let what = what.into();
-        move |reason| Self { what, reason: reason.to_string() }
-    }
-}
 
 /// A node that leaves the signals to their owner.
 pub fn node<S: Service>() -> Result<Node<S>, ShmError> {
@@ -94,20 +78,6 @@ where
         Reason::IncompatibleRequestOrResponseType => OpenError::OtherTypes,
         error => failed(&error),
     })
-}
-
-/// Why a service could not be opened.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum OpenError {
-    /// Nobody has created it.
-    #[error("it does not exist")]
-    Absent,
-    /// What lies in it has another size or name.
-    #[error("it has other types")]
-    OtherTypes,
-    /// The system refused.
-    #[error(transparent)]
-    Failed(ShmError),
 }
 
 /// Opens or creates an event service.

@@ -1,10 +1,12 @@
 //! The signed distance to the hull on a regular grid.
 
-#[cfg(feature = "build")]
 mod build;
-
 #[cfg(feature = "build")]
+mod error;
+
 pub use build::signed_distances;
+#[cfg(feature = "build")]
+pub use error::GridError;
 
 use crate::frame::Vec3;
 
@@ -16,44 +18,6 @@ pub const MARGIN: f64 = 0.5;
 
 /// Most grid points; a vehicle of a metre has two million.
 pub const MAX_POINTS: usize = 1 << 25;
-
-/// Why a grid was refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GridError {
-    /// A mesh without faces.
-    #[error("a signed distance needs a mesh with faces")]
-    Empty,
-    /// More points than `MAX_POINTS`: a hull far smaller than the margin.
-    #[error(
-        "a grid of {x} x {y} x {z} points is too large: the spacing of {spacing_m} m is too fine for a margin of 0.5 m"
-    )]
-    TooLarge {
-        /// Points along x.
-        x: usize,
-        /// Points along y.
-        y: usize,
-        /// Points along z.
-        z: usize,
-        /// Grid spacing [m].
-        spacing_m: f64,
-    },
-    /// Stored values that do not fit the shape, or a spacing that is not positive.
-    #[error("{values} values do not fill a grid of {expected} points with spacing {spacing_m} m")]
-    Shape {
-        /// Number of values.
-        values: usize,
-        /// Product of the shape.
-        expected: usize,
-        /// Grid spacing [m].
-        spacing_m: f64,
-    },
-    /// A NaN or infinite number.
-    #[error("grid value {index} is not finite")]
-    NotFinite {
-        /// Index of the value.
-        index: usize,
-    },
-}
 
 /// Signed distance to the hull, negative inside; frame of the mesh.
 #[derive(Debug, Clone, PartialEq)]
