@@ -13,7 +13,7 @@ use wade_learn::cfd::collect::{self, Collected};
 use wade_learn::cfd::openfoam::OpenFoam;
 use wade_learn::cfd::plan::{self, Plan, Set};
 use wade_learn::cfd::report;
-use wade_learn::cfd::run::{Event, Work};
+use wade_learn::cfd::run::{Event, Machine, Work};
 use wade_learn::cfd::slurm;
 use wade_learn::workflow::campaign::{Addition, Beginning, Folder, Selection};
 
@@ -234,9 +234,10 @@ impl Run {
         eprintln!("{}", solver.label());
         let mut progress = Progress::new(cases.len(), self.jobs)?;
         let mut failed = Vec::new();
-        let jobs = (self.jobs, self.outdated);
-        folder
-            .compute((&plan, &solver, &work), &cases, jobs, &mut |event| progress.hear(event, &mut failed))?;
+        let campaign = &plan.campaign;
+        let outdated = self.outdated;
+        let machine = Machine { vehicle: &vehicle, campaign, solver: &solver, work: &work, outdated };
+        machine.run(&cases, self.jobs, &mut |event| progress.hear(event, &mut failed))?;
         progress.finish();
         for (id, reason) in &failed {
             println!("set aside: {id}: {reason}");

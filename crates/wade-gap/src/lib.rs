@@ -1,11 +1,11 @@
 //! The gap workflow: where a model and measured trials disagree, which known effect explains it, whether anything else could,
-//! and how much smaller the gap is with it on trials that took no part.
+//! and how much smaller the gap is with it on held-out trials.
 //!
 //! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
 //!
 //! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `plausible` (what
 //! cannot be), `noise` (the floor), `candidates` (the
-//! library as columns), `base_drag`, `split` (what is kept back, and folds), `design` (the regression), `robust` (errors that
+//! library as columns), `base_drag`, `split` (held-out trials, and folds), `design` (the regression), `robust` (errors that
 //! hold), `judge` (the gates), `select` and `rivals` (which effects), `shared` (noise of the motion in both), `nonlinear`,
 //! `general` and `lasting` (structure without a name), `features`, `gated`, `locate` and `carriers` (where), `verdict`, `fit`, `holdout`,
 //! `detect` (what would have shown), `experiment`, `report`, `compose`, `sentences`, `page` and `effects_file`; `run` calls them.

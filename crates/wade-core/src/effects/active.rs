@@ -137,6 +137,8 @@ struct Entry {
     values: [f64; MAX_COEFFICIENTS],
     base_drag: BaseDrag,
     channel_width: Option<f64>,
+    /// What the caller may have left unsaid.
+    inputs: &'static [Quantity],
     acts_on_own_drag: bool,
     /// Place of its memory in a session.
     memory: Option<usize>,
@@ -172,6 +174,7 @@ impl ActiveEffects {
             values: effect.values(),
             base_drag: effect.base_drag(),
             channel_width: effect.channel_width,
+            inputs: effect.effect().spec().inputs,
             acts_on_own_drag: effect.effect().spec().acts_on_own_drag,
             memory: effect.effect().memory_place(),
         });
@@ -248,7 +251,7 @@ impl ActiveEffects {
                 Quantity::DepthRate if rate.is_none() => Some(LeftOut::NoDepthRate),
                 _ => None,
             };
-            let left_out = entry.effect.spec().inputs.iter().find_map(missing);
+            let left_out = entry.inputs.iter().find_map(missing);
             let memory = match (session.as_deref_mut(), entry.memory) {
                 (Some(session), Some(place)) => {
                     let memory = &mut session.memories[place];

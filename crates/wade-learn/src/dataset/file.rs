@@ -182,17 +182,17 @@ pub enum Fault {
 
 /// Reads a data set and checks it. Rows may stand in any order; further columns are left alone.
 pub fn read(path: &Path) -> Result<Dataset, DatasetError> {
-    load(path).map_err(|fault| DatasetError { path: path.to_owned(), fault })
+    load(path).map_err(At::path(path))
 }
 
 /// Writes a data set as a whole or not at all: to a temporary file in the same folder, which then takes the name.
 pub fn write(path: &Path, dataset: &Dataset) -> Result<(), DatasetError> {
-    store(path, dataset, Loads::Dictionary).map_err(|fault| DatasetError { path: path.to_owned(), fault })
+    store(path, dataset, Loads::Dictionary).map_err(At::path(path))
 }
 
 /// The same in a third less room, for the data sets of campaigns. The bytes, and so the digest, differ from those of [`write`].
 pub fn write_compact(path: &Path, dataset: &Dataset) -> Result<(), DatasetError> {
-    store(path, dataset, Loads::Plain).map_err(|fault| DatasetError { path: path.to_owned(), fault })
+    store(path, dataset, Loads::Plain).map_err(At::path(path))
 }
 
 fn load(path: &Path) -> Result<Dataset, Fault> {

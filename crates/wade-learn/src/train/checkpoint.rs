@@ -76,7 +76,7 @@ impl Checkpoint {
 
     /// The state to go on from, if any.
     pub(super) fn start(&self, sizes: Sizes, task: &str) -> Result<Option<State>, CheckpointError> {
-        let at = |fault| CheckpointError { path: self.path.clone(), fault };
+        let at = At::path(&self.path);
         if self.resume {
             return read(&self.path, sizes, task).map(Some).map_err(at);
         }
@@ -85,7 +85,7 @@ impl Checkpoint {
 
     /// Replaces the file as a whole: a run that is killed leaves the one before or this one.
     pub(super) fn write(&self, state: &State, task: &str) -> Result<(), CheckpointError> {
-        write(&self.path, state, task).map_err(|fault| CheckpointError { path: self.path.clone(), fault })
+        write(&self.path, state, task).map_err(At::path(&self.path))
     }
 }
 

@@ -7,9 +7,8 @@ use wade_core::vehicle::Vehicle;
 
 use crate::cfd::case::Settings;
 use crate::cfd::collect::{self, CollectError, Collected};
-use crate::cfd::openfoam::OpenFoam;
 use crate::cfd::plan::{self, Campaign, Case, Plan, PlanError, Set};
-use crate::cfd::run::{Event, Machine, RunError, Work};
+use crate::cfd::run::Work;
 use crate::cfd::trials::{self, CaseTrialsError};
 use crate::dataset::{self, DatasetError};
 use crate::parameter_table::ParameterTable;
@@ -37,8 +36,6 @@ pub enum CampaignError {
     NotEmpty { folder: PathBuf },
     #[error(transparent)]
     Plan(#[from] PlanError),
-    #[error(transparent)]
-    Run(#[from] RunError),
     #[error(transparent)]
     Collect(#[from] CollectError),
     #[error(transparent)]
@@ -153,18 +150,6 @@ impl Folder<'_> {
                 && (*again || !work.failure_path(&case.id).exists())
         };
         Ok(plan.cases.iter().filter(is_chosen).cloned().collect())
-    }
-
-    /// Computes cases, so many at a time; `hear` is told of each.
-    pub fn compute(
-        &self,
-        (plan, solver, work): (&Plan, &OpenFoam, &Work),
-        cases: &[Case],
-        (jobs, outdated): (usize, bool),
-        hear: &mut dyn FnMut(Event),
-    ) -> Result<(), CampaignError> {
-        let machine = Machine { vehicle: self.vehicle, campaign: &plan.campaign, solver, work, outdated };
-        Ok(machine.run(cases, jobs, hear)?)
     }
 
     /// Makes trials of computed cases of some sets, and writes them to a folder that holds none. Returns how many.
