@@ -219,9 +219,8 @@ struct Run {
 
 impl Run {
     fn run(self) -> Result<ExitCode> {
-        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
+        let (plan, vehicle) = opened(&self.campaign, &self.vehicles)?;
         let folder = Folder { path: &self.campaign, vehicle: &vehicle };
-        let plan = folder.plan()?;
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: self.keep };
         let selection = Selection {
             sets: self.set.iter().map(|name| (*name).into()).collect(),
@@ -256,9 +255,12 @@ impl Run {
     }
 }
 
-/// The vehicle that a campaign is about.
-fn vehicle_of(campaign: &Path, vehicles: &Vehicles) -> Result<Vehicle> {
-    Ok(vehicles.without_weights(&Plan::read(campaign)?.campaign.vehicle)?.vehicle)
+/// The plan of a campaign and the vehicle that it is about.
+fn opened(campaign: &Path, vehicles: &Vehicles) -> Result<(Plan, Vehicle)> {
+    let plan = Plan::read(campaign)?;
+    let vehicle = vehicles.without_weights(&plan.campaign.vehicle)?.vehicle;
+    plan.check_vehicle(campaign, &vehicle)?;
+    Ok((plan, vehicle))
 }
 
 fn work_folder(campaign: &Path, stated: Option<&PathBuf>) -> PathBuf {
@@ -282,8 +284,7 @@ struct Collect {
 
 impl Collect {
     fn run(self) -> Result<ExitCode> {
-        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
-        let plan = Folder { path: &self.campaign, vehicle: &vehicle }.plan()?;
+        let (plan, vehicle) = opened(&self.campaign, &self.vehicles)?;
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: true };
         let new = collect::collect(&self.campaign, &plan, &vehicle, &work)?;
         let all = Collected::read(&self.campaign, &plan)?.cases.len();
@@ -318,10 +319,10 @@ struct Trials {
 
 impl Trials {
     fn run(self) -> Result<ExitCode> {
-        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
+        let (plan, vehicle) = opened(&self.campaign, &self.vehicles)?;
         let sets: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
         let folder = Folder { path: &self.campaign, vehicle: &vehicle };
-        let count = folder.write_trials(&sets, self.pairs, &self.out)?;
+        let count = folder.write_trials(&plan, &sets, self.pairs, &self.out)?;
         super::emit(&format!("{}: {count} trials\n", self.out.display()))?;
         Ok(ExitCode::SUCCESS)
     }
@@ -347,8 +348,7 @@ impl Report {
         let files = [plan::PLAN_FILE, plan::CAMPAIGN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
         let files = files.map(|name| self.campaign.join(name));
         let written = super::begin_page(self.html.as_deref(), files)?;
-        let vehicle = vehicle_of(&self.campaign, &self.vehicles)?;
-        let plan = Folder { path: &self.campaign, vehicle: &vehicle }.plan()?;
+        let (plan, vehicle) = opened(&self.campaign, &self.vehicles)?;
         let report = report::Report::of(&self.campaign, &plan, &vehicle)?;
         if self.json {
             super::emit(&(serde_json::to_string_pretty(&report)? + "\n"))?;

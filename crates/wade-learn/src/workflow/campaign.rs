@@ -89,13 +89,6 @@ pub struct Selection {
 }
 
 impl Folder<'_> {
-    /// The plan, checked against the vehicle.
-    pub fn plan(&self) -> Result<Plan, PlanError> {
-        let plan = Plan::read(self.path)?;
-        plan.check_vehicle(self.path, self.vehicle)?;
-        Ok(plan)
-    }
-
     /// Adds cases to the plan, or begins one. Returns the plan and how many cases it had before.
     pub fn extend(&self, beginning: Beginning, add: Addition) -> Result<(Plan, usize), CampaignError> {
         let exists = self.path.join(plan::CAMPAIGN_FILE).exists();
@@ -153,11 +146,16 @@ impl Folder<'_> {
     }
 
     /// Makes trials of computed cases of some sets, and writes them to a folder that holds none. Returns how many.
-    pub fn write_trials(&self, sets: &[Set], pairs: bool, out: &Path) -> Result<usize, CampaignError> {
-        let plan = self.plan()?;
+    pub fn write_trials(
+        &self,
+        plan: &Plan,
+        sets: &[Set],
+        pairs: bool,
+        out: &Path,
+    ) -> Result<usize, CampaignError> {
         let dataset = dataset::read(&self.path.join(collect::SECTIONS_FILE))?;
-        let collected = pairs.then(|| Collected::read(self.path, &plan)).transpose()?;
-        let (manifest, trials) = trials::trials(&plan, &dataset, self.vehicle, sets, collected.as_ref())?;
+        let collected = pairs.then(|| Collected::read(self.path, plan)).transpose()?;
+        let (manifest, trials) = trials::trials(plan, &dataset, self.vehicle, sets, collected.as_ref())?;
         if std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) {
             return Err(CampaignError::NotEmpty { folder: out.to_owned() });
         }
