@@ -1,11 +1,11 @@
 //! The signed distance to the hull on a regular grid.
 
-mod build;
 #[cfg(feature = "build")]
+mod build;
 mod error;
 
-pub use build::signed_distances;
 #[cfg(feature = "build")]
+pub use build::signed_distances;
 pub use error::GridError;
 
 use crate::frame::Vec3;
