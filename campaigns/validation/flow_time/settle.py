@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""When the mean of a window stays within 2 % of the mean of the end: settle.py FOLDER_OF_WORK
+"""When the mean of a window stays within 2 % of the mean of the end: settle.py WORK [RUNS]
 
-Reads the histories that `wade campaign run --keep` leaves, and plan.csv beside this file. The window
-has 2, 4 or 6 body lengths over the speed; the reference is the mean of the last 12 lengths. Error of
-a window: largest of the differences along, across and up, over the magnitude of the dynamic force.
-Writes histories.csv (means of a half length) and prints a table.
+Reads the histories that `wade campaign run --keep` leaves in WORK, or those of the same cases that
+`absorbing.sh` leaves in RUNS, and plan.csv beside this file. The window
+has 2, 4 or 6 body lengths over the speed; the reference is the mean of the last 12 lengths. The
+error of the horizontal force is over its magnitude, that of the vertical force over the whole of it.
+Writes histories*.csv (means of a body length) and prints a table.
 """
 import csv
 import math
@@ -13,7 +14,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-LENGTH, GRAVITY, SHARE = 0.868, 9.81, 0.02
+LENGTH, GRAVITY = 0.868, 9.81
 NUMBER = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?")
 
 
@@ -40,23 +41,25 @@ def mean(rows, start, end):
 
 def main():
     work = Path(sys.argv[1])
+    runs = Path(sys.argv[-1])
     samples = []
-    print("case,froude,length_over_speed_s,dynamic_n,window_lengths,settled_after_lengths,worst_at_5.5,period_lengths")
+    print("case,froude,length_over_speed_s,horizontal_n,window_lengths,horizontal_2_percent_after,horizontal_5_percent_after,"
+          "vertical_2_percent_after,horizontal_error_at_3.5_to_6_percent,vertical_error_at_3.5_to_6_percent,wave_period_lengths")
     for case in csv.DictReader((HERE / "plan.csv").open()):
-        folder = work / case["id"]
-        if not folder.is_dir():
+        folder = runs / case["id"]
+        if not folder.is_dir() or not (work / "outcomes" / (case["id"] + ".json")).is_file():
             continue
         speed, depth = float(case["speed_mps"]), float(case["depth_m"])
         froude = speed / math.sqrt(GRAVITY * depth)
         unit = LENGTH / speed
         rows = history(folder)
         end = rows[-1][0]
-        rest = float(next(r["rest_fz_n"] for r in csv.DictReader((HERE / "cases.csv").open()) if r["id"] == case["id"]))
+        if end < 22 * unit:
+            continue  # still running
         reference = mean(rows, end - 12 * unit, end)
-        dynamic = math.sqrt(reference[0]**2 + reference[1]**2 + (reference[2] - rest)**2)
-        for i in range(int(end / unit * 2)):
-            m = mean(rows, 0.5 * i * unit, 0.5 * (i + 1) * unit)
-            samples.append((case["id"], 0.5 * i + 0.25, *m))
+        level_force = math.hypot(reference[0], reference[1])
+        for i in range(int(end / unit)):
+            samples.append((case["id"], i + 0.5, *mean(rows, i * unit, (i + 1) * unit)))
         # crossings of the vertical force with its mean give the period of the wave in the channel
         late = [(t, f[2] - reference[2]) for t, f in rows if t > end - 16 * unit]
         ups = [t for (t, a), (_, b) in zip(late, late[1:]) if a < 0 <= b]
@@ -66,14 +69,18 @@ def main():
             start = 0.0
             while (start + window) * unit <= end - 2 * unit:
                 m = mean(rows, start * unit, (start + window) * unit)
-                errors.append((start, max(abs(a - b) for a, b in zip(m, reference)) / dynamic))
+                across = math.hypot(m[0] - reference[0], m[1] - reference[1]) / level_force
+                errors.append((start, across, abs(m[2] - reference[2]) / abs(reference[2])))
                 start += 0.25
-            late_errors = [s for s, e in errors if e > SHARE]
-            settled = (max(late_errors) + 0.25 if late_errors else 0.0)
-            settled = f"{settled:.2f}" if settled < errors[-1][0] else "never"
-            worst = max(e for s, e in errors if 3.5 <= s <= 5.5)
-            print(f"{case['id']},{froude:.2f},{unit:.2f},{dynamic:.1f},{window},{settled},{worst:.3f},{period:.1f}")
-    with (HERE / "histories.csv").open("w") as file:
+            row = []
+            for index, share in ((1, 0.02), (1, 0.05), (2, 0.02)):
+                late = [e[0] for e in errors if e[index] > share]
+                settled = late[-1] + 0.25 if late else 0.0
+                row.append(f"{settled:.1f}" if settled <= errors[-1][0] else "never")
+            row += [f"{100 * max(e[i] for e in errors if 3.5 <= e[0] <= 6):.0f}" for i in (1, 2)]
+            print(f"{case['id']},{froude:.2f},{unit:.2f},{level_force:.1f},{window}," + ",".join(row) + f",{period:.1f}")
+    name = "histories.csv" if runs == work else f"histories_{runs.name}.csv"
+    with (HERE / name).open("w") as file:
         file.write("case,lengths,fx_n,fy_n,fz_n\n")
         file.writelines(f"{c},{t:.2f},{x:.3f},{y:.3f},{z:.2f}\n" for c, t, x, y, z in samples)
 
