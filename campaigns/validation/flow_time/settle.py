@@ -85,4 +85,5 @@ def main():
         file.writelines(f"{c},{t:.2f},{x:.3f},{y:.3f},{z:.2f}\n" for c, t, x, y, z in samples)
 
 
-main()
+if __name__ == "__main__":
+    main()
