@@ -16,6 +16,7 @@ use wade_core::effects::{
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::model::Model;
 use wade_core::model::kernel::Isa;
+use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
 
 pub const VEHICLES: [&str; 2] = ["husky", "warthog"];
@@ -221,10 +222,10 @@ impl Drawn {
             angular_velocity: vector(self.angular_velocity),
             acceleration: vector(self.acceleration),
             angular_acceleration: vector(self.angular_acceleration),
-            depth: self.depth.into(),
             density: self.density.into(),
             up: -UnitVector3::new_normalize(vector(self.gravity)),
             ground_contact: if self.dry_contact { GroundContact::Dry } else { GroundContact::Wetted },
+            ..Condition::level(velocity, self.depth.into())
         }
     }
 
@@ -235,6 +236,7 @@ impl Drawn {
             wheel_speeds: Some(self.wheel_speeds.map(f64::from)),
             time_step: self.time_step.into(),
             implicit_added_mass: false,
+            physics: Physics::Full,
         }
     }
 }

@@ -22,6 +22,7 @@ impl From<Drawn> for State {
             wheel_speeds: Some(drawn.wheel_speeds),
             time_step: drawn.time_step,
             implicit_added_mass: false,
+            ..Self::default()
         }
     }
 }

@@ -29,7 +29,8 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
         &[
             &["at", "condition", "digest", "domain", "forces", "frame", "named_enum", "wrench"],
             &["geometry", "vehicle"],
-            &["analytic", "anchor", "effects", "features"],
+            &["features", "physics"],
+            &["analytic", "anchor", "effects"],
             &["bundle", "model", "served"],
         ],
     ),
@@ -39,7 +40,7 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
             &["files", "page", "random", "signal"],
             &["parameter_table", "published"],
             &["dataset", "recordings", "trials"],
-            &["cfd", "train", "validate"],
+            &["cfd", "panel_code", "train", "validate"],
             &["evaluate"],
             &["workflow"],
         ],

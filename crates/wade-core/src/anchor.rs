@@ -221,7 +221,12 @@ impl SurfaceReading {
         // x cross F = M - (M . F) F / F^2 for x = F cross M / F^2
         let size = force.norm_squared();
         let point = if size > 0.0 { self.center + force.cross(&moment) / size } else { self.center };
-        SurfaceForce { force, point: point.sup(&low).inf(&high), wetted_fraction: self.wet_fraction }
+        SurfaceForce {
+            force,
+            point: point.sup(&low).inf(&high),
+            wetted_fraction: self.wet_fraction,
+            couple: Vec3::zeros(),
+        }
     }
 }
 

@@ -7,6 +7,12 @@ use crate::frame::{Vec3, WaterPlane};
 /// Density of fresh water [kg/m3].
 pub const FRESH_WATER: f64 = 1000.0;
 
+/// Component of up along body z below which a state has no depth, only a water level [-].
+pub const LEAST_UPRIGHT: f64 = 0.1;
+
+/// Speed through the water below which the bed's share goes to a half [m/s].
+const SLOW: f64 = 0.02;
+
 /// Whether water reaches under the contact patches of the tires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -31,8 +37,16 @@ pub struct Condition {
     pub acceleration: Vec3,
     /// Angular acceleration [rad/s2].
     pub angular_acceleration: Vec3,
-    /// Undisturbed water surface above the ground-contact plane at the body origin [m].
+    /// Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below. Where
+    /// `water_level` is given it decides, and [`Condition::resolved`] puts the depth that belongs to it here.
     pub depth: f64,
+    /// Signed height of the still-water plane above the body origin along up [m]: `(z0 + depth) up_z`.
+    pub water_level: Option<f64>,
+    /// Distance of the bed below the ground-contact plane [m]; the base assumes one where it is not given.
+    pub bed_clearance: Option<f64>,
+    /// Share of the motion through the water that is motion over the bed, 0 parked to 1 driving; by default that of the
+    /// velocities.
+    pub stated_bed: Option<f64>,
     /// Fluid density [kg/m3].
     pub density: f64,
     /// World up in the body frame.
@@ -51,6 +65,9 @@ impl Condition {
             acceleration: Vec3::zeros(),
             angular_acceleration: Vec3::zeros(),
             depth,
+            water_level: None,
+            bed_clearance: None,
+            stated_bed: None,
             density: FRESH_WATER,
             up: Vec3::z_axis(),
             ground_contact: GroundContact::Wetted,
@@ -59,6 +76,28 @@ impl Condition {
 
     /// The water surface in the body frame of a vehicle whose ground-contact plane is at `z0`.
     pub fn water_plane(&self, z0: f64) -> WaterPlane {
-        WaterPlane::new(z0, self.depth, self.up)
+        match self.water_level {
+            Some(offset) => WaterPlane { normal: self.up, offset },
+            None => WaterPlane::new(z0, self.depth, self.up),
+        }
+    }
+
+    /// The same state with the depth that belongs to its water level. Near its side a vehicle has no depth: there it is that of
+    /// the steepest attitude that has one.
+    pub fn resolved(&self, z0: f64) -> Self {
+        match self.water_level {
+            Some(level) => Self { depth: level / self.up.z.max(LEAST_UPRIGHT) - z0, ..*self },
+            None => *self,
+        }
+    }
+
+    /// Share of the motion through the water that is motion over the bed: 1 driving through still water, 0 parked in a current.
+    /// `b = v_ground . v / v^2` between 0 and 1, and a half at rest, smoothly over the slowest [`SLOW`].
+    pub fn bed(&self) -> f64 {
+        self.stated_bed.unwrap_or_else(|| {
+            let rest = SLOW * SLOW;
+            let along = self.ground_velocity.dot(&self.velocity);
+            ((along + 0.5 * rest) / (self.velocity.norm_squared() + rest)).clamp(0.0, 1.0)
+        })
     }
 }

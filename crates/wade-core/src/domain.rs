@@ -110,6 +110,22 @@ pub struct Domain {
 }
 
 impl Domain {
+    /// The states in which the physical base is tested: any attitude and depth, up to 6 m/s and 3 rad/s, water to mud.
+    pub const EVERYWHERE: Self = {
+        const fn range(min: f64, max: f64) -> Range {
+            Range { min, max }
+        }
+        Self {
+            speed_mps: range(0.0, 6.0),
+            angle_rad: range(0.0, std::f64::consts::FRAC_PI_2),
+            density_kgpm3: range(900.0, 2000.0),
+            depth_m: range(-1e3, 1e3),
+            tilt_rad: range(0.0, std::f64::consts::PI),
+            vertical_speed_mps: range(-6.0, 6.0),
+            angular_speed_radps: range(0.0, 3.0),
+        }
+    };
+
     /// The range of one quantity; `None` of the distance, which no range describes.
     pub fn range(&self, quantity: Quantity) -> Option<Range> {
         Some(match quantity {

@@ -26,6 +26,7 @@ pub mod analytic;
 pub mod anchor;
 pub mod effects;
 pub mod features;
+pub mod physics;
 
 pub mod bundle;
 pub mod model;

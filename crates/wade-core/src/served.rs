@@ -1,9 +1,10 @@
 //! A vehicle as it is served: its model and the effects that were added to it.
 
 use crate::condition::Condition;
-use crate::effects::{ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, Session};
+use crate::effects::{ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, EffectsSession};
 use crate::forces::Forces;
 use crate::model::{Form, Model, Workspace};
+use crate::physics::{Memory, Motion};
 
 /// What a served vehicle answers. Reused from query to query.
 #[derive(Debug, Clone, Default)]
@@ -16,6 +17,19 @@ pub struct Loads {
     edge: Forces,
     /// Buffers of the model.
     workspace: Workspace,
+}
+
+/// What lasts from state to state: waves of the base, and the memory of effects. Starts at rest and dry.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Session {
+    base: Memory,
+    effects: EffectsSession,
+}
+
+impl Session {
+    fn split(&mut self) -> (&mut Memory, &mut EffectsSession) {
+        (&mut self.base, &mut self.effects)
+    }
 }
 
 /// One version of a bundle, ready to answer.
@@ -63,11 +77,27 @@ impl ServedVehicle {
         loads: &mut Loads,
     ) {
         let Loads { forces, effects: added, edge, workspace } = loads;
-        self.model.evaluate(condition, workspace, forces);
+        let condition = &condition.resolved(self.model.vehicle().z0);
+        let (memory, session) = match session {
+            Some(session) => {
+                let (memory, effects) = session.split();
+                (Some(memory), Some(effects))
+            }
+            None => (None, None),
+        };
+        let speeds = self.model.wheel_speeds(circumstances.wheel_speeds.as_ref());
+        let motion = Motion {
+            wheel_speeds: &speeds,
+            time_step: circumstances.time_step,
+            implicit_added_mass: circumstances.implicit_added_mass,
+            physics: circumstances.physics,
+        };
+        self.model.evaluate_moving(condition, (&motion, memory), workspace, forces);
         match &self.effects {
             Some(effects) => {
                 // the wet parts of an anchored model are not those of the samples, with which effects are fitted
-                let known = matches!(self.model.weights().form, Form::Paper(_));
+                let known =
+                    self.model.weights().is_some_and(|weights| matches!(weights.form, Form::Paper(_)));
                 let at_edge = effects.edge(condition).map(|state| {
                     self.model.evaluate(&state, workspace, edge);
                     edge.wrench
@@ -77,6 +107,9 @@ impl ServedVehicle {
                 forces.wrench += added.sum();
             }
             None => added.clear(),
+        }
+        if let Some(base) = &forces.base {
+            added.added_mass = Some(added.added_mass.map_or(base.added_mass, |more| base.added_mass + more));
         }
     }
 }

@@ -142,6 +142,8 @@ pub enum Fault {
         asked: Option<u32>,
     },
     /// Serving needs weights.
-    #[error("the bundle has no weights yet: train it first")]
+    #[error(
+        "the bundle has neither weights nor radiation.safetensors, so nothing can be answered: build it again with `wade vehicle build`, which adds the latter, or train it"
+    )]
     NoWeights,
 }

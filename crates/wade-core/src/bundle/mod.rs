@@ -7,6 +7,7 @@
 //! | `patches.safetensors` | `face_surface` u16 `[faces]` |
 //! | `sdf.safetensors` | `distance` i16 `[nx, ny, nz]` in steps given, with origin and spacing, in the metadata; only with `wade vehicle build --sdf` |
 //! | `submergence.safetensors` | `points`, `normals` f32 `[n, 3]` by rising z within a surface, `offsets` u32 `[K + 1]` |
+//! | `radiation.safetensors` | added mass and waves over displaced volume, see `physics::radiation`: with it the bundle has the physical base; may be absent |
 //! | `network.safetensors` | weights and statistics; absent until the vehicle is trained |
 //! | `effects.toml` | the effects that are switched on, see `effects`; may be absent |
 //! | `spec.toml` | the vehicle file that the bundle was built from, for the record; may be absent |
@@ -37,7 +38,8 @@ use crate::geometry::stl::{read_stl, write_stl};
 use crate::geometry::submergence::Samples;
 use crate::geometry::surfaces::Hull;
 use crate::model::kernel::Isa;
-use crate::model::{Model, Weights};
+use crate::model::{Form, Model, Weights};
+use crate::physics::{Base, Radiation};
 use crate::served::ServedVehicle;
 use crate::vehicle::Vehicle;
 use vehicle_file::VehicleFile;
@@ -54,23 +56,25 @@ const HULL_FILE: &str = "hull.stl";
 const PATCHES_FILE: &str = "patches.safetensors";
 const SDF_FILE: &str = "sdf.safetensors";
 const SUBMERGENCE_FILE: &str = "submergence.safetensors";
+const RADIATION_FILE: &str = "radiation.safetensors";
 const NETWORK_FILE: &str = "network.safetensors";
 const EFFECTS_FILE: &str = "effects.toml";
 const SPEC_FILE: &str = "spec.toml";
 const SUMS_FILE: &str = "SHA256SUMS";
-const FILES: [&str; 9] = [
+const FILES: [&str; 10] = [
     VEHICLE_FILE,
     HULL_FILE,
     PATCHES_FILE,
     SDF_FILE,
     SUBMERGENCE_FILE,
+    RADIATION_FILE,
     NETWORK_FILE,
     EFFECTS_FILE,
     SPEC_FILE,
     SUMS_FILE,
 ];
 /// Files that a bundle may do without.
-const OPTIONAL: [&str; 4] = [SDF_FILE, NETWORK_FILE, EFFECTS_FILE, SPEC_FILE];
+const OPTIONAL: [&str; 5] = [SDF_FILE, RADIATION_FILE, NETWORK_FILE, EFFECTS_FILE, SPEC_FILE];
 
 /// Format of the bundles that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;
@@ -84,6 +88,8 @@ pub struct Bundle {
     pub version: u32,
     /// The weights and the domain in which they were learnt; none until the vehicle is trained.
     pub trained: Option<(Weights, Domain)>,
+    /// Added mass and waves; none of a bundle from before there was a physical base.
+    pub radiation: Option<Radiation>,
     /// Signed distance to the hull, where the bundle was built with it: nothing that is served needs it.
     pub distance: Option<SignedDistanceGrid>,
     /// The effects that are switched on; only with the weights that they were fitted to.
@@ -160,9 +166,17 @@ impl Files {
             vehicle,
             version: vehicle_file.version,
             trained,
+            radiation: self.radiation()?,
             distance: self.distance()?,
             spec: self.files.get(SPEC_FILE).map(|bytes| String::from_utf8_lossy(bytes).into_owned()),
         })
+    }
+
+    fn radiation(&self) -> Result<Option<Radiation>, BundleError> {
+        if !self.files.contains_key(RADIATION_FILE) {
+            return Ok(None);
+        }
+        self.parse(RADIATION_FILE, tensors::read_radiation).map(Some)
     }
 
     fn distance(&self) -> Result<Option<SignedDistanceGrid>, BundleError> {
@@ -236,10 +250,20 @@ impl Source {
     fn parts(&self, isa: Isa) -> Result<(Model, Option<EffectsFile>), BundleError> {
         let (files, vehicle_file) = Files::read(self)?;
         let vehicle = files.vehicle(&vehicle_file)?;
-        let trained = files.trained(&vehicle_file)?.ok_or(Fault::NoWeights);
-        let (weights, domain) = trained.map_err(At::path(&files.directory))?;
+        let trained = files.trained(&vehicle_file)?;
+        let base = files.radiation()?.map(|radiation| Base::new(&vehicle, radiation));
         let effects = files.effects(&vehicle.name)?;
-        Ok((Model::new(vehicle, vehicle_file.version, domain, weights, isa), effects))
+        let version = vehicle_file.version;
+        let model = match (trained, base) {
+            // the paper's network answers the whole force, as published
+            (Some((weights, domain)), Some(base)) if matches!(weights.form, Form::Anchored(_)) => {
+                Model::new(vehicle, version, domain, weights, isa).with_base(base)
+            }
+            (Some((weights, domain)), _) => Model::new(vehicle, version, domain, weights, isa),
+            (None, Some(base)) => Model::of_physics(vehicle, version, base),
+            (None, None) => return Err(At::path(&files.directory)(Fault::NoWeights)),
+        };
+        Ok((model, effects))
     }
 
     fn bundle(&self) -> Result<Bundle, BundleError> {
@@ -305,6 +329,9 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
     ]);
     if let Some(grid) = &bundle.distance {
         files.insert(SDF_FILE, tensors::write_distance(grid));
+    }
+    if let Some(radiation) = &bundle.radiation {
+        files.insert(RADIATION_FILE, tensors::write_radiation(radiation));
     }
     if let Some((weights, _)) = &bundle.trained {
         files.insert(NETWORK_FILE, tensors::write_weights(weights));

@@ -1,6 +1,7 @@
 //! The safetensors files. All metadata of a file is one JSON text under the key `wade`, so that the same content is
 //! always the same bytes.
 
+use nalgebra::Matrix6;
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,7 @@ use crate::geometry::distance::{GridError, SignedDistanceGrid};
 use crate::geometry::submergence::Samples;
 use crate::model::network::{Network, OUTPUTS, Scaling, WIDTH};
 use crate::model::{Anchored, Form, Paper, SPREAD, Weights};
+use crate::physics::radiation::{NODES, Node, POLES, Pole, Radiation, RadiationError};
 
 /// No weight or statistic is larger: with 256 inputs a layer and bounded states, every sum then stays finite.
 const LARGEST: f32 = 1e6;
@@ -83,6 +85,9 @@ pub enum TensorError {
     /// No training case, from which no distance can be told.
     #[error("tensor cases has no row")]
     NoCases,
+    /// A table of waves that no hull has.
+    #[error("{0}")]
+    Radiation(#[from] RadiationError),
     /// A grid that is none.
     #[error("{0}")]
     Grid(#[from] GridError),
@@ -145,6 +150,18 @@ impl Kind {
             Self::Anchored => SPREAD + 1,
         }
     }
+}
+
+/// What the file of added mass and waves says of itself.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RadiationMetadata {
+    source: String,
+    volume_step_m3: f64,
+    bed_reach_m: f64,
+    frequency_radps: f64,
+    /// Natural frequency [rad/s] and damping ratio of each oscillator.
+    poles: [[f64; 2]; POLES],
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -306,6 +323,55 @@ pub fn write_distance(grid: &SignedDistanceGrid) -> Vec<u8> {
     let meta = GridMetadata { origin_m: grid.origin.into(), spacing_m: grid.spacing, step_m };
     let tensor = ("distance", Dtype::I16, grid.shape.to_vec(), bytes_of(&steps, i16::to_le_bytes));
     write(&[tensor], Some(&meta))
+}
+
+/// Tables of matrices, a matrix each row: mass, then one gain each oscillator.
+const RADIATION_TABLES: [&str; 2] = ["deep", "standing"];
+
+pub fn read_radiation(bytes: &[u8]) -> Result<Radiation, TensorError> {
+    let file = File::new(bytes)?;
+    let meta: RadiationMetadata = metadata(bytes)?;
+    let table = |name: &'static str| {
+        let shape = [Some(NODES), Some(1 + POLES), Some(36)];
+        let values: Vec<f64> = numbers(file.view(name, Dtype::F64, &shape)?.data(), f64::from_le_bytes);
+        let sound = |value: &f64| value.is_finite() && value.abs() <= LARGEST.into();
+        if let Some(index) = values.iter().position(|value| !sound(value)) {
+            return Err(TensorError::NotFinite { name, index });
+        }
+        let matrices: Vec<_> =
+            values.as_chunks::<36>().0.iter().map(|m| Matrix6::from_row_slice(m)).collect();
+        let row = |row: &[Matrix6<f64>]| Node { mass: row[0], gains: std::array::from_fn(|m| row[1 + m]) };
+        Ok(matrices.chunks_exact(1 + POLES).map(row).collect::<Vec<_>>())
+    };
+    let radiation = Radiation {
+        deep: table(RADIATION_TABLES[0])?,
+        standing: table(RADIATION_TABLES[1])?,
+        source: meta.source,
+        volume_step: meta.volume_step_m3,
+        bed_reach: meta.bed_reach_m,
+        frequency: meta.frequency_radps,
+        poles: meta.poles.map(|[frequency, damping]| Pole { frequency, damping }),
+    };
+    Ok(radiation.checked()?)
+}
+
+pub fn write_radiation(radiation: &Radiation) -> Vec<u8> {
+    let meta = RadiationMetadata {
+        source: radiation.source.clone(),
+        volume_step_m3: radiation.volume_step,
+        bed_reach_m: radiation.bed_reach,
+        frequency_radps: radiation.frequency,
+        poles: radiation.poles.map(|pole| [pole.frequency, pole.damping]),
+    };
+    let table = |name: &'static str, rows: &[Node]| {
+        let matrices = rows.iter().flat_map(|row| std::iter::once(&row.mass).chain(&row.gains));
+        let values: Vec<f64> =
+            matrices.flat_map(|m| m.transpose().iter().copied().collect::<Vec<_>>()).collect();
+        (name, Dtype::F64, vec![rows.len(), 1 + POLES, 36], bytes_of(&values, f64::to_le_bytes))
+    };
+    let tables =
+        [table(RADIATION_TABLES[0], &radiation.deep), table(RADIATION_TABLES[1], &radiation.standing)];
+    write(&tables, Some(&meta))
 }
 
 pub fn read_weights(bytes: &[u8]) -> Result<Weights, TensorError> {

@@ -15,6 +15,7 @@ use super::validity::OutsideBox;
 use crate::condition::Condition;
 use crate::forces::Forces;
 use crate::frame::Vec3;
+use crate::physics::Physics;
 use crate::vehicle::{MAX_SURFACES, Vehicle};
 use crate::wrench::Wrench;
 
@@ -31,18 +32,20 @@ pub struct Circumstances {
     pub time_step: f64,
     /// The caller integrates added mass himself with the matrix: forces leave `-M_A nu_dot` out.
     pub implicit_added_mass: bool,
+    /// How much of the physical base answers.
+    pub physics: Physics,
 }
 
-/// What lasts from state to state: the memory of waves and flooding. Starts at rest and dry.
+/// What effects remember from state to state: waves and flooding. Starts at rest and dry.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Session {
+pub struct EffectsSession {
     /// One an effect that remembers, in the order of the library.
     memories: [Memory; MEMORIES],
     depth: Option<f64>,
     depth_rate: Option<f64>,
 }
 
-impl Session {
+impl EffectsSession {
     /// Takes the rate of the depth from its change.
     fn follow(&mut self, depth: f64, time_step: f64) {
         if let Some(before) = self.depth.filter(|_| time_step > 0.0) {
@@ -97,7 +100,7 @@ pub struct EffectLoads {
     pub surface_forces: Vec<Vec3>,
     /// How far the state lies outside the box in which the effects were seen.
     pub outside: OutsideBox,
-    /// Added mass and inertia about the center of mass, forces first [kg, kg m, kg m2], where there is such an effect.
+    /// Added mass and inertia about the center of mass, forces first [kg, kg m, kg m2], of base and effects together.
     pub added_mass: Option<Matrix6<f64>>,
     immersion: Immersion,
 }
@@ -202,7 +205,7 @@ impl ActiveEffects {
         &self,
         circumstances: &Circumstances,
         answer: &Answer,
-        mut session: Option<&mut Session>,
+        mut session: Option<&mut EffectsSession>,
         out: &mut EffectLoads,
     ) {
         let Answer { condition, forces, wet_parts_known, at_edge } = *answer;

@@ -5,7 +5,7 @@ use super::immersion::{Immersion, WetPanel};
 use crate::condition::Condition;
 use crate::forces::SurfaceForce;
 use crate::frame::{Vec3, WaterPlane};
-use crate::vehicle::{SurfaceKind, Vehicle};
+use crate::vehicle::Vehicle;
 
 /// A piece of the hull; body frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -201,15 +201,13 @@ fn mesh_panel(vehicle: &Vehicle, index: usize) -> Panel {
         .hull
         .patch(index)
         .map_or_else(Vec3::zeros, |patch| patch.spread.diagonal().map(|variance| variance.max(0.0).sqrt()));
-    let wheel = (surface.kind == SurfaceKind::Wheel)
-        .then(|| wheel_at(surface.centroid.x >= 0.0, surface.centroid.y >= 0.0));
     Panel {
         name: surface.name.clone(),
         centroid: surface.centroid,
         spread,
         facing_plus: plus,
         facing_minus: minus,
-        wheel,
+        wheel: surface.wheel(),
     }
 }
 

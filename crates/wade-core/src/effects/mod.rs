@@ -46,7 +46,7 @@ mod law;
 mod library;
 mod validity;
 
-pub use active::{ActiveEffects, Answer, Circumstances, EffectLoad, EffectLoads, LeftOut, Session};
+pub use active::{ActiveEffects, Answer, Circumstances, EffectLoad, EffectLoads, EffectsSession, LeftOut};
 pub use body::{Block, Body, Panel};
 pub use channel_flow::is_choked;
 pub use file::{ActiveEffect, Between, EffectsFile, EffectsFileError, Evidence, ParameterValue};

@@ -1,5 +1,10 @@
-//! A vehicle with its weights: condition in, forces out.
+//! A vehicle with what is known of its loads: condition in, forces out.
+//!
+//! There are three kinds. Weights alone, as the paper has them or anchored to a simple drag. The physical base alone
+//! ([`crate::physics`]). And the base with anchored weights: near the cases that these learnt from the answer is theirs, far from
+//! them it is the base's, and [`Blend`] keeps the sum from ever putting power into the hull.
 
+mod blend;
 pub mod kernel;
 pub mod network;
 mod reference;
@@ -11,9 +16,12 @@ use crate::anchor::{self, Anchor, Reading};
 use crate::condition::{Condition, GroundContact};
 use crate::domain::{Domain, Quantity};
 use crate::features;
-use crate::forces::{Forces, SurfaceForce};
+use crate::forces::{self, Forces, SurfaceForce};
 use crate::frame::Vec3;
+use crate::physics::drag::SurfaceDrag;
+use crate::physics::{Base, BaseLoads, Memory, Motion, Physics, STATED_NONE};
 use crate::vehicle::{MAX_SURFACES, Vehicle};
+use blend::Blend;
 use kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, MAX_OUTPUTS, StaticRows, WetSurface};
 
 /// Working memory of [`Model::evaluate`], good for every vehicle.
@@ -22,6 +30,8 @@ pub struct Workspace {
     buffers: Buffers,
     wet: Vec<WetSurface>,
     reading: Reading,
+    base: BaseLoads,
+    level_drag: Vec<SurfaceDrag>,
 }
 
 impl Workspace {
@@ -31,6 +41,8 @@ impl Workspace {
             buffers: Buffers::new(MAX_SURFACES),
             wet: Vec::with_capacity(MAX_SURFACES),
             reading: Reading::with_capacity(MAX_SURFACES),
+            base: BaseLoads::with_capacity(MAX_SURFACES),
+            level_drag: Vec::with_capacity(MAX_SURFACES),
         }
     }
 }
@@ -41,12 +53,22 @@ impl Default for Workspace {
     }
 }
 
+/// What weights that learnt nothing are labelled as.
+pub const PHYSICS: &str = "physics";
+
 /// One version of a vehicle's bundle, ready to answer.
 #[derive(Debug)]
 pub struct Model {
     vehicle: Vehicle,
     version: u32,
     domain: Domain,
+    learned: Option<Learned>,
+    base: Option<Base>,
+}
+
+/// The learned part, packed for an instruction set.
+#[derive(Debug)]
+struct Learned {
     weights: Weights,
     kernel: Kernel,
     statics: StaticRows,
@@ -56,9 +78,8 @@ pub struct Model {
     learnt: Vec<f64>,
 }
 
-impl Model {
-    /// Packs the weights for an instruction set and precomputes what the vehicle contributes to layer 1.
-    pub fn new(vehicle: Vehicle, version: u32, domain: Domain, weights: Weights, isa: Isa) -> Self {
+impl Learned {
+    fn new(vehicle: &Vehicle, weights: Weights, isa: Isa) -> Self {
         let network = &weights.network;
         let (kernel, statics, anchor, learnt) = match &weights.form {
             Form::Paper(_) => {
@@ -70,13 +91,60 @@ impl Model {
             }
             Form::Anchored(form) => {
                 let kernel = Kernel::new(network, (anchor::STATIC, anchor::DYNAMIC), isa);
-                let anchor = Anchor::new(&vehicle);
-                let statics = kernel.static_rows(&anchor.static_rows(&vehicle));
-                let learnt = form.learnt(&anchor, &vehicle);
+                let anchor = Anchor::new(vehicle);
+                let statics = kernel.static_rows(&anchor.static_rows(vehicle));
+                let learnt = form.learnt(&anchor, vehicle);
                 (kernel, statics, Some(anchor), learnt)
             }
         };
-        Self { vehicle, version, domain, weights, kernel, statics, anchor, learnt }
+        Self { weights, kernel, statics, anchor, learnt }
+    }
+
+    /// What the network says of the wet surfaces of a reading, which are listed in `wet`.
+    fn answer<'b>(
+        &self,
+        form: &Anchored,
+        (reading, wet, buffers): (&Reading, &mut Vec<WetSurface>, &'b mut Buffers),
+    ) -> &'b [[f32; MAX_OUTPUTS]] {
+        wet.clear();
+        for (index, surface) in reading.surfaces.iter().enumerate() {
+            if surface.wet_fraction > 0.0 {
+                wet.push(WetSurface { surface: index, dynamic: surface.dynamic });
+            }
+        }
+        self.kernel.forward(&form.standardize(&reading.global), &self.statics, wet, buffers)
+    }
+}
+
+impl Model {
+    /// Packs the weights for an instruction set and precomputes what the vehicle contributes to layer 1.
+    pub fn new(vehicle: Vehicle, version: u32, domain: Domain, weights: Weights, isa: Isa) -> Self {
+        let learned = Some(Learned::new(&vehicle, weights, isa));
+        Self { vehicle, version, domain, learned, base: None }
+    }
+
+    /// A vehicle of which nothing was learnt.
+    pub fn of_physics(vehicle: Vehicle, version: u32, base: Base) -> Self {
+        Self { vehicle, version, domain: Domain::EVERYWHERE, learned: None, base: Some(base) }
+    }
+
+    /// The same weights on the physical base.
+    pub fn with_base(self, base: Base) -> Self {
+        Self { base: Some(base), ..self }
+    }
+
+    /// What the answer rests on besides weights, in words.
+    pub fn base_name(&self) -> &'static str {
+        match (&self.base, self.weights().map(|weights| &weights.form)) {
+            (Some(_), _) => PHYSICS,
+            (None, Some(Form::Anchored(_))) => anchor::BASE,
+            (None, _) => "none",
+        }
+    }
+
+    /// The physical base, where the bundle has one.
+    pub fn base(&self) -> Option<&Base> {
+        self.base.as_ref()
     }
 
     /// The vehicle.
@@ -94,48 +162,111 @@ impl Model {
         &self.domain
     }
 
-    /// The weights as they were stored.
-    pub fn weights(&self) -> &Weights {
-        &self.weights
+    /// The weights as they were stored, where there are any.
+    pub fn weights(&self) -> Option<&Weights> {
+        self.learned.as_ref().map(|learned| &learned.weights)
     }
 
-    /// Source of the training data.
+    /// Source of the training data, or [`PHYSICS`].
     pub fn provenance(&self) -> &str {
-        &self.weights.provenance
+        self.weights().map_or(PHYSICS, |weights| &weights.provenance)
     }
 
-    /// Name of the instruction set in use.
-    pub fn isa(&self) -> Isa {
-        self.kernel.isa()
-    }
-
-    /// Forces on every surface and the net wrench about the center of mass, body frame.
-    ///
-    /// Allocates nothing once `forces` has held this many surfaces. Angular rates and accelerations do not enter. A state
-    /// with angular rates is marked as outside the training domain; accelerations are not judged.
-    pub fn evaluate(&self, condition: &Condition, workspace: &mut Workspace, forces: &mut Forces) {
-        forces.outside = self.domain.outside(condition);
-        match (&self.weights.form, &self.anchor) {
-            (Form::Anchored(form), Some(anchor)) => {
-                self.evaluate_anchored((form, anchor), condition, workspace, forces);
+    /// Speed of each surface that is a wheel, NaN where none is stated [rad/s].
+    pub fn wheel_speeds(&self, stated: Option<&[f64; 4]>) -> [f64; MAX_SURFACES] {
+        let mut speeds = STATED_NONE;
+        if let Some(stated) = stated {
+            for (speed, surface) in speeds.iter_mut().zip(&self.vehicle.surfaces) {
+                if let Some(wheel) = surface.wheel() {
+                    *speed = stated[wheel];
+                }
             }
-            (Form::Paper(form), _) => self.evaluate_paper(form, condition, workspace, forces),
+        }
+        speeds
+    }
+
+    /// The instruction set in use, where there is a network.
+    pub fn isa(&self) -> Option<Isa> {
+        self.learned.as_ref().map(|learned| learned.kernel.isa())
+    }
+
+    /// Forces on every surface and the net wrench about the center of mass, body frame, of a state that stands alone.
+    ///
+    /// Allocates nothing once `forces` has held this many surfaces. Without the physical base angular rates and accelerations
+    /// do not enter; a state with angular rates is then marked as outside the training domain.
+    pub fn evaluate(&self, condition: &Condition, workspace: &mut Workspace, forces: &mut Forces) {
+        let motion = Motion {
+            wheel_speeds: &STATED_NONE,
+            time_step: 0.0,
+            implicit_added_mass: false,
+            physics: Physics::Full,
+        };
+        self.evaluate_moving(condition, (&motion, None), workspace, forces);
+    }
+
+    /// The same with the wheels, and with what a session remembers.
+    pub fn evaluate_moving(
+        &self,
+        condition: &Condition,
+        (motion, memory): (&Motion<'_>, Option<&mut Memory>),
+        workspace: &mut Workspace,
+        forces: &mut Forces,
+    ) {
+        let condition = &condition.resolved(self.vehicle.z0);
+        forces.outside = self.domain.outside(condition);
+        forces.base = None;
+        match (&self.base, &self.learned) {
+            (Some(base), learned) => {
+                let Workspace { buffers, wet, reading, base: loads, level_drag } = workspace;
+                base.evaluate(condition, motion, memory, loads);
+                let mut blend = Blend::new(condition, loads, forces);
+                if let Some(learned) = learned.as_ref().filter(|_| motion.physics != Physics::Hydrostatic)
+                    && let (Form::Anchored(form), Some(anchor)) = (&learned.weights.form, &learned.anchor)
+                {
+                    // learnt from hulls that neither rise nor turn
+                    let level = blend::level(condition);
+                    base.drag_into(&level, loads, level_drag);
+                    anchor.read(&self.vehicle, &level, reading);
+                    let outputs = learned.answer(form, (reading, wet, buffers));
+                    blend.add((learned, form, reading), (wet, outputs), level_drag, forces);
+                }
+                blend.finish(&self.vehicle, base, forces);
+            }
+            (None, Some(learned)) => self.evaluate_learned(learned, condition, workspace, forces),
+            (None, None) => unreachable!("a model has weights or a base"),
+        }
+    }
+
+    fn evaluate_learned(
+        &self,
+        learned: &Learned,
+        condition: &Condition,
+        workspace: &mut Workspace,
+        forces: &mut Forces,
+    ) {
+        match (&learned.weights.form, &learned.anchor) {
+            (Form::Anchored(form), Some(anchor)) => {
+                self.evaluate_anchored((learned, form, anchor), condition, workspace, forces);
+            }
+            (Form::Paper(form), _) => self.evaluate_paper((learned, form), condition, workspace, forces),
             (Form::Anchored(_), None) => unreachable!("made together by `new`"),
         }
         forces.sum_about(&self.vehicle.center_of_mass);
+        forces.moment_uncertainty = forces::moment_deviation(&forces.uncertainty, &self.vehicle.dimensions);
     }
 
     fn evaluate_paper(
         &self,
-        form: &Paper,
+        (learned, form): (&Learned, &Paper),
         condition: &Condition,
         workspace: &mut Workspace,
         forces: &mut Forces,
     ) {
         self.immerse(condition, workspace, forces);
         let global = form.scaling.standardize(&features::global(condition, &self.vehicle.dimensions));
-        let outputs = self.kernel.forward(&global, &self.statics, &workspace.wet, &mut workspace.buffers);
-        for (surface, [x, y, z, ..]) in workspace.wet.iter().zip(outputs) {
+        let Workspace { buffers, wet, .. } = workspace;
+        let outputs = learned.kernel.forward(&global, &learned.statics, wet, buffers);
+        for (surface, [x, y, z, ..]) in wet.iter().zip(outputs) {
             let force = Vec3::from(form.scaling.target([*x, *y, *z])) * condition.density;
             forces.surfaces[surface.surface].force = force;
         }
@@ -147,29 +278,24 @@ impl Model {
     /// surface was in the water there.
     fn evaluate_anchored(
         &self,
-        (form, anchor): (&Anchored, &Anchor),
+        (learned, form, anchor): (&Learned, &Anchored, &Anchor),
         condition: &Condition,
         workspace: &mut Workspace,
         forces: &mut Forces,
     ) {
-        let Workspace { buffers, wet, reading } = workspace;
+        let Workspace { buffers, wet, reading, .. } = workspace;
         anchor.read(&self.vehicle, condition, reading);
         let distance = form.distance(&reading.coordinates);
         forces.outside.excess[Quantity::Distance as usize - 1] = (distance - 1.0).max(0.0);
         let trust = Anchored::trust(distance);
-        wet.clear();
         forces.surfaces.clear();
-        for (index, surface) in reading.surfaces.iter().enumerate() {
+        for surface in &reading.surfaces {
             forces.surfaces.push(SurfaceForce { point: surface.center, ..SurfaceForce::default() });
-            if surface.wet_fraction > 0.0 {
-                wet.push(WetSurface { surface: index, dynamic: surface.dynamic });
-            }
         }
-        let global = form.standardize(&reading.global);
-        let outputs = self.kernel.forward(&global, &self.statics, wet, buffers);
+        let outputs = learned.answer(form, (reading, wet, buffers));
         let (mut doubtful, mut spread) = (Vec3::zeros(), 0.0);
         for (WetSurface { surface, .. }, output) in wet.iter().zip(outputs) {
-            let (known, learnt) = (&reading.surfaces[*surface], self.learnt[*surface]);
+            let (known, learnt) = (&reading.surfaces[*surface], learned.learnt[*surface]);
             forces.surfaces[*surface] = known.load(&faded(output, trust * learnt));
             let doubt = Anchored::doubt(distance).max(1.0 - learnt);
             doubtful += (known.force(&faded(output, 1.0)) - known.drag).abs() * doubt;

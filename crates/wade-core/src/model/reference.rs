@@ -1,6 +1,6 @@
 //! The answer by plain loops over whole rows of features: slow, obvious, and what the fast path is tested against.
 
-use super::{Anchored, Form, Model, Paper};
+use super::{Anchored, Form, Learned, Model, Paper};
 use crate::anchor::{self, Anchor, Reading};
 use crate::condition::Condition;
 use crate::features::{self, STATIC};
@@ -9,15 +9,17 @@ use crate::geometry::submergence::Submergence;
 use crate::vehicle::Surface;
 
 impl Model {
-    /// Force on each surface, body frame [N]; by weights that have a ground-contact convention baked in, in that one.
+    /// Force on each surface by the weights alone, body frame [N]; by weights that have a ground-contact convention baked in,
+    /// in that one. Empty without weights.
     pub fn reference(&self, condition: &Condition) -> Vec<Vec3> {
-        match &self.weights.form {
-            Form::Paper(form) => self.reference_paper(form, condition),
-            Form::Anchored(form) => self.reference_anchored(form, condition),
+        let Some(learned) = &self.learned else { return Vec::new() };
+        match &learned.weights.form {
+            Form::Paper(form) => self.reference_paper((learned, form), condition),
+            Form::Anchored(form) => self.reference_anchored((learned, form), condition),
         }
     }
 
-    fn reference_paper(&self, form: &Paper, condition: &Condition) -> Vec<Vec3> {
+    fn reference_paper(&self, (learned, form): (&Learned, &Paper), condition: &Condition) -> Vec<Vec3> {
         let plane = condition.water_plane(self.vehicle.z0);
         let surfaces = self.vehicle.surfaces.iter().zip(&self.vehicle.samples.surfaces);
         let force = surfaces.map(|(surface, samples)| {
@@ -25,7 +27,7 @@ impl Model {
             if wet.fraction == 0.0 {
                 return Vec3::zeros();
             }
-            let output = self.weights.network.forward(&self.row(form, condition, surface, &wet));
+            let output = learned.weights.network.forward(&self.row(form, condition, surface, &wet));
             Vec3::from(form.scaling.target(std::array::from_fn(|c| output[c]))) * condition.density
         });
         force.collect()
@@ -41,19 +43,19 @@ impl Model {
         of_surface.chain(form.scaling.standardize(&features::global(condition, dimensions))).collect()
     }
 
-    fn reference_anchored(&self, form: &Anchored, condition: &Condition) -> Vec<Vec3> {
+    fn reference_anchored(&self, (learned, form): (&Learned, &Anchored), condition: &Condition) -> Vec<Vec3> {
         let anchor = Anchor::new(&self.vehicle);
         let mut reading = Reading::default();
         anchor.read(&self.vehicle, condition, &mut reading);
         let trust = Anchored::trust(form.distance(&reading.coordinates));
-        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&self.learnt);
+        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&learned.learnt);
         let force = surfaces.map(|((known, fixed), learnt)| {
             if known.wet_fraction == 0.0 {
                 return Vec3::zeros();
             }
             let of_surface = fixed.into_iter().chain(known.dynamic);
             let row: Vec<f32> = of_surface.chain(form.standardize(&reading.global)).collect();
-            let output = self.weights.network.forward(&row);
+            let output = learned.weights.network.forward(&row);
             let answer: [f32; anchor::OUTPUTS] = std::array::from_fn(|i| output[i] * (trust * learnt) as f32);
             known.hydrostatic.force + known.force(&answer)
         });

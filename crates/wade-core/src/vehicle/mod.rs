@@ -64,6 +64,15 @@ pub struct Surface {
     pub mirror_front_rear: Option<usize>,
 }
 
+impl Surface {
+    /// Number of the wheel speed that turns it: 0 to 3 for front left, front right, rear left, rear right; none of what is no
+    /// wheel.
+    pub fn wheel(&self) -> Option<usize> {
+        let place = 2 * usize::from(self.centroid.x < 0.0) + usize::from(self.centroid.y < 0.0);
+        (self.kind == SurfaceKind::Wheel).then_some(place)
+    }
+}
+
 /// Size of the bounding box or as stated [m].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dimensions {

@@ -47,10 +47,10 @@ fn what_is_written_is_read_back() {
         let original = bundle::read(&vehicles().join(name)).expect("sound");
         let copy_path = folder.path().join(name);
         bundle::write(&copy_path, &original).expect("written");
-        let Bundle { vehicle, version, trained, effects, distance, spec } =
+        let Bundle { vehicle, version, trained, radiation, effects, distance, spec } =
             bundle::read(&copy_path).expect("sound");
         assert_eq!((vehicle, version, spec), (original.vehicle, original.version, original.spec));
-        assert_eq!(effects, original.effects);
+        assert_eq!((effects, radiation), (original.effects, original.radiation));
         let (weights, domain) = trained.expect("trained");
         let (original_weights, original_domain) = original.trained.expect("trained");
         assert_eq!((weights, domain), (original_weights, original_domain));

@@ -7,13 +7,13 @@ use wade_core::condition::Condition;
 use wade_core::effects::channel_blockage::ChannelBlockage;
 use wade_core::effects::current::Current;
 use wade_core::effects::{
-    BaseDrag, Body, Circumstances, Effect, EffectLoad, Immersion, Input, LeftOut, Memory, Session, Shape,
+    BaseDrag, Body, Circumstances, Effect, EffectLoad, Immersion, Input, LeftOut, Memory, Shape,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::model::Workspace;
-use wade_core::served::{Loads, ServedVehicle};
+use wade_core::served::{Loads, ServedVehicle, Session};
 use wade_core::wrench::Wrench;
 
 fn evaluate(served: &ServedVehicle, condition: &Condition, told: &Circumstances) -> Loads {

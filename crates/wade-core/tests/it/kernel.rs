@@ -6,11 +6,11 @@ use wade_core::features;
 use wade_core::forces::Forces;
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::model::kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, WetSurface};
-use wade_core::model::{Form, Model, Workspace};
+use wade_core::model::{Form, Model, Weights, Workspace};
 
 /// Size of the terms that a surface's force is a sum of, by which its rounding is measured [N].
 fn size_of_terms(model: &Model, condition: &Condition, surface: usize) -> f64 {
-    match &model.weights().form {
+    match &model.weights().expect("weights").form {
         Form::Paper(form) => condition.density * f64::from(form.scaling.target_std[2]),
         Form::Anchored(_) => {
             let (speed, depth) = (condition.velocity.norm(), condition.depth);
@@ -24,13 +24,19 @@ fn every_instruction_set_agrees_with_the_reference() {
     for isa in Isa::available() {
         for model in VEHICLES.into_iter().flat_map(|vehicle| [model_on(vehicle, isa), paper_on(vehicle, isa)])
         {
-            let name = format!("{} {} {}", isa.name(), model.vehicle().name, model.weights().form.name());
+            let name = format!(
+                "{} {} {}",
+                isa.name(),
+                model.vehicle().name,
+                model.weights().expect("weights").form.name()
+            );
             let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
             let mut numbers = Numbers::new(7);
             let mut wet = 0;
             for _ in 0..200 {
                 let mut condition = numbers.condition();
-                condition.ground_contact = model.weights().ground_contact().unwrap_or_default();
+                condition.ground_contact =
+                    model.weights().and_then(Weights::ground_contact).unwrap_or_default();
                 model.evaluate(&condition, &mut workspace, &mut forces);
                 let both = forces.surfaces.iter().zip(model.reference(&condition));
                 for (surface, (load, expected)) in both.enumerate() {
@@ -48,7 +54,7 @@ fn every_instruction_set_agrees_with_the_reference() {
 #[test]
 fn a_row_has_the_same_bits_alone_and_in_any_company() {
     let model = paper_on("husky", Isa::available()[0]);
-    let (vehicle, weights) = (model.vehicle(), model.weights());
+    let (vehicle, weights) = (model.vehicle(), model.weights().expect("weights"));
     for isa in Isa::available() {
         let kernel = Kernel::new(&weights.network, (features::STATIC, features::DYNAMIC), isa);
         let fixed = vehicle

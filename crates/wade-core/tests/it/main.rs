@@ -7,6 +7,7 @@ mod common;
 
 mod analytic_loads;
 mod anchor;
+mod bodies;
 mod bundle;
 mod bundle_files;
 mod effects_bundle;
@@ -15,6 +16,9 @@ mod hydrostatics;
 mod kernel;
 mod mesh;
 mod model;
+mod physics;
+mod random;
+mod release;
 mod shipped;
 mod submergence;
 mod symmetry;

@@ -1,0 +1,541 @@
+//! The loads of the base on a vehicle in any state: still water exactly, drag by elements, added mass and waves.
+//!
+//! `W = W_hydrostatic + sum_elements f + W_added + W_waves` with
+//! `W_added = -(A nu_dot + C_A(nu) nu + y'+ dA/dy nu)` about the body origin. `nu` is the velocity through the water, `C_A`
+//! Kirchhoff's cross terms (Newman, Marine Hydrodynamics, section 4.14), `y` the place in the table of [`Radiation`], which
+//! rises with the volume under water. The last term is the momentum that entering water is given (von Karman 1929); it acts
+//! while `y` rises alone: half of its work goes into the spray, and a hull that leaves the water gets nothing back. So the
+//! energy of body, added mass, memory and position never rises by what the water does.
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::drag::{Drag, SurfaceDrag};
+use super::elements::{COUNT, elements};
+use super::radiation::{NODES, Node, POLES, Pole, Radiation, STEPS};
+use crate::condition::{Condition, GroundContact};
+use crate::frame::{GRAVITY, Vec3, WaterPlane};
+use crate::geometry::hydrostatics::float_depth;
+use crate::geometry::mesh::Bounds;
+use crate::geometry::wetting::{Wetting, WettingTable};
+use crate::vehicle::{ContactPatch, MAX_SURFACES, Vehicle};
+use crate::wrench::Wrench;
+
+crate::named_enum! {
+    /// How much of the base answers: for tests, and to see what a term does.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[repr(u8)]
+    pub enum Physics {
+        /// The pressure of still water.
+        Hydrostatic = 1 => "hydrostatic",
+        /// And drag and friction of the local velocity.
+        QuasiSteady = 2 => "quasi_steady",
+        /// And added mass, entry and the waves that the hull makes.
+        #[default]
+        Full = 3 => "full",
+    }
+}
+
+/// Clearance of a covered hull of which nobody stated it, over its height [-]: the bed is then next to nothing.
+const LIFTED: f64 = 2.0;
+/// Share of the momentum that entering water takes from the hull at once [-]. At a half the energy of added mass and body stays
+/// what it is; von Karman's 1 spends as much again on the spray, which a hull with frame and tilt makes less of.
+const ENTRY: f64 = 0.5;
+/// Share of a surface that is wet from which its elements bear all of their drag [-].
+const REACHED: f64 = 0.05;
+/// Depth of the covered hull over its height by which the table goes on one step, from where the surface is a fifth of it away.
+const SUNK_STEP: f64 = 0.5;
+const SUNK_ONSET: f64 = 0.2;
+
+/// What is remembered from state to state: waves made, and the acceleration of explicit integration.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Memory {
+    /// Output of each oscillator and its integral.
+    waves: [[Vector6<f64>; 2]; POLES],
+    /// Acceleration that the added mass resists in explicit integration.
+    rate: Option<Vector6<f64>>,
+}
+
+impl Memory {
+    /// Energy in the oscillators over the density, `sum (y^2 + w^2 q^2) / 2` [m5/s2].
+    pub fn energy(&self, poles: &[Pole; POLES]) -> f64 {
+        let stored = |([y, q], pole): (&[Vector6<f64>; 2], &Pole)| {
+            0.5 * (y.norm_squared() + pole.frequency.powi(2) * q.norm_squared())
+        };
+        self.waves.iter().zip(poles).map(stored).sum()
+    }
+}
+
+/// The load of the base on one surface; body frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SurfaceLoad {
+    /// Pressure of still water about the body origin [N, N m].
+    pub hydrostatic: Wrench,
+    /// Drag and friction about the body origin [N, N m].
+    pub drag: Wrench,
+    /// Share under water.
+    pub wet_fraction: f64,
+    /// Centroid of the wet part; of the surface where it is dry [m].
+    pub center: Vec3,
+}
+
+/// What the base says of a state. Reused from query to query.
+#[derive(Debug, Clone, Default)]
+pub struct BaseLoads {
+    /// One entry a surface.
+    pub surfaces: Vec<SurfaceLoad>,
+    /// Added mass and waves about the body origin [N, N m]: loads of the whole hull.
+    pub hull: Wrench,
+    /// Added mass and inertia about the body origin, forces first [kg, kg m, kg m2].
+    pub added_mass: Matrix6<f64>,
+    /// Derivative of the linear wave load with respect to the velocity, with the sign changed [kg/s, kg m/s, kg m2/s].
+    pub damping: Matrix6<f64>,
+    /// Volume under water as softly as it gets wet, the coordinate of the table [m3].
+    pub volume: f64,
+    /// Clearance over the bed that was used [m].
+    pub bed_clearance: f64,
+    /// Share of the motion through the water that is motion over the bed, as used.
+    pub bed: f64,
+    /// Power that the shafts of the wheels put in [W].
+    pub shaft_power: f64,
+    wetting: Vec<Wetting>,
+    drags: Vec<SurfaceDrag>,
+}
+
+impl BaseLoads {
+    /// Room for a vehicle of so many surfaces.
+    pub fn with_capacity(surfaces: usize) -> Self {
+        Self {
+            surfaces: Vec::with_capacity(surfaces),
+            wetting: Vec::with_capacity(surfaces),
+            drags: Vec::with_capacity(surfaces),
+            ..Self::default()
+        }
+    }
+}
+
+/// What the base needs to know beside the state.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// Speed of each surface that is a wheel about the body's y [rad/s]; NaN where none is stated.
+    pub wheel_speeds: &'a [f64],
+    /// Time since the state before it in the session [s].
+    pub time_step: f64,
+    /// The caller integrates added mass with the matrix.
+    pub implicit_added_mass: bool,
+    /// How much of the base answers.
+    pub physics: Physics,
+}
+
+/// A vehicle prepared for the base.
+#[derive(Debug, Clone)]
+pub struct Base {
+    table: WettingTable,
+    drag: Drag,
+    radiation: Radiation,
+    /// Rows of the table at [`Radiation::frequency`], as a state without a session is answered.
+    steady: [Vec<Steady>; 2],
+    bounds: Bounds,
+    z0: f64,
+    height: f64,
+    /// [`BaseLoads::volume`] afloat in fresh water, or of the whole hull where it sinks [m3].
+    float_volume: f64,
+    rigid: Matrix6<f64>,
+    contacts: Vec<ContactPatch>,
+    areas: Vec<f64>,
+    centers: Vec<Vec3>,
+}
+
+/// Added mass and damping of a row at one frequency.
+#[derive(Debug, Clone, Copy)]
+struct Steady {
+    mass: Matrix6<f64>,
+    damping: Matrix6<f64>,
+}
+
+impl Base {
+    /// Prepares a vehicle with the table of its waves.
+    pub fn new(vehicle: &Vehicle, radiation: Radiation) -> Self {
+        let count = vehicle.surfaces.len();
+        let bounds = vehicle.hull.mesh.bounds().unwrap_or(Bounds { min: Vec3::zeros(), max: Vec3::zeros() });
+        let steady = steady(&radiation);
+        let whole = radiation.volume_step * STEPS as f64;
+        let drag = Drag::new(vehicle, &elements(vehicle, COUNT));
+        let afloat = float_depth(&vehicle.hull.mesh, vehicle.z0, vehicle.mass);
+        let float_volume = drag.volume(&WaterPlane::level(vehicle.z0, afloat)).clamp(1e-9, whole.max(1e-9));
+        Self {
+            table: WettingTable::new(&vehicle.hull, count),
+            drag,
+            radiation,
+            steady,
+            bounds,
+            z0: vehicle.z0,
+            height: vehicle.dimensions.height,
+            float_volume,
+            rigid: rigid_mass(vehicle),
+            contacts: vehicle.contacts.clone(),
+            areas: vehicle.surfaces.iter().map(|s| s.area).collect(),
+            centers: vehicle.surfaces.iter().map(|s| s.centroid).collect(),
+        }
+    }
+
+    /// The table of waves.
+    pub fn radiation(&self) -> &Radiation {
+        &self.radiation
+    }
+
+    /// Takes velocities of a point `about` and of the body to those of the origin: a matrix `A` about the origin is
+    /// `T^T A T` about the point.
+    pub fn moved_to(&self, about: &Vec3) -> Matrix6<f64> {
+        let mut matrix = Matrix6::identity();
+        // v at the origin is v at the point less omega x about
+        matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&about.cross_matrix());
+        matrix
+    }
+
+    /// Elements that are evaluated a query.
+    pub fn elements(&self) -> usize {
+        self.drag.len()
+    }
+
+    /// The loads in a state. Allocates nothing once `out` has held this many surfaces.
+    pub fn evaluate(
+        &self,
+        condition: &Condition,
+        motion: &Motion<'_>,
+        memory: Option<&mut Memory>,
+        out: &mut BaseLoads,
+    ) {
+        let plane = condition.water_plane(self.z0);
+        let count = self.areas.len();
+        out.wetting.resize(count, Wetting::default());
+        out.drags.resize(count, SurfaceDrag::default());
+        self.table.wetting_into(&plane, &mut out.wetting);
+        self.drag.evaluate(&plane, condition, motion.wheel_speeds, &mut out.drags);
+        if motion.physics == Physics::Hydrostatic {
+            out.drags.iter_mut().for_each(|drag| (drag.load, drag.shaft_power) = Default::default());
+        }
+        self.sum_surfaces(condition, out);
+        if condition.ground_contact == GroundContact::Dry {
+            for patch in &self.contacts {
+                let surface = &mut out.surfaces[patch.surface];
+                if surface.wet_fraction > 0.0 {
+                    surface.hydrostatic += patch.lost_pressure(&plane, condition.density, &Vec3::zeros());
+                }
+            }
+        }
+        out.bed = condition.bed();
+        out.bed_clearance = condition.bed_clearance.unwrap_or_else(|| self.usual_clearance(out.volume));
+        (out.hull, out.added_mass, out.damping) = Default::default();
+        if motion.physics == Physics::Full {
+            self.add_waves(condition, motion, memory, out);
+        }
+    }
+
+    /// Drag and friction on each surface of the same hull in the same water, moving in another way, about the body origin; `of`
+    /// holds the loads of the state asked for.
+    pub fn drag_into(&self, condition: &Condition, of: &BaseLoads, out: &mut Vec<SurfaceDrag>) {
+        out.resize(self.areas.len(), SurfaceDrag::default());
+        let plane = condition.water_plane(self.z0);
+        self.drag.evaluate(&plane, condition, &STATED_NONE[..self.areas.len()], out);
+        for ((drag, wetting), area) in out.iter_mut().zip(&of.wetting).zip(&self.areas) {
+            drag.load = drag.load * reached(wetting, *area);
+        }
+    }
+
+    fn sum_surfaces(&self, condition: &Condition, out: &mut BaseLoads) {
+        let weight = condition.density * GRAVITY;
+        out.surfaces.clear();
+        (out.volume, out.shaft_power) = (0.0, 0.0);
+        for (index, (wetting, drag)) in out.wetting.iter().zip(&out.drags).enumerate() {
+            let reached = reached(wetting, self.areas[index]);
+            out.volume += drag.volume;
+            out.shaft_power += drag.shaft_power * reached;
+            out.surfaces.push(SurfaceLoad {
+                hydrostatic: wetting.pressure * weight,
+                drag: drag.load * reached,
+                wet_fraction: (wetting.area / self.areas[index]).min(1.0),
+                center: wetting.centroid().unwrap_or(self.centers[index]),
+            });
+        }
+        out.volume = out.volume.max(0.0);
+    }
+
+    /// Clearance of a hull of which nobody stated it [m]: it stands on the bed up to the level at which it floats, and is lifted
+    /// smoothly from there.
+    fn usual_clearance(&self, volume: f64) -> f64 {
+        LIFTED * self.height * self.lifted(volume).powi(2)
+    }
+
+    fn add_waves(
+        &self,
+        condition: &Condition,
+        motion: &Motion<'_>,
+        memory: Option<&mut Memory>,
+        out: &mut BaseLoads,
+    ) {
+        let soaked: f64 = out.wetting.iter().map(|wetting| wetting.soaked_area).sum();
+        if soaked <= 0.0 {
+            if let Some(memory) = memory {
+                memory.advance(&self.radiation.poles, &[Vector6::zeros(); POLES], motion.time_step);
+            }
+            return;
+        }
+        let (density, up) = (condition.density, condition.up.into_inner());
+        let (v, omega) = (condition.velocity, condition.angular_velocity);
+        let nu = joined(&v, &omega);
+        let rising = -up.dot(&v);
+        let flux: f64 = out.drags.iter().map(|drag| drag.flux).sum();
+        let place = self.place(out.volume, flux, self.sunk(&condition.water_plane(self.z0)), rising);
+        let bed = self.near_bed(out.bed_clearance);
+        let remembers = memory.is_some();
+        // a state alone is answered at the natural frequency of heave
+        let mass_of = |table: usize, row: usize| match remembers {
+            true => self.rows(table)[row].mass,
+            false => self.steady[table][row].mass,
+        };
+        let (mut mass, mut growth) = (Matrix6::zeros(), Matrix6::zeros());
+        let mut bed_adds = Matrix6::zeros();
+        for &(row, weight, slope) in &place.rows {
+            let deep = mass_of(0, row);
+            let added = mass_of(1, row) - deep;
+            mass += (deep + added * bed.share) * weight;
+            growth += (deep + added * bed.share) * slope;
+            bed_adds += added * weight;
+        }
+        // elements know the hull's lowest points by their spread alone
+        let reached = (soaked / (REACHED * self.areas.iter().sum::<f64>())).min(1.0);
+        let mass = mass * (density * reached);
+        // entry gives momentum to the water; so does a hull that sinks toward the bed
+        let closing = match condition.bed_clearance {
+            Some(_) => (-up.dot(&condition.ground_velocity)).max(0.0),
+            None => (-self.clearance_rate(out.volume, flux)).max(0.0),
+        };
+        let entry = growth * place.rate.max(0.0) + bed_adds * (bed.closing * closing);
+        let mut load = -(entry * nu) * (ENTRY * density * reached) - cross_terms(&mass, &v, &omega);
+        let rate = joined(
+            &(condition.acceleration - omega.cross(&condition.velocity)),
+            &condition.angular_acceleration,
+        );
+        if let Some(memory) = memory {
+            let factors = self.factors(&place, bed.share);
+            let push: [Vector6<f64>; POLES] = std::array::from_fn(|m| factors[m].transpose() * nu);
+            memory.advance(&self.radiation.poles, &push, motion.time_step);
+            for (factor, [output, _]) in factors.iter().zip(&memory.waves) {
+                load -= factor * output * (density * reached);
+            }
+            if !motion.implicit_added_mass {
+                load -= mass * memory.settled(&self.rigid, &mass, rate, motion.time_step);
+            }
+        } else {
+            let mut damping = Matrix6::zeros();
+            for &(row, weight, _) in &place.rows {
+                let (deep, standing) = (self.steady[0][row].damping, self.steady[1][row].damping);
+                damping += (deep + (standing - deep) * bed.share) * weight;
+            }
+            // only what moves up and down or tilts makes waves in steady motion
+            let lifting = lifting(&up);
+            out.damping = lifting * damping * lifting * (density * reached);
+            load -= out.damping * nu;
+            if !motion.implicit_added_mass {
+                load -= mass * rate;
+            }
+        }
+        out.added_mass = mass;
+        out.hull = Wrench {
+            force: load.fixed_rows::<3>(0).into_owned(),
+            moment: load.fixed_rows::<3>(3).into_owned(),
+        };
+    }
+
+    fn rows(&self, table: usize) -> &[Node] {
+        if table == 0 { &self.radiation.deep } else { &self.radiation.standing }
+    }
+
+    /// Depth of the highest point of the box around the hull below the surface [m]; 0 where it looks out.
+    fn sunk(&self, plane: &WaterPlane) -> f64 {
+        let n = plane.normal.into_inner();
+        let top: f64 = (0..3).map(|i| (n[i] * self.bounds.min[i]).max(n[i] * self.bounds.max[i])).sum();
+        (plane.offset - top).max(0.0)
+    }
+
+    /// Where a hull is in the table, and how fast it goes down there.
+    fn place(&self, volume: f64, flux: f64, sunk: f64, rising: f64) -> Place {
+        let step = self.radiation.volume_step;
+        let depth = sunk / self.height;
+        let below = depth * depth / (depth + SUNK_ONSET) / SUNK_STEP;
+        let below_rate = depth * (depth + 2.0 * SUNK_ONSET) / (depth + SUNK_ONSET).powi(2) / SUNK_STEP;
+        // the spline lags by half a step
+        let v = (volume / step).clamp(0.0, STEPS as f64);
+        let square = v * v;
+        let y = v + 0.5 * square / (square + 1.0) + below;
+        let rate = (1.0 + v / (square + 1.0).powi(2)) * flux / step + below_rate * rising / self.height;
+        let end = NODES as f64 - 1e-9;
+        let (y, rate) = if y < end { (y, rate) } else { (end, 0.0) };
+        let row = (y.floor() as usize).min(NODES - 1);
+        let t = y - row as f64;
+        // quadratic B-splines: weights that are never negative, sums with a continuous slope
+        let last = (0.5 * t * t, t);
+        // the row before the first is dry as well, so that the slope begins at zero
+        let [a, b] = match row {
+            0 => [(0.0, 0.0); 2],
+            _ => [(0.5 * (1.0 - t).powi(2), t - 1.0), (0.5 + t - t * t, 1.0 - 2.0 * t)],
+        };
+        let next = (row + 1).min(NODES - 1);
+        let before = row.saturating_sub(1);
+        Place { rows: [(before, a.0, a.1), (row, b.0, b.1), (next, last.0, last.1)], rate }
+    }
+
+    /// How much of what the bed adds is left at a clearance, and how that grows as it closes [-, 1/m].
+    fn near_bed(&self, clearance: f64) -> NearBed {
+        let x = 1.0 + clearance.max(0.0) / self.radiation.bed_reach;
+        NearBed { share: x.powi(-2), closing: 2.0 * x.powi(-3) / self.radiation.bed_reach }
+    }
+
+    /// Rate of [`Self::usual_clearance`] [m/s].
+    fn clearance_rate(&self, volume: f64, flux: f64) -> f64 {
+        LIFTED * self.height * 2.0 * self.lifted(volume) * flux / self.lifting_volume()
+    }
+
+    /// Where a hull is between floating and covered, 0 to 1.
+    fn lifted(&self, volume: f64) -> f64 {
+        ((volume - self.float_volume) / self.lifting_volume()).clamp(0.0, 1.0)
+    }
+
+    fn lifting_volume(&self) -> f64 {
+        let whole = self.radiation.volume_step * STEPS as f64;
+        (whole - self.float_volume).max(0.1 * whole).max(1e-9)
+    }
+
+    /// Square roots of the gains at a place.
+    fn factors(&self, place: &Place, near_bed: f64) -> [Matrix6<f64>; POLES] {
+        std::array::from_fn(|m| {
+            let mut gain = Matrix6::zeros();
+            for &(row, weight, _) in &place.rows {
+                let (deep, standing) =
+                    (self.radiation.deep[row].gains[m], self.radiation.standing[row].gains[m]);
+                gain += (deep + (standing - deep) * near_bed) * weight;
+            }
+            factor(&gain)
+        })
+    }
+}
+
+/// Wheel speeds of which none is stated.
+pub const STATED_NONE: [f64; MAX_SURFACES] = [f64::NAN; MAX_SURFACES];
+
+/// How much of the loads of its elements a surface bears: these know its lowest points by their spread alone.
+fn reached(wetting: &Wetting, area: f64) -> f64 {
+    (wetting.soaked_area / (REACHED * area)).min(1.0)
+}
+
+/// Place in the table: rows with weights and slopes, and the rate of the coordinate [1/s].
+struct Place {
+    rows: [(usize, f64, f64); 3],
+    rate: f64,
+}
+
+struct NearBed {
+    share: f64,
+    closing: f64,
+}
+
+impl Memory {
+    /// Moves on by a time step under a push that is constant meanwhile, exactly.
+    fn advance(&mut self, poles: &[Pole; POLES], push: &[Vector6<f64>; POLES], dt: f64) {
+        for ((pole, push), [output, integral]) in poles.iter().zip(push).zip(&mut self.waves) {
+            let decay = pole.damping * pole.frequency;
+            let swing = pole.frequency * (1.0 - pole.damping * pole.damping).sqrt();
+            // q'' + 2 zeta w q' + w^2 q = u about its resting place
+            let rest = push / pole.frequency.powi(2);
+            let (q, p) = (*integral - rest, *output);
+            let (sine, cosine) = (swing * dt).sin_cos();
+            let fade = (-decay * dt).exp();
+            let s = sine / swing;
+            *integral = rest + (q * (cosine + decay * s) + p * s) * fade;
+            *output = (p * (cosine - decay * s) - q * (pole.frequency.powi(2) * s)) * fade;
+        }
+    }
+
+    /// The acceleration that the added mass resists in explicit integration, stable whatever the added mass:
+    /// `(M + A) a = M a_measured + A a_before`, which is the true one where the body followed the load of before.
+    fn settled(
+        &mut self,
+        rigid: &Matrix6<f64>,
+        added: &Matrix6<f64>,
+        measured: Vector6<f64>,
+        dt: f64,
+    ) -> Vector6<f64> {
+        let before = self.rate.unwrap_or(measured);
+        if dt > 0.0 || self.rate.is_none() {
+            let right = rigid * measured + added * before;
+            self.rate = Some((rigid + added).cholesky().map_or(measured, |both| both.solve(&right)));
+        }
+        self.rate.unwrap_or(measured)
+    }
+}
+
+fn steady(radiation: &Radiation) -> [Vec<Steady>; 2] {
+    let responses = radiation.poles.map(|pole| pole.response(radiation.frequency));
+    let sum = |row: &Node, part: usize| {
+        let terms = row.gains.iter().zip(&responses).map(|(gain, response)| gain * response[part]);
+        terms.fold(Matrix6::zeros(), |sum, term| sum + term)
+    };
+    let tables = [&radiation.deep, &radiation.standing];
+    let masses = tables.map(|rows| rows.iter().map(|row| row.mass + sum(row, 0)).collect());
+    let [deep, standing] = super::radiation::rising(masses);
+    let joined = |masses: Vec<Matrix6<f64>>, rows: &[Node]| {
+        masses.into_iter().zip(rows).map(|(mass, row)| Steady { mass, damping: sum(row, 1) }).collect()
+    };
+    [joined(deep, &radiation.deep), joined(standing, &radiation.standing)]
+}
+
+/// Mass and inertia of the vehicle about the body origin, forces first.
+fn rigid_mass(vehicle: &Vehicle) -> Matrix6<f64> {
+    let arm = vehicle.center_of_mass.cross_matrix();
+    let mut matrix = Matrix6::identity() * vehicle.mass;
+    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&(arm * -vehicle.mass));
+    matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&(arm * vehicle.mass));
+    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&(vehicle.inertia - arm * arm * vehicle.mass));
+    matrix
+}
+
+/// Kirchhoff's `C_A(nu) nu`: momentum that turns with the body.
+fn cross_terms(mass: &Matrix6<f64>, v: &Vec3, omega: &Vec3) -> Vector6<f64> {
+    let momentum = mass * joined(v, omega);
+    let linear = momentum.fixed_rows::<3>(0).into_owned();
+    let angular = momentum.fixed_rows::<3>(3).into_owned();
+    joined(&omega.cross(&linear), &(omega.cross(&angular) + v.cross(&linear)))
+}
+
+fn joined(linear: &Vec3, angular: &Vec3) -> Vector6<f64> {
+    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+}
+
+/// Projection on motion up and down and on turning about horizontal axes.
+fn lifting(up: &Vec3) -> Matrix6<f64> {
+    let vertical = up * up.transpose();
+    let mut matrix = Matrix6::identity();
+    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&vertical);
+    let level = matrix.fixed_view::<3, 3>(3, 3).into_owned() - vertical;
+    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&level);
+    matrix
+}
+
+/// A lower triangle `L` with `L L^T` the matrix, which is not negative; rows without size are zero.
+fn factor(matrix: &Matrix6<f64>) -> Matrix6<f64> {
+    let mut lower = Matrix6::<f64>::zeros();
+    for column in 0..6 {
+        let square: f64 = (0..column).map(|k| lower[(column, k)] * lower[(column, k)]).sum();
+        let pivot = matrix[(column, column)] - square;
+        if pivot <= 1e-12 * matrix[(column, column)].abs() || pivot <= 0.0 {
+            continue;
+        }
+        let pivot = pivot.sqrt();
+        lower[(column, column)] = pivot;
+        for row in column + 1..6 {
+            let dot: f64 = (0..column).map(|k| lower[(row, k)] * lower[(column, k)]).sum();
+            lower[(row, column)] = (matrix[(row, column)] - dot) / pivot;
+        }
+    }
+    lower
+}

@@ -1,0 +1,274 @@
+//! The physical base in random states of the whole space: any attitude, dry to drowned, up to 6 m/s and 3 rad/s.
+
+use nalgebra::{UnitQuaternion, UnitVector3};
+use wade_core::condition::Condition;
+use wade_core::frame::{GRAVITY, Vec3};
+use wade_core::geometry::hydrostatics::surface_hydrostatics;
+use wade_core::physics::{Base, BaseLoads, Motion, Physics};
+use wade_core::vehicle::{MAX_SURFACES, Vehicle};
+use wade_core::wrench::Wrench;
+
+use crate::bodies::{bodies, radiation};
+use crate::random::Random;
+
+const STATES: usize = 100_000;
+
+struct Subject {
+    vehicle: Vehicle,
+    base: Base,
+}
+
+fn subjects() -> &'static [Subject] {
+    static ALL: std::sync::OnceLock<Vec<Subject>> = std::sync::OnceLock::new();
+    ALL.get_or_init(|| {
+        let subject = |vehicle: Vehicle| {
+            let base = Base::new(&vehicle, radiation(&vehicle));
+            Subject { vehicle, base }
+        };
+        bodies().into_iter().map(subject).collect()
+    })
+}
+
+impl Subject {
+    fn weight(&self) -> f64 {
+        self.vehicle.mass * GRAVITY
+    }
+
+    fn size(&self) -> f64 {
+        let d = self.vehicle.dimensions;
+        Vec3::new(d.length, d.width, d.height).norm()
+    }
+
+    /// A state anywhere, wet in most cases.
+    fn random(&self, random: &mut Random) -> Condition {
+        let up = random.direction();
+        let half = 0.5 * self.size();
+        let density = 1000.0 + 900.0 * random.unit();
+        let velocity = random.direction() * (6.0 * random.unit());
+        let current =
+            if random.unit() < 0.5 { Vec3::zeros() } else { random.direction() * (2.0 * random.unit()) };
+        Condition {
+            velocity,
+            ground_velocity: velocity + current,
+            angular_velocity: random.direction() * (3.0 * random.unit()),
+            up: UnitVector3::new_normalize(up),
+            water_level: Some(half * (3.0 * random.unit() - 1.2)),
+            bed_clearance: (random.unit() < 0.5).then(|| 1.5 * random.unit() * half),
+            density,
+            ..Condition::level(velocity, 0.0)
+        }
+    }
+
+    fn loads(&self, state: &Condition, speeds: &[f64], physics: Physics, out: &mut BaseLoads) -> [Wrench; 2] {
+        let motion = Motion { wheel_speeds: speeds, time_step: 0.0, implicit_added_mass: false, physics };
+        self.base.evaluate(state, &motion, None, out);
+        let still = out.surfaces.iter().fold(Wrench::default(), |sum, s| sum + s.hydrostatic);
+        let moving = out.surfaces.iter().fold(out.hull, |sum, s| sum + s.drag);
+        [still, moving]
+    }
+}
+
+const NO_WHEELS: [f64; MAX_SURFACES] = [f64::NAN; MAX_SURFACES];
+
+/// Accelerations that leave the body components of the velocity through the water as they are.
+fn without_inertia(state: Condition) -> Condition {
+    Condition { acceleration: state.angular_velocity.cross(&state.velocity), ..state }
+}
+
+fn power(load: &Wrench, state: &Condition) -> f64 {
+    load.force.dot(&state.velocity) + load.moment.dot(&state.angular_velocity)
+}
+
+#[test]
+fn motion_through_the_water_costs_power_in_every_state() {
+    let mut out = BaseLoads::default();
+    for subject in subjects() {
+        let mut random = Random::new(1);
+        let mut worst = f64::NEG_INFINITY;
+        for index in 0..STATES {
+            let state = without_inertia(subject.random(&mut random));
+            let turning: [f64; MAX_SURFACES] = std::array::from_fn(|_| 40.0 * random.unit() - 20.0);
+            let speeds = if index % 2 == 0 { &NO_WHEELS } else { &turning };
+            let [_, moving] = subject.loads(&state, speeds, Physics::Full, &mut out);
+            let scale = subject.weight() * (state.velocity.norm() + 0.1 * state.angular_velocity.norm());
+            worst = worst.max((power(&moving, &state) - out.shaft_power.max(0.0)) / scale);
+        }
+        assert!(worst <= 1e-4, "{}: {worst}", subject.vehicle.name);
+    }
+}
+
+#[test]
+fn at_rest_force_and_moment_are_those_of_the_clipped_hull() {
+    let mut out = BaseLoads::default();
+    for subject in subjects() {
+        let mut random = Random::new(2);
+        for _ in 0..STATES / 20 {
+            let still = Vec3::zeros();
+            let state = Condition {
+                velocity: still,
+                ground_velocity: still,
+                angular_velocity: still,
+                ..subject.random(&mut random)
+            };
+            let [rest, moving] = subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
+            let plane = state.water_plane(subject.vehicle.z0);
+            let count = subject.vehicle.surfaces.len();
+            let exact = surface_hydrostatics(&subject.vehicle.hull, count, &plane, state.density, &still);
+            let exact = exact.into_iter().fold(Wrench::default(), |sum, load| sum + load);
+            let sum = rest + moving;
+            let force = (sum.force - exact.force).norm() / subject.weight();
+            let moment = (sum.moment - exact.moment).norm() / (subject.weight() * subject.size());
+            assert!(force < 1e-4 && moment < 1e-4, "{}: {force} {moment}", subject.vehicle.name);
+        }
+    }
+}
+
+#[test]
+fn above_the_water_nothing_acts() {
+    let mut out = BaseLoads::default();
+    for subject in subjects() {
+        let mut random = Random::new(3);
+        for _ in 0..STATES / 20 {
+            let mut state = subject.random(&mut random);
+            let lowest = subject
+                .vehicle
+                .hull
+                .mesh
+                .vertices
+                .iter()
+                .map(|vertex| state.up.dot(vertex))
+                .fold(f64::INFINITY, f64::min);
+            state.water_level = Some(lowest - 1e-9 - 0.1 * random.unit());
+            let [still, moving] = subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
+            assert_eq!((still, moving), (Wrench::default(), Wrench::default()), "{}", subject.vehicle.name);
+            assert_eq!(out.added_mass.norm(), 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_mirrored_state_has_a_mirrored_load() {
+    let flip = |v: &Vec3| Vec3::new(v.x, -v.y, v.z);
+    let turn = |v: &Vec3| Vec3::new(-v.x, v.y, -v.z);
+    let mut out = BaseLoads::default();
+    for subject in subjects() {
+        let mut random = Random::new(4);
+        for _ in 0..STATES / 10 {
+            let state = subject.random(&mut random);
+            let mirrored = Condition {
+                velocity: flip(&state.velocity),
+                ground_velocity: flip(&state.ground_velocity),
+                angular_velocity: turn(&state.angular_velocity),
+                up: UnitVector3::new_normalize(flip(&state.up)),
+                ..state
+            };
+            let [_, one] = subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
+            let [_, other] = subject.loads(&mirrored, &NO_WHEELS, Physics::Full, &mut out);
+            let q = 0.5 * state.density * 40.0 * subject.size().powi(2);
+            let force = (one.force - flip(&other.force)).norm() / q;
+            let moment = (one.moment - turn(&other.moment)).norm() / (q * subject.size());
+            assert!(force < 1e-5 && moment < 1e-5, "{}: {force} {moment}", subject.vehicle.name);
+        }
+    }
+}
+
+#[test]
+fn added_mass_and_damping_are_symmetric_and_not_negative() {
+    let mut out = BaseLoads::default();
+    for subject in subjects() {
+        let mut random = Random::new(5);
+        for _ in 0..STATES / 50 {
+            let state = subject.random(&mut random);
+            subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
+            for matrix in [out.added_mass, out.damping] {
+                let size = matrix.norm().max(1e-9);
+                assert!((matrix - matrix.transpose()).norm() <= 1e-12 * size);
+                let least = matrix.symmetric_eigenvalues().min();
+                assert!(least >= -1e-12 * size, "{}: {least} of {size}", subject.vehicle.name);
+            }
+        }
+    }
+}
+
+/// Steps of 1 mm, 0.1 degree, 1 cm/s or 0.01 rad/s along random lines, and the largest jump that bisection leaves of the worst.
+#[test]
+fn no_line_through_the_states_has_a_jump() {
+    const LINES: usize = 1_667;
+    const STEPS: usize = 40;
+    let mut out = BaseLoads::default();
+    for subject in subjects() {
+        let mut random = Random::new(6);
+        let (mut steepest, mut jump) = (0.0_f64, 0.0_f64);
+        let mut worst = String::new();
+        for _ in 0..LINES {
+            let start = without_inertia(subject.random(&mut random));
+            let kind = (random.unit() * 4.0) as usize;
+            let axis = random.direction();
+            let at = |x: f64| {
+                let state = match kind {
+                    0 => Condition { water_level: start.water_level.map(|l| l + 1e-3 * x), ..start },
+                    1 => {
+                        let turned = UnitQuaternion::from_scaled_axis(axis * (0.1_f64.to_radians() * x));
+                        Condition { up: turned * start.up, ..start }
+                    }
+                    2 => {
+                        let more = axis * (0.01 * x);
+                        let ground_velocity = start.ground_velocity + more;
+                        Condition { velocity: start.velocity + more, ground_velocity, ..start }
+                    }
+                    _ => Condition { angular_velocity: start.angular_velocity + axis * (0.01 * x), ..start },
+                };
+                without_inertia(state)
+            };
+            let room = |x: f64| {
+                let state = at(x);
+                let turning = state.angular_velocity.norm() * 0.5 * subject.size();
+                let q = 0.5 * state.density * (state.velocity.norm() + turning).powi(2);
+                0.01 * subject.weight() + 0.01 * q * subject.vehicle.hull.mesh.area()
+            };
+            let mut force = |x: f64| subject.loads(&at(x), &NO_WHEELS, Physics::Full, &mut out)[1].force;
+            let values: Vec<Vec3> = (0..=STEPS).map(|i| force(i as f64)).collect();
+            let (mut low, change) = (0..STEPS)
+                .map(|i| (i as f64, (values[i + 1] - values[i]).norm() / room(i as f64)))
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .expect("steps");
+            if change > steepest {
+                steepest = change;
+                worst = format!("kind {kind} {start:?} at {low}");
+            }
+            let mut width = 1.0;
+            while width > 1e-7 {
+                width *= 0.5;
+                let [a, b, c] = [low, low + width, low + 2.0 * width].map(&mut force);
+                if (c - b).norm() > (b - a).norm() {
+                    low += width;
+                }
+            }
+            jump = jump.max((force(low + width) - force(low)).norm() / subject.weight());
+        }
+        assert!(steepest < 1.0, "{}: {steepest}, {worst}", subject.vehicle.name);
+        assert!(jump < 1e-5, "{}: {jump}", subject.vehicle.name);
+    }
+}
+
+/// A released body, integrated with the matrix of added mass in small steps; up is the world's z.
+#[test]
+fn what_the_water_does_never_adds_energy() {
+    let mut out = BaseLoads::default();
+    for subject in subjects() {
+        let mut random = Random::new(7);
+        for _ in 0..20 {
+            let mut run = crate::release::Release::random(&subject.vehicle, &mut random);
+            let start = run.energy(&subject.base, &mut out);
+            let scale = subject.weight() * subject.size();
+            let (mut highest, mut least) = (0.0_f64, start);
+            for _ in 0..2_000 {
+                run.step(&subject.base, 1e-3, &mut out);
+                let now = run.energy(&subject.base, &mut out);
+                highest = highest.max((now - least) / scale);
+                least = least.min(now);
+            }
+            assert!(highest < 1e-3, "{}: energy rose by {highest}", subject.vehicle.name);
+        }
+    }
+}
