@@ -17,10 +17,12 @@ use wade_core::frame::WaterPlane;
 use wade_core::geometry::distance::SignedDistanceGrid;
 use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::geometry::mesh::Mesh;
+use wade_core::physics::Radiation;
 use wade_core::vehicle::build::build_reporting;
 use wade_core::vehicle::shipped;
 use wade_core::vehicle::spec::VehicleSpec;
 use wade_learn::files::StagedFile;
+use wade_learn::panel_code::Capytaine;
 
 use super::running::Running;
 use super::{Vehicles, emit};
@@ -133,6 +135,24 @@ enum Command {
         #[command(flatten)]
         vehicles: Vehicles,
     },
+    /// Compute added mass and waves of a hull with capytaine, in the place of the estimate in its bundle
+    ///
+    /// Takes minutes of one core. The bundle becomes the next version; rollback restores the one before.
+    #[command(after_help = "Example: wade vehicle radiation rover --python ~/capytaine/bin/python")]
+    Radiation {
+        /// Name of the vehicle
+        name: String,
+        /// Python that has capytaine [default: WADE_PYTHON, else python3]
+        #[arg(long, value_name = "FILE")]
+        python: Option<PathBuf>,
+        /// Write the estimate that `wade vehicle build` makes
+        #[arg(long, conflicts_with = "python")]
+        estimate: bool,
+        #[command(flatten)]
+        vehicles: Vehicles,
+        #[command(flatten)]
+        running: Running,
+    },
     /// Have a running server read a bundle again; exit status 1 where it refuses and keeps the version that it serves
     #[command(after_help = "Examples:
   wade vehicle reload husky
@@ -229,6 +249,21 @@ impl Vehicle {
                 let out = out.unwrap_or_else(|| format!("{name}-sdf.safetensors").into());
                 sdf(&vehicles.without_weights(&name)?.vehicle.hull.mesh, &out)?;
             }
+            Command::Radiation { name, python, estimate, vehicles, running } => {
+                let library = vehicles.library_to_write()?;
+                let mut bundle = library.read(&name)?;
+                let radiation = if estimate {
+                    Radiation::estimate(&bundle.vehicle)
+                } else {
+                    panel_code(python, &bundle.vehicle)?
+                };
+                let source = radiation.source.clone();
+                bundle.radiation = Some(radiation);
+                for (place, version) in library.succeed_together(vec![bundle])? {
+                    println!("{name}: version {version}, added mass and waves: {source}");
+                    running.reload(&name, &place);
+                }
+            }
             Command::Reload { name, running } => {
                 let served = running.ask(name.as_deref().unwrap_or_default())?;
                 return Ok(if served { ExitCode::SUCCESS } else { ExitCode::FAILURE });
@@ -313,7 +348,8 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let distance = if made.sdf { Some(signed_distance(&vehicle.hull.mesh)?) } else { None };
     let vehicle_translation = vehicle.translation;
     let spec = Some(spec_text.to_owned());
-    let bundle = Bundle { vehicle, version: 0, trained: None, effects: None, distance, spec };
+    let radiation = Some(Radiation::estimate(&vehicle));
+    let bundle = Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance, spec };
     let version = bundle::succeed(out, bundle)?;
     let t = vehicle_translation;
     println!("{}: version {version}, no weights yet", out.display());
@@ -322,6 +358,20 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     }
     println!("body frame = axes and scale of the STL, then moved by ({:.4}, {:.4}, {:.4}) m", t.x, t.y, t.z);
     Ok(())
+}
+
+/// Added mass and waves by capytaine, with a progress bar on a terminal.
+fn panel_code(python: Option<PathBuf>, vehicle: &wade_core::vehicle::Vehicle) -> Result<Radiation> {
+    let code = Capytaine::find(python)?;
+    let bar = ProgressBar::new(0)
+        .with_message(format!("capytaine {}", code.version))
+        .with_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} water levels, {eta} left")?);
+    let radiation = code.radiation(vehicle, &|done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(radiation)
 }
 
 /// The paper's grid, with a progress bar on a terminal.

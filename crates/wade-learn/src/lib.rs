@@ -19,6 +19,7 @@ pub mod trials;
 
 pub mod cfd;
 pub mod evaluate;
+pub mod panel_code;
 pub mod train;
 pub mod validate;
 

@@ -88,16 +88,16 @@ impl Partial {
             Some(contact) => contact,
             None => return Err(named(&schema::GROUND_CONTACT, "wetted or dry")?),
         };
+        let velocity = vector(&schema::VELOCITY)?;
         let condition = Condition {
-            velocity: vector(&schema::VELOCITY)?,
             ground_velocity: vector(&schema::GROUND_VELOCITY)?,
             angular_velocity: vector(&schema::ANGULAR_VELOCITY)?,
             acceleration: vector(&schema::ACCELERATION)?,
             angular_acceleration: vector(&schema::ANGULAR_ACCELERATION)?,
-            depth: number(&schema::DEPTH)?,
             density: number(&schema::DENSITY)?,
             up: UnitVector3::new_unchecked(vector(&schema::UP)?),
             ground_contact,
+            ..Condition::level(velocity, number(&schema::DEPTH)?)
         };
         let sample = Sample {
             vehicle,

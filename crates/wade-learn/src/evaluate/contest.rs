@@ -56,7 +56,9 @@ pub fn enter(
         }
         let no_model = || EvaluateError::NoModel { vehicle: name.clone() };
         let models = contestants.models.get(name).ok_or_else(no_model)?;
-        let name_of = |model: &Model| model.weights().form.name().to_owned();
+        let name_of = |model: &Model| {
+            model.weights().map_or(model.provenance(), |weights| weights.form.name()).to_owned()
+        };
         let mut entries: Vec<_> =
             models.iter().map(|model| (name_of(model), served(model, &held_out))).collect();
         entries.push((baseline::KNOWN.to_owned(), baseline::known(vehicle, &held_out)));

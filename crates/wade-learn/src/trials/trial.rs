@@ -168,16 +168,16 @@ impl Trial {
 
     /// The state at a sample.
     pub fn condition(&self, sample: usize, ground_contact: GroundContact) -> Condition {
+        let velocity = self.velocity[sample] - self.current[sample];
         Condition {
-            velocity: self.velocity[sample] - self.current[sample],
             ground_velocity: self.velocity[sample],
             angular_velocity: self.angular_velocity[sample],
             acceleration: self.acceleration[sample],
             angular_acceleration: self.angular_acceleration[sample],
-            depth: self.depth[sample],
             density: self.density[sample],
             up: self.up(sample),
             ground_contact,
+            ..Condition::level(velocity, self.depth[sample])
         }
     }
 

@@ -1,0 +1,172 @@
+//! Added mass and waves of a hull by capytaine, a boundary-element code for linear waves in Python.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use wade_core::physics::elements::elements;
+use wade_core::physics::panel::{Panel, wet_panels};
+use wade_core::physics::radiation::{Radiation, Solved, frequencies};
+use wade_core::vehicle::Vehicle;
+
+/// How to get it.
+const HOW_TO_INSTALL: &str = "`python3 -m pip install capytaine==3.0.0 trimesh meshio`, into an environment whose Python \
+    stands in WADE_PYTHON or is given with --python";
+
+/// What solves a case: JSON in, a line of JSON a case out.
+const SCRIPT: &str = include_str!("solve.py");
+
+/// Most panels of a hull: a case then takes seconds.
+const PANELS: usize = 400;
+
+/// The Python that has capytaine.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Capytaine {
+    python: PathBuf,
+    /// Its version.
+    pub version: String,
+}
+
+/// Why there are no waves.
+#[derive(Debug, thiserror::Error)]
+pub enum PanelCodeError {
+    /// Not found.
+    #[error("{}: no capytaine ({reason}): {HOW_TO_INSTALL}", .python.display())]
+    Missing {
+        /// The Python that was asked.
+        python: PathBuf,
+        /// What it said.
+        reason: String,
+    },
+    /// It ended early.
+    #[error("capytaine ended after {done} of {cases} water levels: {reason}")]
+    Ended {
+        /// How many were solved.
+        done: usize,
+        /// How many there are.
+        cases: usize,
+        /// The last line that it wrote to its standard error.
+        reason: String,
+    },
+    /// It says what no panel code says.
+    #[error("capytaine answers what cannot be read: {0}")]
+    Answer(#[from] serde_json::Error),
+    /// The process could not be run.
+    #[error("capytaine cannot be run: {0}")]
+    Io(#[from] std::io::Error),
+}
+
+#[derive(Serialize)]
+struct Task {
+    cases: Vec<Case>,
+    frequencies: Vec<f64>,
+}
+
+/// Water of a depth, `None` for deep, and the wet part of the hull in it.
+#[derive(Serialize)]
+struct Case {
+    level: f64,
+    depth: Option<f64>,
+    panels: Vec<[[f64; 3]; 4]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Answer {
+    #[serde(rename = "case")]
+    _case: usize,
+    mass: [[f64; 6]; 6],
+    damping: Vec<[[f64; 6]; 6]>,
+}
+
+impl Capytaine {
+    /// Finds it in a Python: the one given, `WADE_PYTHON`, or `python3`.
+    pub fn find(python: Option<PathBuf>) -> Result<Self, PanelCodeError> {
+        let python = python
+            .or_else(|| std::env::var_os("WADE_PYTHON").filter(|name| !name.is_empty()).map(PathBuf::from))
+            .unwrap_or_else(|| "python3".into());
+        let asked = Command::new(&python)
+            .args(["-c", "import capytaine; print(capytaine.__version__)"])
+            .stdin(Stdio::null())
+            .output();
+        let missing = |reason: String| PanelCodeError::Missing { python: python.clone(), reason };
+        let asked = asked.map_err(|error| missing(error.to_string()))?;
+        if !asked.status.success() {
+            return Err(missing(last_line(&asked.stderr)));
+        }
+        let version = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
+        Ok(Self { python, version })
+    }
+
+    /// The table of a vehicle; `progress` hears how many of how many water levels are solved.
+    pub fn radiation(
+        &self,
+        vehicle: &Vehicle,
+        progress: &dyn Fn(usize, usize),
+    ) -> Result<Radiation, PanelCodeError> {
+        let elements = elements(vehicle, PANELS);
+        let mut cases = Vec::new();
+        // what is asked for, in order; the answers are not used
+        Radiation::from_solved(vehicle, "", |level, clearance| {
+            let bed = clearance.map(|clearance| vehicle.z0 - clearance);
+            cases.push(Case {
+                level,
+                depth: bed.map(|bed| level - bed),
+                panels: wet_panels(&elements, level).iter().map(Panel::corners).collect(),
+            });
+            Solved { mass: Matrix6::identity(), damping: vec![Matrix6::zeros(); frequencies(vehicle).len()] }
+        });
+        let count = cases.len();
+        let task = Task { cases, frequencies: frequencies(vehicle).to_vec() };
+        let mut solved = self.solve(&task, count, progress)?.into_iter();
+        let source = format!("capytaine {}", self.version);
+        Ok(Radiation::from_solved(vehicle, &source, |_, _| {
+            solved.next().unwrap_or_else(|| unreachable!("as many answers as cases"))
+        }))
+    }
+
+    fn solve(
+        &self,
+        task: &Task,
+        count: usize,
+        progress: &dyn Fn(usize, usize),
+    ) -> Result<Vec<Solved>, PanelCodeError> {
+        let mut child = Command::new(&self.python)
+            .args(["-c", SCRIPT])
+            // one core: others may have work on this machine
+            .env("OMP_NUM_THREADS", "1")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()?;
+        if let Some(mut input) = child.stdin.take() {
+            input.write_all(serde_json::to_string(task)?.as_bytes())?;
+        }
+        let mut solved = Vec::new();
+        if let Some(output) = child.stdout.take() {
+            for line in BufReader::new(output).lines() {
+                let answer: Answer = serde_json::from_str(&line?)?;
+                let matrix = |rows: &[[f64; 6]; 6]| Matrix6::from_fn(|i, j| rows[i][j]);
+                solved.push(Solved {
+                    mass: matrix(&answer.mass),
+                    damping: answer.damping.iter().map(matrix).collect(),
+                });
+                progress(solved.len(), count);
+            }
+        }
+        let ended = child.wait_with_output()?;
+        if !ended.status.success() || solved.len() != count {
+            let reason = last_line(&ended.stderr);
+            return Err(PanelCodeError::Ended { done: solved.len(), cases: count, reason });
+        }
+        Ok(solved)
+    }
+}
+
+fn last_line(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    text.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no reason given").trim().to_owned()
+}
