@@ -17,8 +17,8 @@ use common::{Row, Subject, Table};
 use wade_core::bundle;
 use wade_core::condition::Condition;
 use wade_core::effects::{
-    ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectsFile, Evidence, Kind,
-    ParameterValue, Session, Shape, Validity,
+    ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectsFile, EffectsSession,
+    Evidence, Kind, ParameterValue, Shape, Validity,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, WaterPlane, up_from_roll_pitch};
@@ -202,13 +202,14 @@ fn effects(vehicle: &str) -> Vec<Subject> {
         wheel_speeds: Some([3.0; 4]),
         time_step: 0.001,
         implicit_added_mass: false,
+        ..Circumstances::default()
     };
     let mut subjects: Vec<Subject> = Vec::new();
     for (name, condition) in [("level", level), ("tilted", tilted)] {
         let active = ActiveEffects::new(every_effect(vehicle), model.vehicle());
         let mut forces = Forces::default();
         model.evaluate(&condition, &mut Workspace::new(), &mut forces);
-        let (mut session, mut loads) = (Session::default(), EffectLoads::default());
+        let (mut session, mut loads) = (EffectsSession::default(), EffectLoads::default());
         let work = move || {
             let answer = Answer {
                 condition: black_box(&condition),

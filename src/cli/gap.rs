@@ -9,7 +9,6 @@ use serde_json::json;
 use wade_core::bundle::{self, Library};
 use wade_core::effects::{Body, EffectsFile};
 use wade_core::forces::Forces;
-use wade_core::frame::Vec3;
 use wade_core::model::kernel::Isa;
 use wade_core::model::{Model, Workspace};
 use wade_gap::{Config, GapError, NotApplicable, Predicted, Report, effects_file};
@@ -381,23 +380,15 @@ fn check_loss(
     )
 }
 
-/// The model's answers with its uncertainty. Of its moments the model states none; the error of a force is taken to act a quarter
-/// of the hull from its middle, along each axis.
+/// The model's answers with its uncertainty.
 fn predictor(model: &Model) -> impl FnMut(&wade_core::condition::Condition) -> Predicted {
     let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
-    let dimensions = model.vehicle().dimensions;
     move |condition| {
         model.evaluate(condition, &mut workspace, &mut forces);
-        let u = forces.uncertainty;
-        let arm = Vec3::new(dimensions.length, dimensions.width, dimensions.height) * 0.25;
-        let moment = [
-            (u.y * arm.z).hypot(u.z * arm.y),
-            (u.x * arm.z).hypot(u.z * arm.x),
-            (u.x * arm.y).hypot(u.y * arm.x),
-        ];
+        let (force, moment) = (forces.uncertainty, forces.moment_uncertainty);
         Predicted {
             wrench: forces.wrench,
-            uncertainty: [u.x, u.y, u.z, moment[0], moment[1], moment[2]],
+            uncertainty: [force.x, force.y, force.z, moment.x, moment.y, moment.z],
             outside: !forces.outside.is_inside(),
         }
     }

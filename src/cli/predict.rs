@@ -7,21 +7,21 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use wade::states::{Row, unknown_columns};
 use wade_core::domain::{Domain, Outside};
-use wade_core::effects::Session;
 use wade_core::frame::Vec3;
 use wade_core::model::Model;
+use wade_core::served::Session;
 use wade_learn::files::StagedFile;
 use wade_wire::State;
 use wade_wire::{Evaluated, Evaluator};
 
+use super::state::Terms;
 use super::{Vehicles, outside};
 
 /// Forces for every row of a table of states
 ///
-/// Columns: vx vy vz and depth; optionally cx cy cz (current), wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho,
+/// Columns: vx vy vz and depth, or water_level in its place; optionally bed_clearance, bed, cx cy cz (current), wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho,
 /// wheel_fl wheel_fr wheel_rl wheel_rr, in SI units and radians. Other columns are kept. Adds fx fy fz mx my mz about the
-/// center of mass; their predicted standard deviations sfx sfy sfz smx smy smz, empty where the model states none, as for
-/// moments; in_domain (1 or 0); and outside, the quantities outside the training domain with `;` between them. Where there
+/// center of mass; their predicted standard deviations sfx sfy sfz smx smy smz; in_domain (1 or 0); and outside, the quantities outside the training domain with `;` between them. Where there
 /// is a column t, the rows are one run in time, along which effects remember waves and flooding.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
@@ -42,6 +42,9 @@ pub struct Predict {
     /// Exit status 1 where a row is outside the training domain
     #[arg(long)]
     strict: bool,
+    /// How much of the physical base answers
+    #[arg(long, value_enum, default_value_t = Terms::Full)]
+    physics: Terms,
     #[command(flatten)]
     vehicles: Vehicles,
 }
@@ -75,7 +78,7 @@ impl Predict {
             let row = Row::read(&record, &headers).with_context(at)?;
             let time_step = time_step(row.t, before, session.is_some()).with_context(at)?;
             before = row.t;
-            let state = State { time_step, ..row.state() };
+            let state = State { time_step, physics: self.physics.into(), ..row.state() };
             let state = state.check().with_context(at)?;
             let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut());
             far.count(&evaluated.forces.outside);
@@ -102,8 +105,7 @@ impl Predict {
         let no_effects = vec![Vec3::zeros(); forces.surfaces.len()];
         let added = if effects.loads.is_empty() { &no_effects } else { &effects.surface_forces };
         let wrench = forces.wrench.force.iter().chain(forces.wrench.moment.iter()).map(number);
-        // the model states a deviation of the force alone
-        let deviation = forces.uncertainty.iter().map(number).chain(std::iter::repeat_n(String::new(), 3));
+        let deviation = forces.uncertainty.iter().chain(forces.moment_uncertainty.iter()).map(number);
         let in_domain = u8::from(forces.outside.is_inside()).to_string();
         let outside: Vec<&str> = forces.outside.iter().map(|(quantity, _)| quantity.name()).collect();
         let surfaces = forces.surfaces.iter().zip(added).filter(|_| self.per_surface);
@@ -172,8 +174,12 @@ fn time_step(t: Option<f64>, before: Option<f64>, is_run: bool) -> Result<f32> {
 /// Refuses a table without a state or with forces already, and names the unused columns.
 fn check_columns(headers: &csv::StringRecord) -> Result<()> {
     let has = |name: &str| headers.iter().any(|header| header.trim() == name);
-    if let Some(missing) = ["vx", "vy", "vz", "depth"].into_iter().find(|name| !has(name)) {
-        bail!("column {missing} is missing; there are: {}", headers.iter().collect::<Vec<_>>().join(", "));
+    let there = || headers.iter().collect::<Vec<_>>().join(", ");
+    if let Some(missing) = ["vx", "vy", "vz"].into_iter().find(|name| !has(name)) {
+        bail!("column {missing} is missing; there are: {}", there());
+    }
+    if !has("depth") && !has("water_level") {
+        bail!("column depth is missing, or water_level in its place; there are: {}", there());
     }
     if let Some(taken) = ADDED.into_iter().find(|name| has(name)) {
         bail!("column {taken} is there already: wade predict adds it; rename or remove yours");

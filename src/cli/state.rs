@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use wade_core::frame::up_from_roll_pitch;
+use wade_core::physics::Physics;
 use wade_wire::State;
 use wade_wire::single;
 
@@ -19,8 +20,20 @@ pub struct StateArgs {
     #[arg(long, value_name = "WX,WY,WZ", value_parser = numbers::<3>, allow_hyphen_values = true)]
     angular: Option<[f32; 3]>,
     /// Water surface above the ground under the vehicle [m]
-    #[arg(long, allow_negative_numbers = true)]
-    depth: f32,
+    #[arg(long, allow_negative_numbers = true, required_unless_present = "water_level")]
+    depth: Option<f32>,
+    /// Still-water plane above the body origin along up [m], in the place of --depth
+    #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with = "depth")]
+    water_level: Option<f32>,
+    /// Distance from the ground-contact plane down to the bed [m] [default: on the bed until the vehicle floats]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    bed_clearance: Option<f32>,
+    /// Share of the motion through the water that is motion over the bed: 0 or parked, 1 or driving [default: from the velocities]
+    #[arg(long, value_name = "B", value_parser = bed)]
+    bed: Option<f32>,
+    /// How much of the physical base answers
+    #[arg(long, value_enum, default_value_t = Terms::Full)]
+    physics: Terms,
     /// Density of the fluid [kg/m3]
     #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
     density: f32,
@@ -64,6 +77,36 @@ enum Contact {
     Dry,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum Terms {
+    /// The pressure of still water
+    Hydrostatic,
+    /// And drag and friction of the local velocity
+    QuasiSteady,
+    /// And added mass, entry and the waves that the hull makes
+    Full,
+}
+
+impl From<Terms> for Physics {
+    fn from(terms: Terms) -> Self {
+        match terms {
+            Terms::Hydrostatic => Self::Hydrostatic,
+            Terms::QuasiSteady => Self::QuasiSteady,
+            Terms::Full => Self::Full,
+        }
+    }
+}
+
+/// A share, or one of the two words for its ends.
+fn bed(text: &str) -> Result<f32, String> {
+    match text {
+        "parked" => Ok(0.0),
+        "driving" => Ok(1.0),
+        number => number.parse().map_err(|_| format!("`{number}`: parked, driving or a number from 0 to 1")),
+    }
+}
+
 impl StateArgs {
     /// Roll as it was given [rad].
     pub fn roll(&self) -> f64 {
@@ -84,7 +127,10 @@ impl StateArgs {
             acceleration: self.acceleration.unwrap_or_default(),
             angular_acceleration: self.angular_acceleration.unwrap_or_default(),
             gravity: gravity(self.roll, self.pitch),
-            depth: self.depth,
+            depth: self.depth.unwrap_or(f32::NAN),
+            water_level: self.water_level,
+            bed_clearance: self.bed_clearance,
+            bed: self.bed,
             density: self.density,
             dry_contact: self.ground_contact == Contact::Dry,
             heading: self.heading,
@@ -92,6 +138,7 @@ impl StateArgs {
             wheel_speeds: self.wheel_speeds,
             time_step: 0.0,
             implicit_added_mass: self.implicit_added_mass,
+            physics: self.physics.into(),
         }
     }
 }

@@ -180,7 +180,8 @@ fn announce(served: &ServedVehicle, metrics: &Metrics) {
     let effects = served.effects().map_or(0, |file| file.effects.len());
     let vehicle = &model.vehicle().name;
     metrics.set_bundle_version(vehicle, model.version());
-    let (version, kernel, origin) = (model.version(), model.isa().name(), served.origin());
+    let kernel = model.isa().map_or("none", Isa::name);
+    let (version, origin) = (model.version(), served.origin());
     tracing::info!(vehicle, version, origin, effects, "bundle loaded");
     tracing::debug!(vehicle, version, kernel, provenance = model.provenance(), "weights");
 }

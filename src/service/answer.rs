@@ -18,6 +18,7 @@ pub struct Answer {
     surfaces: Vec<Surface>,
     wrench: Wrench,
     uncertainty: Uncertainty,
+    base: Option<Base>,
     in_domain: bool,
     outside: Vec<Outside>,
     effects: Vec<EffectLoad>,
@@ -39,6 +40,7 @@ struct Surface {
     force: [f32; 3],
     point: [f32; 3],
     wetted_fraction: f32,
+    couple: [f32; 3],
     effects_force: [f32; 3],
 }
 
@@ -55,6 +57,17 @@ struct Wrench {
 #[derive(Debug, Serialize)]
 struct Uncertainty {
     force: [f32; 3],
+    moment: [f32; 3],
+}
+
+/// What the physical base tells; none of a bundle without one.
+#[derive(Debug, Serialize)]
+struct Base {
+    water_level: f32,
+    bed_clearance: f32,
+    bed: f32,
+    /// 6 rows of 6, forces first.
+    damping: Vec<[f32; 6]>,
 }
 
 #[derive(Debug, Serialize)]
@@ -98,6 +111,7 @@ impl Answer {
             force: row(&response.surface_force_n, i),
             point: row(&response.surface_point_m, i),
             wetted_fraction,
+            couple: row(&response.surface_couple_nm, i),
             effects_force: row(&response.effect_surface_force_n, i),
         };
         let quantity = |code: i32| Quantity::ALL.into_iter().find(|quantity| *quantity as i32 == code);
@@ -114,7 +128,13 @@ impl Answer {
                 moment_nm: moment.into(),
                 about_m: about.into(),
             },
-            uncertainty: Uncertainty { force: uncertainty },
+            uncertainty: Uncertainty { force: uncertainty, moment: array(response.moment_uncertainty_nm) },
+            base: response.base.as_ref().map(|base| Base {
+                water_level: base.water_level_m,
+                bed_clearance: base.bed_clearance_m,
+                bed: base.bed,
+                damping: base.damping.as_chunks::<6>().0.to_vec(),
+            }),
             in_domain: response.in_domain,
             outside: response
                 .outside

@@ -10,8 +10,8 @@ use tonic::{Request, Response, Status};
 use super::admin::Reloader;
 use crate::engine::Engine;
 use crate::metrics::{self, Metrics, Transport};
-use wade_core::effects::Session;
 use wade_core::served::ServedVehicle;
+use wade_core::served::Session;
 use wade_wire::{Evaluator, Refusal, nanoseconds_since, proto};
 
 thread_local! {

@@ -29,7 +29,7 @@ async fn client(served: &Served) -> HydrodynamicsClient<Channel> {
 
 fn request(vehicle: &str, depth_m: f32) -> proto::EvaluateRequest {
     let velocity_mps = Some(proto::Vector3 { x: 0.5, y: 0.0, z: 0.0 });
-    let state = proto::State { velocity_mps, depth_m, ..Default::default() };
+    let state = proto::State { velocity_mps, depth_m: Some(depth_m), ..Default::default() };
     proto::EvaluateRequest { vehicle: vehicle.into(), state: Some(state) }
 }
 
@@ -69,8 +69,8 @@ fn bad_requests_name_their_field_and_the_next_is_served() {
         let quaternion =
             |w, x| proto::state::Attitude::WorldFromBody(proto::Quaternion { w, x, y: 0.0, z: 0.0 });
         let mut bad = vec![
-            (state(|s| s.depth_m = -0.1), "state.depth_m"),
-            (state(|s| s.depth_m = f32::NAN), "state.depth_m"),
+            (state(|s| s.depth_m = None), "state.depth_m"),
+            (state(|s| s.depth_m = Some(f32::NAN)), "state.depth_m"),
             (state(|s| s.density_kgpm3 = Some(-1.0)), "state.density_kgpm3"),
             (proto::EvaluateRequest { state: None, ..request("husky", 0.1) }, "state"),
         ];

@@ -32,6 +32,7 @@ impl From<&WadeState> for State {
             wheel_speeds: has(WADE_HAS_WHEEL_SPEEDS).then_some(state.wheel_speed_radps),
             time_step: state.time_step_s,
             implicit_added_mass: has(WADE_IMPLICIT_ADDED_MASS),
+            ..Self::default()
         }
     }
 }

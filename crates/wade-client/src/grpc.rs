@@ -7,7 +7,7 @@ use tokio::runtime::Runtime;
 use tonic::transport::Endpoint;
 
 use super::grpc_link::GrpcLink;
-use super::{ClientError, EffectReply, Reply, SurfaceReply, nobody_at};
+use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply, nobody_at};
 use wade_core::domain::{Domain, Outside, Quantity, Range};
 use wade_core::effects::{BoxQuantity, Effect, LeftOut, OutsideBox};
 use wade_wire::State;
@@ -130,7 +130,10 @@ pub(super) fn message(state: &State) -> proto::State {
         angular_velocity_radps: vector(state.angular_velocity),
         acceleration_mps2: vector(state.acceleration),
         angular_acceleration_radps2: vector(state.angular_acceleration),
-        depth_m: state.depth,
+        depth_m: Some(state.depth).filter(|depth| !depth.is_nan()),
+        water_level_m: state.water_level,
+        bed_clearance_m: state.bed_clearance,
+        bed: state.bed,
         density_kgpm3: Some(state.density),
         attitude: Some(proto::state::Attitude::GravityDirection(proto::Vector3 { x, y, z })),
         ground_contact: ground_contact(state).into(),
@@ -139,6 +142,7 @@ pub(super) fn message(state: &State) -> proto::State {
         wheel_speed_radps: state.wheel_speeds.map_or_else(Vec::new, Vec::from),
         time_step_s: state.time_step,
         implicit_added_mass: state.implicit_added_mass,
+        physics: state.physics as i32,
     }
 }
 
@@ -147,10 +151,10 @@ fn ground_contact(state: &State) -> proto::GroundContact {
 }
 
 /// What the states of a batch have in common: the message carries it once, or not at all.
-pub(super) fn shared(state: &State) -> [bool; 5] {
-    let State { heading, depth_rate, wheel_speeds, .. } = state;
+pub(super) fn shared(state: &State) -> impl PartialEq + use<> {
+    let State { heading, depth_rate, wheel_speeds, physics, .. } = state;
     let given = [heading.is_some(), depth_rate.is_some(), wheel_speeds.is_some()];
-    [state.dry_contact, state.implicit_added_mass, given[0], given[1], given[2]]
+    (state.dry_contact, state.implicit_added_mass, *physics, given)
 }
 
 pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateBatchRequest {
@@ -163,6 +167,9 @@ pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateB
         acceleration_mps2: rows(|s| s.acceleration),
         angular_acceleration_radps2: rows(|s| s.angular_acceleration),
         depth_m: states.iter().map(|s| s.depth).collect(),
+        water_level_m: stated(states, |s| s.water_level),
+        bed_clearance_m: stated(states, |s| s.bed_clearance),
+        bed: stated(states, |s| s.bed),
         density_kgpm3: states.iter().map(|s| s.density).collect(),
         gravity_direction: rows(|s| s.gravity),
         ground_contact: states.first().map_or(proto::GroundContact::Unspecified, ground_contact).into(),
@@ -171,6 +178,16 @@ pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateB
         depth_rate_mps: states.iter().filter_map(|s| s.depth_rate).collect(),
         wheel_speed_radps: states.iter().filter_map(|s| s.wheel_speeds).flatten().collect(),
         implicit_added_mass: states.first().is_some_and(|s| s.implicit_added_mass),
+        physics: states.first().map_or(0, |s| s.physics as i32),
+    }
+}
+
+/// An array with NaN where a state has no value; empty where none has.
+fn stated(states: &[State], value: fn(&State) -> Option<f32>) -> Vec<f32> {
+    if states.iter().any(|state| value(state).is_some()) {
+        states.iter().map(|state| value(state).unwrap_or(f32::NAN)).collect()
+    } else {
+        Vec::new()
     }
 }
 
@@ -184,12 +201,15 @@ impl From<proto::EvaluateResponse> for Reply {
             surfaces: surfaces(
                 &response.surface_force_n,
                 &response.surface_point_m,
+                &response.surface_couple_nm,
                 &response.wetted_fraction,
             ),
             force: vector(wrench.force_n),
             moment: vector(wrench.moment_nm),
             about: vector(wrench.about_m),
             uncertainty: vector(response.uncertainty_n),
+            moment_uncertainty: vector(response.moment_uncertainty_nm),
+            base: response.base.as_ref().and_then(base),
             outside: outside(response.outside.iter()),
             effects: response.effects.iter().filter_map(effect).collect(),
             effect_surface_forces: response.effect_surface_force_n.as_chunks::<3>().0.to_vec(),
@@ -218,6 +238,7 @@ impl From<&Reply> for proto::EvaluateResponse {
         Self {
             surface_force_n: reply.surfaces.iter().flat_map(|surface| surface.force).collect(),
             surface_point_m: reply.surfaces.iter().flat_map(|surface| surface.point).collect(),
+            surface_couple_nm: reply.surfaces.iter().flat_map(|surface| surface.couple).collect(),
             wetted_fraction: reply.surfaces.iter().map(|surface| surface.wetted_fraction).collect(),
             wrench: Some(proto::Wrench {
                 force_n: vector(reply.force),
@@ -225,6 +246,14 @@ impl From<&Reply> for proto::EvaluateResponse {
                 about_m: vector(reply.about),
             }),
             uncertainty_n: vector(reply.uncertainty),
+            moment_uncertainty_nm: vector(reply.moment_uncertainty),
+            base: reply.base.map(|base| proto::BaseAnswer {
+                water_level_m: base.water_level,
+                bed_clearance_m: base.bed_clearance,
+                bed: base.bed,
+                shaft_power_w: 0.0,
+                damping: base.damping.to_vec(),
+            }),
             in_domain: reply.outside.is_inside(),
             outside: outside.collect(),
             bundle_version: reply.version,
@@ -269,12 +298,15 @@ pub fn replies(response: proto::EvaluateBatchResponse) -> Vec<Reply> {
             surfaces: surfaces(
                 &response.surface_force_n[3 * from..3 * to],
                 &response.surface_point_m[3 * from..3 * to],
+                response.surface_couple_nm.get(3 * from..3 * to).unwrap_or_default(),
                 &response.wetted_fraction[from..to],
             ),
             force: row(&response.force_n, i),
             moment: row(&response.moment_nm, i),
             about,
             uncertainty: row(&response.uncertainty_n, i),
+            moment_uncertainty: row(&response.moment_uncertainty_nm, i),
+            base: response.base.get(i).and_then(base),
             outside: outside(response.outside.iter().filter(|outside| outside.index as usize == i)),
             effects: (0..effect_count).filter_map(|number| effect(i, number)).collect(),
             effect_surface_forces: match effect_count {
@@ -291,9 +323,26 @@ pub fn replies(response: proto::EvaluateBatchResponse) -> Vec<Reply> {
     (0..states).map(reply).collect()
 }
 
-fn surfaces(forces: &[f32], points: &[f32], wetted: &[f32]) -> Vec<SurfaceReply> {
-    let rows = forces.as_chunks::<3>().0.iter().zip(points.as_chunks::<3>().0).zip(wetted);
-    rows.map(|((&force, &point), &wetted_fraction)| SurfaceReply { force, point, wetted_fraction }).collect()
+fn surfaces(forces: &[f32], points: &[f32], couples: &[f32], wetted: &[f32]) -> Vec<SurfaceReply> {
+    let [forces, points, couples] = [forces, points, couples].map(|values| values.as_chunks::<3>().0);
+    let rows = forces.iter().zip(points).zip(wetted).enumerate();
+    rows.map(|(i, ((&force, &point), &wetted_fraction))| SurfaceReply {
+        force,
+        point,
+        wetted_fraction,
+        // a server from before there were any sends none
+        couple: couples.get(i).copied().unwrap_or_default(),
+    })
+    .collect()
+}
+
+fn base(base: &proto::BaseAnswer) -> Option<BaseReply> {
+    Some(BaseReply {
+        water_level: base.water_level_m,
+        bed_clearance: base.bed_clearance_m,
+        bed: base.bed,
+        damping: base.damping.as_slice().try_into().ok()?,
+    })
 }
 
 fn effect(load: &proto::EffectLoad) -> Option<EffectReply> {

@@ -17,11 +17,11 @@ pub use shm::ShmClient;
 pub use shm_link::{Asked, Lost, ShmLink};
 
 use wade_core::domain::Outside;
-use wade_core::effects::{Effect, LeftOut, OutsideBox, Session};
-use wade_core::served::ServedVehicle;
+use wade_core::effects::{Effect, LeftOut, OutsideBox};
+use wade_core::served::{ServedVehicle, Session};
 use wade_wire::State;
 use wade_wire::{Evaluated, Evaluator};
-use wade_wire::{added_mass, single};
+use wade_wire::{added_mass, by_rows, single};
 
 /// Nobody answers at a URL, for what an error and its causes say: each reason once, since some repeat their source.
 fn nobody_at(url: &str, error: &dyn std::error::Error) -> ClientError {
@@ -44,6 +44,21 @@ pub struct SurfaceReply {
     pub point: [f32; 3],
     /// Share under water.
     pub wetted_fraction: f32,
+    /// Moment of the load about the point of application [N m].
+    pub couple: [f32; 3],
+}
+
+/// What the physical base tells as it travels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BaseReply {
+    /// Height of the still-water plane above the body origin along up [m].
+    pub water_level: f32,
+    /// Distance from the ground-contact plane to the bed, as used [m].
+    pub bed_clearance: f32,
+    /// Share of the motion through the water that is motion over the bed, as used.
+    pub bed: f32,
+    /// Linear damping by rows, forces first [kg/s, kg m/s, kg m2/s].
+    pub damping: [f32; 36],
 }
 
 /// The load of an effect as it travels.
@@ -76,6 +91,10 @@ pub struct Reply {
     pub about: [f32; 3],
     /// One standard deviation of the net force [N].
     pub uncertainty: [f32; 3],
+    /// One standard deviation of the net moment [N m].
+    pub moment_uncertainty: [f32; 3],
+    /// What the physical base tells; none of a bundle without one.
+    pub base: Option<BaseReply>,
     /// How far each quantity lies outside the training domain.
     pub outside: Outside,
     /// The effects that were added to the model; with the surfaces they sum to the net wrench.
@@ -84,7 +103,7 @@ pub struct Reply {
     pub effect_surface_forces: Vec<[f32; 3]>,
     /// How far the state lies outside the box in which the effects were seen.
     pub effects_outside: OutsideBox,
-    /// Added mass and inertia by rows, forces first [kg, kg m, kg m2], where there is such an effect.
+    /// Added mass and inertia by rows, forces first [kg, kg m, kg m2], of base and effects together.
     pub added_mass: Option<[f32; 36]>,
     /// The server's own time [ns].
     pub compute_ns: u64,
@@ -97,6 +116,13 @@ impl Reply {
             force: single(&load.force),
             point: single(&load.point),
             wetted_fraction: load.wetted_fraction as f32,
+            couple: single(&load.couple),
+        };
+        let base = |base: &wade_core::forces::Base| BaseReply {
+            water_level: base.water_level as f32,
+            bed_clearance: base.bed_clearance as f32,
+            bed: base.bed as f32,
+            damping: by_rows(&base.damping),
         };
         Self {
             version: model.version(),
@@ -106,6 +132,8 @@ impl Reply {
             moment: single(&forces.wrench.moment),
             about: single(&model.vehicle().center_of_mass),
             uncertainty: single(&forces.uncertainty),
+            moment_uncertainty: single(&forces.moment_uncertainty),
+            base: forces.base.as_ref().map(base),
             outside: Outside { excess: forces.outside.excess.map(|excess| f64::from(excess as f32)) },
             effects: effects.loads.iter().map(EffectReply::from).collect(),
             effect_surface_forces: effects.surface_forces.iter().map(single).collect(),

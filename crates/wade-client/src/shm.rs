@@ -5,11 +5,12 @@ use std::time::{Duration, Instant};
 use tonic::Code;
 
 use super::shm_link::{Lost, ShmLink, not_served};
-use super::{ClientError, EffectReply, Reply, SurfaceReply};
+use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply};
 use wade_core::effects::{Effect, LeftOut};
 use wade_wire::State;
 use wade_wire::shm::layout::{
-    Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, MAX_BATCH, Names, Query, Status, SurfaceAnswer,
+    Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, HAS_DAMPING, MAX_BATCH, Names, Query, Status,
+    SurfaceAnswer,
 };
 use wade_wire::shm::{self, Wait};
 
@@ -131,7 +132,14 @@ impl From<&Answer> for Reply {
             force: load.force_n,
             point: load.point_m,
             wetted_fraction: load.wetted_fraction,
+            couple: load.couple_nm,
         };
+        let base = (answer.flags & HAS_DAMPING != 0).then_some(BaseReply {
+            water_level: answer.water_level_m,
+            bed_clearance: answer.bed_clearance_m,
+            bed: answer.bed,
+            damping: answer.damping,
+        });
         let effect = |load: &EffectAnswer| {
             Some(EffectReply {
                 effect: Effect::from_code(load.effect)?,
@@ -148,6 +156,8 @@ impl From<&Answer> for Reply {
             moment: answer.moment_nm,
             about: answer.about_m,
             uncertainty: answer.force_deviation_n,
+            moment_uncertainty: answer.moment_deviation_nm,
+            base,
             outside: answer.outside(),
             effects: answer.effects().iter().filter_map(effect).collect(),
             effect_surface_forces: match answer.effect_count {

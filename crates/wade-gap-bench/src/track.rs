@@ -2,7 +2,7 @@
 
 use super::Wrench6;
 use super::profile::Profile;
-use wade_core::condition::{Condition, GroundContact};
+use wade_core::condition::Condition;
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_learn::recordings::generated::{Motion as RunMotion, Run};
 
@@ -42,15 +42,12 @@ impl State {
     /// The same for a query, in still water.
     pub fn condition(&self) -> Condition {
         Condition {
-            velocity: self.velocity,
-            ground_velocity: self.velocity,
             angular_velocity: self.angular_velocity,
             acceleration: self.acceleration,
             angular_acceleration: self.angular_acceleration,
-            depth: self.depth,
             density: DENSITY,
             up: up_from_roll_pitch(self.attitude[0], self.attitude[1]),
-            ground_contact: GroundContact::Wetted,
+            ..Condition::level(self.velocity, self.depth)
         }
     }
 

@@ -1,11 +1,12 @@
 //! The generated types to and from ours, by hand.
 
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Matrix6, Quaternion, UnitQuaternion};
 
 use wade_core::domain::{Domain, Outside, Quantity};
 use wade_core::effects::{self, BoxQuantity, EffectLoads, EffectsFile, OutsideBox};
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
+use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
 use wade_core::vehicle::{Surface, SurfaceKind};
 
@@ -25,7 +26,10 @@ pub fn state(message: &proto::State) -> Result<State, InvalidState> {
         acceleration: vector(&message.acceleration_mps2),
         angular_acceleration: vector(&message.angular_acceleration_radps2),
         gravity: message.attitude.as_ref().map_or(Ok(default.gravity), gravity)?,
-        depth: message.depth_m,
+        depth: message.depth_m.unwrap_or(f32::NAN),
+        water_level: message.water_level_m,
+        bed_clearance: message.bed_clearance_m,
+        bed: message.bed,
         density: message.density_kgpm3.unwrap_or(default.density),
         dry_contact: is_dry(message.ground_contact)?,
         heading: message.heading_rad.map_or_else(|| heading(message.attitude.as_ref()), |h| Ok(Some(h)))?,
@@ -37,7 +41,18 @@ pub fn state(message: &proto::State) -> Result<State, InvalidState> {
         },
         time_step: message.time_step_s,
         implicit_added_mass: message.implicit_added_mass,
+        physics: physics(message.physics)?,
     })
+}
+
+fn physics(code: i32) -> Result<Physics, InvalidState> {
+    match code {
+        0 => Ok(Physics::Full),
+        code => Physics::ALL
+            .into_iter()
+            .find(|physics| *physics as i32 == code)
+            .ok_or(InvalidState { field: Field::Physics, problem: Problem::Unknown }),
+    }
 }
 
 /// The heading of a quaternion; the other attitudes know none.
@@ -76,9 +91,10 @@ fn gravity(attitude: &Attitude) -> Result<[f32; 3], InvalidState> {
     Ok(single(&-up.into_inner()))
 }
 
-/// The states of a batch; every array is checked against the length of `depth_m`.
+/// The states of a batch; every array is checked against the length of `depth_m`, or of `water_level_m` where that is empty.
 pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<State>, Refusal> {
-    let len = message.depth_m.len();
+    let levels = if message.depth_m.is_empty() { &message.water_level_m } else { &message.depth_m };
+    let len = levels.len();
     if len == 0 {
         return Err(Refusal::EmptyBatch);
     }
@@ -95,6 +111,12 @@ pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<St
         rows(Field::AngularAcceleration, accelerations, len, default.angular_acceleration)?;
     let gravity = rows(Field::Gravity, &message.gravity_direction, len, default.gravity)?;
     let density = rows(Field::Density, &message.density_kgpm3, len, [default.density])?;
+    let depth = rows(Field::Depth, &message.depth_m, len, [f32::NAN])?;
+    let water_level = rows(Field::WaterLevel, &message.water_level_m, len, [f32::NAN])?;
+    let bed_clearance = rows(Field::BedClearance, &message.bed_clearance_m, len, [f32::NAN])?;
+    let bed = rows(Field::Bed, &message.bed, len, [f32::NAN])?;
+    let stated = |[value]: [f32; 1]| Some(value).filter(|value| !value.is_nan());
+    let physics = physics(message.physics)?;
     let dry_contact = is_dry(message.ground_contact)?;
     let heading = optional_rows::<1>(Field::Heading, &message.heading_rad, len)?;
     let depth_rate = optional_rows::<1>(Field::DepthRate, &message.depth_rate_mps, len)?;
@@ -106,7 +128,10 @@ pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<St
         acceleration: acceleration(i),
         angular_acceleration: angular_acceleration(i),
         gravity: gravity(i),
-        depth: message.depth_m[i],
+        depth: depth(i)[0],
+        water_level: stated(water_level(i)),
+        bed_clearance: stated(bed_clearance(i)),
+        bed: stated(bed(i)),
         density: density(i)[0],
         dry_contact,
         heading: heading(i).map(|[heading]| heading),
@@ -115,6 +140,7 @@ pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<St
         // the states of a batch do not follow each other
         time_step: 0.0,
         implicit_added_mass: message.implicit_added_mass,
+        physics,
     };
     Ok((0..len).map(state).collect())
 }
@@ -168,6 +194,8 @@ pub fn response(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> proto::Ev
             about_m: Some(vector3(&model.vehicle().center_of_mass)),
         }),
         uncertainty_n: Some(vector3(&forces.uncertainty)),
+        moment_uncertainty_nm: Some(vector3(&forces.moment_uncertainty)),
+        base: forces.base.as_ref().map(base),
         in_domain: forces.outside.is_inside(),
         outside: outside(&forces.outside, 0).collect(),
         bundle_version: model.version(),
@@ -182,7 +210,23 @@ pub fn response(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> proto::Ev
     reserve_surfaces(&mut response, model.vehicle().surfaces.len());
     let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
     push_surfaces(forces, force, point, &mut response.wetted_fraction);
+    response.surface_couple_nm.extend(forces.surfaces.iter().flat_map(|load| single(&load.couple)));
     response
+}
+
+fn base(base: &wade_core::forces::Base) -> proto::BaseAnswer {
+    proto::BaseAnswer {
+        water_level_m: base.water_level as f32,
+        bed_clearance_m: base.bed_clearance as f32,
+        bed: base.bed as f32,
+        shaft_power_w: base.shaft_power as f32,
+        damping: by_rows(&base.damping).to_vec(),
+    }
+}
+
+/// A matrix by rows, in the wire's precision.
+pub fn by_rows(matrix: &Matrix6<f64>) -> [f32; 36] {
+    std::array::from_fn(|i| matrix[(i / 6, i % 6)] as f32)
 }
 
 fn effect_load(load: &effects::EffectLoad) -> proto::EffectLoad {
@@ -200,7 +244,7 @@ fn left_out(load: &effects::EffectLoad) -> i32 {
 
 /// The added mass by rows, in the wire's precision.
 pub fn added_mass(effects: &EffectLoads) -> Option<[f32; 36]> {
-    effects.added_mass.map(|matrix| std::array::from_fn(|i| matrix[(i / 6, i % 6)] as f32))
+    effects.added_mass.as_ref().map(by_rows)
 }
 
 fn outside_box(outside: &OutsideBox, index: u32) -> impl Iterator<Item = proto::EffectOutside> + '_ {
@@ -215,6 +259,7 @@ fn outside_box(outside: &OutsideBox, index: u32) -> impl Iterator<Item = proto::
 fn reserve_surfaces(response: &mut proto::EvaluateResponse, surfaces: usize) {
     response.surface_force_n.reserve_exact(3 * surfaces);
     response.surface_point_m.reserve_exact(3 * surfaces);
+    response.surface_couple_nm.reserve_exact(3 * surfaces);
     response.wetted_fraction.reserve_exact(surfaces);
 }
 
@@ -244,6 +289,8 @@ pub fn batch_response(
         moment_nm: Vec::with_capacity(3 * len),
         about_m: Some(vector3(&model.vehicle().center_of_mass)),
         uncertainty_n: Vec::with_capacity(3 * len),
+        moment_uncertainty_nm: Vec::with_capacity(3 * len),
+        surface_couple_nm: Vec::with_capacity(3 * rows),
         bundle_version: model.version(),
         provenance: model.provenance().to_owned(),
         effect_force_n: Vec::with_capacity(3 * len * codes.len()),
@@ -266,6 +313,8 @@ pub fn push(
     response.force_n.extend(single(&forces.wrench.force));
     response.moment_nm.extend(single(&forces.wrench.moment));
     response.uncertainty_n.extend(single(&forces.uncertainty));
+    response.moment_uncertainty_nm.extend(single(&forces.moment_uncertainty));
+    response.base.extend(forces.base.as_ref().map(base));
     response.outside.extend(outside(&forces.outside, index));
     for load in &effects.loads {
         response.effect_force_n.extend(single(&load.wrench.force));
@@ -277,6 +326,7 @@ pub fn push(
     if with_surfaces {
         let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
         push_surfaces(forces, force, point, &mut response.wetted_fraction);
+        response.surface_couple_nm.extend(forces.surfaces.iter().flat_map(|load| single(&load.couple)));
         response.effect_surface_force_n.extend(effects.surface_forces.iter().flat_map(single));
     }
 }
@@ -298,6 +348,7 @@ pub fn summary(vehicle: &ServedVehicle) -> proto::VehicleSummary {
         surface_count: model.vehicle().surfaces.len() as u32,
         provenance: model.provenance().to_owned(),
         origin: vehicle.origin().to_owned(),
+        base: model.base_name().to_owned(),
     }
 }
 
@@ -412,7 +463,7 @@ mod tests {
         let q = UnitQuaternion::from_euler_angles(0.1, -0.2, 2.0).into_inner();
         let [w, x, y, z] = [q.w, q.i, q.j, q.k].map(|part| part as f32);
         let of = |attitude| {
-            let message = proto::State { depth_m: 0.1, attitude: Some(attitude), ..Default::default() };
+            let message = proto::State { depth_m: Some(0.1), attitude: Some(attitude), ..Default::default() };
             state(&message).expect("valid").heading
         };
         let heading = of(Attitude::WorldFromBody(proto::Quaternion { w, x, y, z })).expect("known");

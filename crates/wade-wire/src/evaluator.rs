@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 use super::state::CheckedState;
-use wade_core::effects::{EffectLoads, Session};
+use wade_core::effects::EffectLoads;
 use wade_core::forces::Forces;
-use wade_core::served::{Loads, ServedVehicle};
+use wade_core::served::{Loads, ServedVehicle, Session};
 
 /// What every transport does between its checks and its answer. Owned by one thread.
 #[derive(Debug, Default)]

@@ -10,7 +10,9 @@ pub mod shm;
 mod state;
 mod tensor_fault;
 
-pub use convert::{added_mass, batch, batch_response, push, response, single, state, summary, vehicle};
+pub use convert::{
+    added_mass, batch, batch_response, by_rows, push, response, single, state, summary, vehicle,
+};
 pub use evaluator::{Evaluated, Evaluator, nanoseconds_since};
 pub use refusal::{Overloaded, Refusal, UnknownVehicle};
 pub use sessions::Sessions;

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::hash::Hash;
 
-use wade_core::effects::Session;
+use wade_core::served::Session;
 
 /// Sessions by key.
 #[derive(Debug)]

@@ -2,9 +2,10 @@
 
 use nalgebra::UnitVector3;
 
-use wade_core::condition::{Condition, FRESH_WATER, GroundContact};
+use wade_core::condition::{Condition, FRESH_WATER, GroundContact, LEAST_UPRIGHT};
 use wade_core::effects::Circumstances;
 use wade_core::frame::Vec3;
+use wade_core::physics::Physics;
 
 /// A state as it travels: single precision, body frame, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,8 +22,14 @@ pub struct State {
     pub angular_acceleration: [f32; 3],
     /// Unit vector along gravity (down).
     pub gravity: [f32; 3],
-    /// Water depth [m].
+    /// Water surface above the ground-contact plane at the body origin [m]; NaN where `water_level` is given instead.
     pub depth: f32,
+    /// Signed height of the still-water plane above the body origin along up [m].
+    pub water_level: Option<f32>,
+    /// Distance from the ground-contact plane down to the bed [m].
+    pub bed_clearance: Option<f32>,
+    /// Share of the motion through the water that is motion over the bed, 0 to 1.
+    pub bed: Option<f32>,
     /// Density [kg/m3].
     pub density: f32,
     /// No water pressure under the contact patches.
@@ -37,6 +44,8 @@ pub struct State {
     pub time_step: f32,
     /// The caller integrates added mass himself.
     pub implicit_added_mass: bool,
+    /// How much of the physical base answers.
+    pub physics: Physics,
 }
 
 impl Default for State {
@@ -48,7 +57,10 @@ impl Default for State {
             acceleration: [0.0; 3],
             angular_acceleration: [0.0; 3],
             gravity: [0.0, 0.0, -1.0],
-            depth: 0.0,
+            depth: f32::NAN,
+            water_level: None,
+            bed_clearance: None,
+            bed: None,
             density: FRESH_WATER as f32,
             dry_contact: false,
             heading: None,
@@ -56,6 +68,7 @@ impl Default for State {
             wheel_speeds: None,
             time_step: 0.0,
             implicit_added_mass: false,
+            physics: Physics::Full,
         }
     }
 }
@@ -105,6 +118,8 @@ wade_core::named_enum! {
         WheelWaterLevel = 19 => "wheel_water_level_m",
         /// `flags`
         Flags = 20 => "flags",
+        /// `physics`
+        Physics = 21 => "physics",
     }
 }
 
@@ -137,10 +152,18 @@ pub enum Problem {
     Unsupported = 8,
     /// A value, but not the flag that says so.
     WithoutFlag = 9,
+    /// Neither a depth nor a water level.
+    NoLevel = 10,
+    /// A depth and a water level.
+    TwoLevels = 11,
+    /// A depth of a vehicle that lies on its side or its back.
+    NoDepth = 12,
+    /// Not between 0 and 1.
+    NoShare = 13,
 }
 
 impl Problem {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 13] = [
         Self::NotFinite,
         Self::TooLarge,
         Self::Negative,
@@ -150,6 +173,10 @@ impl Problem {
         Self::Count,
         Self::Unsupported,
         Self::WithoutFlag,
+        Self::NoLevel,
+        Self::TwoLevels,
+        Self::NoDepth,
+        Self::NoShare,
     ];
 
     /// The problem of a code of the shared-memory layout.
@@ -181,6 +208,14 @@ impl std::fmt::Display for InvalidState {
             Problem::Count => write!(f, "{name} must have four values, or none"),
             Problem::Unsupported => write!(f, "{name} is set, which this server does not support yet"),
             Problem::WithoutFlag => write!(f, "{name} has a value, but its flag is not set"),
+            Problem::NoLevel => write!(f, "{name} must be given, or water_level_m in its place"),
+            Problem::TwoLevels => write!(f, "{name} and depth_m are both given: give one of the two"),
+            Problem::NoDepth => write!(
+                f,
+                "{name} means nothing for a vehicle on its side or its back (body z within {:.0} degrees of level or below): give water_level_m",
+                LEAST_UPRIGHT.asin().to_degrees()
+            ),
+            Problem::NoShare => write!(f, "{name} must lie between 0 (parked) and 1 (driving)"),
             Problem::NotUnit => write!(f, "{name} must have length 1 (within {UNIT_TOLERANCE})"),
         }
     }
@@ -200,8 +235,9 @@ pub fn limit(field: Field) -> f64 {
         // a turn counter may have wound up
         Field::Heading => 1e6,
         Field::DepthRate | Field::WheelSpeed | Field::TimeStep => 1e3,
+        Field::WaterLevel | Field::BedClearance | Field::Bed => 1e3,
         // these are refused whatever their value
-        Field::WaterLevel | Field::BedClearance | Field::Bed | Field::WheelWaterLevel | Field::Flags => 1e3,
+        Field::WheelWaterLevel | Field::Flags | Field::Physics => 1e3,
     }
 }
 
@@ -246,7 +282,22 @@ impl State {
             wheel_speeds: wheel_speeds.transpose()?,
             time_step,
             implicit_added_mass: self.implicit_added_mass,
+            physics: self.physics,
         })
+    }
+
+    /// Depth and water level, of which one is given.
+    fn levels(&self, up: &UnitVector3<f64>) -> Result<(f64, Option<f64>), InvalidState> {
+        let wrong = |field: Field, problem: Problem| Err(InvalidState { field, problem });
+        match (self.depth.is_nan(), self.water_level) {
+            (true, Some(level)) => Ok((0.0, Some(scalar(Field::WaterLevel, level)?))),
+            (true, None) => wrong(Field::Depth, Problem::NoLevel),
+            (false, Some(_)) => wrong(Field::WaterLevel, Problem::TwoLevels),
+            (false, None) => {
+                let depth = scalar(Field::Depth, self.depth)?;
+                if up.z < LEAST_UPRIGHT { wrong(Field::Depth, Problem::NoDepth) } else { Ok((depth, None)) }
+            }
+        }
     }
 
     fn condition(&self) -> Result<Condition, InvalidState> {
@@ -256,9 +307,16 @@ impl State {
         if density <= 0.0 {
             return Err(InvalidState { field: Field::Density, problem: Problem::NotPositive });
         }
-        let depth = scalar(Field::Depth, self.depth)?;
-        if depth < 0.0 {
-            return Err(InvalidState { field: Field::Depth, problem: Problem::Negative });
+        let up = -direction(&self.gravity)?;
+        let (depth, water_level) = self.levels(&up)?;
+        let optional = |field: Field, value: Option<f32>| value.map(|value| scalar(field, value)).transpose();
+        let bed_clearance = optional(Field::BedClearance, self.bed_clearance)?;
+        if bed_clearance.is_some_and(|clearance| clearance < 0.0) {
+            return Err(InvalidState { field: Field::BedClearance, problem: Problem::Negative });
+        }
+        let stated_bed = optional(Field::Bed, self.bed)?;
+        if stated_bed.is_some_and(|bed| !(0.0..=1.0).contains(&bed)) {
+            return Err(InvalidState { field: Field::Bed, problem: Problem::NoShare });
         }
         Ok(Condition {
             velocity: velocity - current,
@@ -267,8 +325,11 @@ impl State {
             acceleration: vector(Field::Acceleration, &self.acceleration)?,
             angular_acceleration: vector(Field::AngularAcceleration, &self.angular_acceleration)?,
             depth,
+            water_level,
+            bed_clearance,
+            stated_bed,
             density,
-            up: -direction(&self.gravity)?,
+            up,
             ground_contact: if self.dry_contact { GroundContact::Dry } else { GroundContact::Wetted },
         })
     }
@@ -320,7 +381,12 @@ mod tests {
             (State { current: [0.0, f32::INFINITY, 0.0], ..good }, Field::Current, Problem::NotFinite),
             (State { angular_velocity: [0.0, 0.0, 1e9], ..good }, Field::AngularVelocity, Problem::TooLarge),
             (State { acceleration: [f32::NAN; 3], ..good }, Field::Acceleration, Problem::NotFinite),
-            (State { depth: -0.01, ..good }, Field::Depth, Problem::Negative),
+            (State { depth: f32::NAN, ..good }, Field::Depth, Problem::NoLevel),
+            (State { depth: f32::INFINITY, ..good }, Field::Depth, Problem::NotFinite),
+            (State { water_level: Some(0.1), ..good }, Field::WaterLevel, Problem::TwoLevels),
+            (State { gravity: [0.0, 0.0, 1.0], ..good }, Field::Depth, Problem::NoDepth),
+            (State { bed_clearance: Some(-0.1), ..good }, Field::BedClearance, Problem::Negative),
+            (State { bed: Some(1.5), ..good }, Field::Bed, Problem::NoShare),
             (State { density: 0.0, ..good }, Field::Density, Problem::NotPositive),
             (State { density: f32::NAN, ..good }, Field::Density, Problem::NotFinite),
             (State { gravity: [0.0, 0.0, -0.9], ..good }, Field::Gravity, Problem::NotUnit),
@@ -338,7 +404,8 @@ mod tests {
 
     #[test]
     fn a_current_is_subtracted() {
-        let state = State { velocity: [1.0, 0.0, 0.0], current: [0.25, 0.5, 0.0], ..State::default() };
+        let state =
+            State { velocity: [1.0, 0.0, 0.0], current: [0.25, 0.5, 0.0], depth: 0.1, ..State::default() };
         let checked = state.check().expect("valid");
         let condition = checked.condition();
         assert_eq!(condition.velocity, Vec3::new(0.75, -0.5, 0.0));

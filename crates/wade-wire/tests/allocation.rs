@@ -7,10 +7,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use common::{Numbers, VEHICLES, every_effect, model_on, served_with};
-use wade_core::effects::Session;
 use wade_core::forces::Forces;
 use wade_core::model::Workspace;
 use wade_core::model::kernel::Isa;
+use wade_core::served::Session;
 use wade_wire::Evaluator;
 
 thread_local! {

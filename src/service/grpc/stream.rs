@@ -11,7 +11,7 @@ use super::handlers::STATES_PER_TURN;
 use super::size_limit;
 use crate::metrics::Transport;
 use crate::service::call::{Call, Shared, answer_state};
-use wade_core::effects::Session;
+use wade_core::served::Session;
 use wade_wire::Refusal;
 use wade_wire::proto;
 

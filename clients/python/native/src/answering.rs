@@ -1,7 +1,7 @@
 //! From checked states to rows, with what the effects remember of each session.
 
-use wade_core::effects::Session;
 use wade_core::served::ServedVehicle;
+use wade_core::served::Session;
 use wade_wire::{Evaluator, InvalidState, Sessions, State};
 
 use crate::columns::push;

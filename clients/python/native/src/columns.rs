@@ -47,7 +47,8 @@ pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool) -> Vec<Column> {
         column("effect_surface_force_n", FLOAT, &[effect_surfaces, 3]),
         column("effects_outside", FLOAT, &[BoxQuantity::ALL.len()]),
     ];
-    if effects.iter().any(|effect| effect.effect() == Effect::AddedMass) {
+    let moves_water = effects.iter().any(|effect| effect.effect() == Effect::AddedMass);
+    if moves_water || vehicle.model().base().is_some() {
         columns.push(column("added_mass", FLOAT, &[6, 6]));
     }
     columns

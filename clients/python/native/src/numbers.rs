@@ -1,12 +1,14 @@
 //! States as the client passes them: single-precision numbers in the order of `State.floats`, and flags.
 
+use wade_core::physics::Physics;
 use wade_wire::State;
 use wade_wire::shm::layout::{
-    DRY_CONTACT, HAS_DEPTH_RATE, HAS_HEADING, HAS_WHEEL_SPEEDS, IMPLICIT_ADDED_MASS,
+    DRY_CONTACT, HAS_BED, HAS_BED_CLEARANCE, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_SPEEDS,
+    HYDROSTATIC, IMPLICIT_ADDED_MASS, QUASI_STEADY,
 };
 
 /// Numbers of a state.
-pub const NUMBERS: usize = 27;
+pub const NUMBERS: usize = 30;
 
 /// Bytes that are no rows of states.
 #[derive(Debug, thiserror::Error)]
@@ -29,6 +31,9 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
         front_right,
         rear_left,
         rear_right,
+        water_level,
+        bed_clearance,
+        bed,
         time_step,
     ] = numbers;
     let vector = |i: usize| [vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]];
@@ -48,6 +53,14 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
         wheel_speeds: has(HAS_WHEEL_SPEEDS).then_some([front_left, front_right, rear_left, rear_right]),
         time_step,
         implicit_added_mass: has(IMPLICIT_ADDED_MASS),
+        water_level: has(HAS_WATER_LEVEL).then_some(water_level),
+        bed_clearance: has(HAS_BED_CLEARANCE).then_some(bed_clearance),
+        bed: has(HAS_BED).then_some(bed),
+        physics: match flags & (HYDROSTATIC | QUASI_STEADY) {
+            HYDROSTATIC => Physics::Hydrostatic,
+            QUASI_STEADY => Physics::QuasiSteady,
+            _ => Physics::Full,
+        },
     }
 }
 

@@ -27,7 +27,7 @@ from .forces import BoxQuantity, Effect, Forces, LeftOut, Quantity
 from .in_process import InProcess
 from .latency import Latency, Percentiles
 from .rpc import GrpcClient
-from .state import GroundContact, State
+from .state import GroundContact, Physics, State
 from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ __all__ = [
     "LayoutMismatch",
     "LeftOut",
     "Percentiles",
+    "Physics",
     "Quantity",
     "Refused",
     "Reloaded",

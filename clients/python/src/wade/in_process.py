@@ -66,9 +66,9 @@ class InProcess:
         """The forces in N states of one vehicle, any number of them."""
         _check(timeout_s)
         rows = states.rows()
-        length = len(rows["depth_m"])
-        # a number that is not given is not read
-        numbers = np.zeros((length, _NUMBERS), "<f4")
+        length = states.length(rows)
+        # a number that is not given is not a number
+        numbers = np.full((length, _NUMBERS), np.nan, "<f4")
         start = 0
         for name, width in _WIDTHS.items():
             if name in rows:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from . import shm_layout as layout
 from .forces import Forces
-from .state import GroundContact, State
+from .state import GroundContact, Physics, State
 
 
 def session_numbers() -> Iterator[int]:
@@ -27,6 +27,16 @@ def flags(state: State) -> int:
         flags |= layout.HAS_DEPTH_RATE
     if state.wheel_speed_radps is not None:
         flags |= layout.HAS_WHEEL_SPEEDS
+    if state.water_level_m is not None:
+        flags |= layout.HAS_WATER_LEVEL
+    if state.bed_clearance_m is not None:
+        flags |= layout.HAS_BED_CLEARANCE
+    if state.bed is not None:
+        flags |= layout.HAS_BED
+    if state.physics == Physics.HYDROSTATIC:
+        flags |= layout.HYDROSTATIC
+    elif state.physics == Physics.QUASI_STEADY:
+        flags |= layout.QUASI_STEADY
     return flags
 
 

@@ -84,7 +84,8 @@ def evaluate_request(vehicle: str, state: State) -> Message:
     _without_session(state)
     request = _new("EvaluateRequest", vehicle=vehicle)
     message = request.state
-    message.depth_m = values[0]
+    if state.depth_m is not None:
+        message.depth_m = values[0]
     message.ground_contact = state.ground_contact
     if not state.is_default("density_kgpm3"):
         message.density_kgpm3 = values[1]
@@ -92,7 +93,15 @@ def evaluate_request(vehicle: str, state: State) -> Message:
         if not state.is_default(name):
             vector = getattr(message, name)
             vector.x, vector.y, vector.z = values[2 + 3 * i : 5 + 3 * i]
-    heading, rate, *wheels = values[TOLD_AT:TIME_STEP_AT]
+    heading, rate, *wheels, water_level, bed_clearance, bed = values[TOLD_AT:TIME_STEP_AT]
+    if state.water_level_m is not None:
+        message.water_level_m = water_level
+    if state.bed_clearance_m is not None:
+        message.bed_clearance_m = bed_clearance
+    if state.bed is not None:
+        message.bed = bed
+    if not state.is_default("physics"):
+        message.physics = state.physics
     if state.heading_rad is not None:
         message.heading_rad = heading
     if state.depth_rate_mps is not None:
@@ -122,9 +131,10 @@ def evaluate_batch_request(vehicle: str, states: State, surfaces: bool) -> tuple
         ground_contact=states.ground_contact,
         omit_surfaces=not surfaces,
         implicit_added_mass=states.implicit_added_mass,
+        physics=states.physics,
         **arrays,
     )
-    return request, len(rows["depth_m"])
+    return request, states.length(rows)
 
 
 _NO_SESSION = "{} must be left out: over gRPC a stream is a run of states, and there is no other; or use shared memory"

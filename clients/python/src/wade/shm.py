@@ -73,7 +73,7 @@ class ShmClient:
         """The forces in N states of one vehicle, which travel 256 at a time."""
         timeout_s, end = self._end(timeout_s)
         rows, flagged = states.rows(), flags(states)
-        length = len(rows["depth_m"])
+        length = states.length(rows)
         sessions = np.broadcast_to(states.sessions(length), length)
         with self._lock:
             forces: Forces | None = None
@@ -162,9 +162,10 @@ _WHEELS = TOLD["wheel_speed_radps"]
 
 
 def _query(sequence: int, wake_key: int, session: int, flags: int, floats: list[float]) -> bytes:
-    # in the order of the layout; water level, bed clearance, bed, further wheels and the wheels' levels are not set
-    stated, (heading, depth_rate, *wheels, time_step) = floats[:TOLD_AT], floats[TOLD_AT:]
-    values = (*stated, time_step, heading, depth_rate, *_NAN * 3, *wheels, *_NAN * (2 * layout.MAX_WHEELS - _WHEELS))
+    # in the order of the layout; further wheels and the wheels' levels are not set
+    stated, (heading, depth_rate, *wheels, level, clearance, bed, time_step) = floats[:TOLD_AT], floats[TOLD_AT:]
+    beyond = _NAN * (2 * layout.MAX_WHEELS - _WHEELS)
+    values = (*stated, time_step, heading, depth_rate, level, clearance, bed, *wheels, *beyond)
     try:
         return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *values)
     except OverflowError:

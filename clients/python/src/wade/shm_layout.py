@@ -38,6 +38,8 @@ HAS_WATER_LEVEL = 32
 HAS_BED_CLEARANCE = 64
 HAS_BED = 128
 HAS_WHEEL_LEVELS = 256
+HYDROSTATIC = 512
+QUASI_STEADY = 1024
 #: Flag of an answer: the server polls, so that waking it is of no use.
 SERVER_POLLS = 1
 #: Flag of an answer: the session begins with this query.
@@ -162,6 +164,7 @@ FIELDS = {
     18: "bed",
     19: "wheel_water_level_m",
     20: "flags",
+    21: "physics",
 }
 
 #: What is wrong with them, by code.
@@ -175,6 +178,10 @@ PROBLEMS = {
     7: "must have four values, or none",
     8: "is set, which this server does not support yet",
     9: "has a value, but its flag is not set",
+    10: "must be given, or water_level_m in its place",
+    11: "and depth_m are both given: give one of the two",
+    12: "means nothing for a vehicle on its side or its back: give water_level_m",
+    13: "must lie between 0 (parked) and 1 (driving)",
 }
 
 

@@ -22,6 +22,17 @@ class GroundContact(IntEnum):
     DRY = 2
 
 
+class Physics(IntEnum):
+    """How much of the physical base answers. The values are those of the wire."""
+
+    #: The pressure of still water.
+    HYDROSTATIC = 1
+    #: And drag and friction of the local velocity.
+    QUASI_STEADY = 2
+    #: And added mass, entry and the waves that the hull makes.
+    FULL = 3
+
+
 _REST = (0.0, 0.0, 0.0)
 _FRESH_WATER = 1000.0
 _LEVEL = (0.0, 0.0, -1.0)
@@ -38,7 +49,14 @@ VECTORS = (
     "gravity_direction",
 )
 #: Fields that may be None, which is not the same as 0: how many numbers each has.
-TOLD = {"heading_rad": 1, "depth_rate_mps": 1, "wheel_speed_radps": 4}
+TOLD = {
+    "heading_rad": 1,
+    "depth_rate_mps": 1,
+    "wheel_speed_radps": 4,
+    "water_level_m": 1,
+    "bed_clearance_m": 1,
+    "bed": 1,
+}
 #: Where the numbers of `State.floats` stand.
 TOLD_AT = len(SCALARS) + 3 * len(VECTORS)
 TIME_STEP_AT = TOLD_AT + sum(TOLD.values())
@@ -50,12 +68,13 @@ _UNTOLD = (math.nan,) * sum(TOLD.values())
 class State:
     """One state, or N of them for a batch. Body frame: x forward, y left, z up; SI units.
 
-    In a single state a vector is any sequence of three numbers. In a batch `depth_m` is `[N]`, a vector is `[N, 3]` or,
+    Exactly one of `depth_m` and `water_level_m` is given; of a vehicle on its side or its back the latter. In a single
+    state a vector is any sequence of three numbers. In a batch that one is `[N]`, a vector is `[N, 3]` or,
     where all have the same, `[3]`, and any other number `[N]` or one number. What is left out has the server's default.
     """
 
-    #: Undisturbed water surface above the ground-contact plane at the body origin [m].
-    depth_m: ArrayLike
+    #: Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
+    depth_m: ArrayLike | None = None
     #: Velocity over ground [m/s]; through the water where there is no current.
     velocity_mps: ArrayLike = _REST
     #: Velocity of the water over ground [m/s].
@@ -80,6 +99,14 @@ class State:
     #: Front left, front right, rear left, rear right [rad/s], `[4]` or `[N, 4]`. None: effects that need them are left
     #: out.
     wheel_speed_radps: ArrayLike | None = None
+    #: Signed height of the still-water plane above the body origin along up [m], in the place of `depth_m`.
+    water_level_m: ArrayLike | None = None
+    #: Distance from the ground-contact plane down to the bed [m]. None: on the bed until the vehicle floats.
+    bed_clearance_m: ArrayLike | None = None
+    #: Share of the motion through the water that is motion over the bed, 0 parked to 1 driving. None: from the velocities.
+    bed: ArrayLike | None = None
+    #: How much of the physical base answers, for tests. One for the whole batch.
+    physics: Physics = Physics.FULL
     #: Time since the state before it in the run [s]. 0: what effects remember stays as it is.
     time_step_s: ArrayLike = _NO_TIME
     #: The caller adds `Forces.added_mass` to a mass matrix of his own: the forces leave `-M_A nu_dot` out and keep the
@@ -103,7 +130,8 @@ class State:
         name = ""
         try:
             for name in SCALARS:
-                values.append(float(getattr(self, name)))
+                value = getattr(self, name)
+                values.append(math.nan if value is None else float(value))
             for name in VECTORS:
                 vector = getattr(self, name)
                 if vector is _DEFAULTS[name]:
@@ -111,7 +139,7 @@ class State:
                 else:
                     x, y, z = vector
                     values += (float(x), float(y), float(z))
-            if self.heading_rad is self.depth_rate_mps is self.wheel_speed_radps is None:
+            if all(getattr(self, name) is None for name in TOLD):
                 values += _UNTOLD
             else:
                 for name, count in TOLD.items():
@@ -128,13 +156,15 @@ class State:
 
         Raises `InvalidState` for a wrong shape and for an empty batch.
         """
-        depth = _array("depth_m", self.depth_m)
+        first = "depth_m" if self.depth_m is not None or self.water_level_m is None else "water_level_m"
+        given = getattr(self, first)
+        if given is None:
+            raise _wrong(first, "must be given, or water_level_m in its place")
+        depth = _array(first, given)
         if depth.ndim != 1 or depth.size == 0:
-            raise _wrong(
-                "depth_m", f"must have one value a state, [N] with N at least 1, got {_describe(self.depth_m)}"
-            )
-        rows = {"depth_m": depth}
-        told = [name for name in TOLD if getattr(self, name) is not None]
+            raise _wrong(first, f"must have one value a state, [N] with N at least 1, got {_describe(given)}")
+        rows = {first: depth}
+        told = [name for name in TOLD if getattr(self, name) is not None and name != first]
         for name in (*SCALARS[1:], *VECTORS, *told, "time_step_s"):
             count = 3 if name in VECTORS else TOLD.get(name, 1)
             shape = (depth.size,) if count == 1 else (depth.size, count)
@@ -143,6 +173,11 @@ class State:
                 raise _wrong(name, f"must have shape {shape} or {shape[1:]}, got {_describe(getattr(self, name))}")
             rows[name] = np.broadcast_to(array, shape)
         return rows
+
+    @staticmethod
+    def length(rows: dict[str, NDArray[np.float32]]) -> int:
+        """Number of states in the arrays of `rows`."""
+        return len(next(iter(rows.values())))
 
     def sessions(self, length: int | None) -> Any:
         """The number of the run of a single state (`length` None), or `[N]` of them. Raises `InvalidState`."""

@@ -2,12 +2,14 @@
 
 use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE, HAS_DAMPING,
-    HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, IMPLICIT_ADDED_MASS,
-    MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, Query, Status, SurfaceAnswer,
+    HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC,
+    IMPLICIT_ADDED_MASS, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, Status,
+    SurfaceAnswer,
 };
-use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, single};
+use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, by_rows, single};
 use wade_core::domain::{Outside, Quantity};
 use wade_core::effects::{BoxQuantity, OutsideBox};
+use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
 use wade_core::vehicle::MAX_SURFACES;
 
@@ -20,7 +22,9 @@ const QUERY_FLAGS: u64 = DRY_CONTACT
     | HAS_WATER_LEVEL
     | HAS_BED_CLEARANCE
     | HAS_BED
-    | HAS_WHEEL_LEVELS;
+    | HAS_WHEEL_LEVELS
+    | HYDROSTATIC
+    | QUASI_STEADY;
 
 /// Wheels that effects know of.
 const WHEELS: usize = 4;
@@ -31,17 +35,15 @@ impl Query {
         if self.flags & !QUERY_FLAGS != 0 {
             return Err(InvalidState { field: Field::Flags, problem: Problem::Unsupported });
         }
-        let unsupported = [
-            (HAS_WATER_LEVEL, Field::WaterLevel, std::slice::from_ref(&self.water_level_m)),
-            (HAS_BED_CLEARANCE, Field::BedClearance, std::slice::from_ref(&self.bed_clearance_m)),
-            (HAS_BED, Field::Bed, std::slice::from_ref(&self.bed)),
-            (HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m[..]),
-        ];
-        for (flag, field, values) in unsupported {
-            if self.has(flag, field, values)? {
-                return Err(InvalidState { field, problem: Problem::Unsupported });
-            }
+        if self.has(HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m)? {
+            return Err(InvalidState { field: Field::WheelWaterLevel, problem: Problem::Unsupported });
         }
+        let optional = |flag: u64, field: Field, value: f32| {
+            Ok::<_, InvalidState>(self.has(flag, field, &[value])?.then_some(value))
+        };
+        let water_level = optional(HAS_WATER_LEVEL, Field::WaterLevel, self.water_level_m)?;
+        let bed_clearance = optional(HAS_BED_CLEARANCE, Field::BedClearance, self.bed_clearance_m)?;
+        let bed = optional(HAS_BED, Field::Bed, self.bed)?;
         let heading = self.has(HAS_HEADING, Field::Heading, &[self.heading_rad])?;
         let depth_rate = self.has(HAS_DEPTH_RATE, Field::DepthRate, &[self.depth_rate_mps])?;
         let wheel_speeds = self.has(HAS_WHEEL_SPEEDS, Field::WheelSpeed, &self.wheel_speed_radps)?;
@@ -57,6 +59,9 @@ impl Query {
             angular_acceleration: self.angular_acceleration_radps2,
             gravity: self.gravity_direction,
             depth: self.depth_m,
+            water_level,
+            bed_clearance,
+            bed,
             density: self.density_kgpm3,
             dry_contact: self.flags & DRY_CONTACT != 0,
             heading: heading.then_some(self.heading_rad),
@@ -64,6 +69,12 @@ impl Query {
             wheel_speeds: wheel_speeds.then_some([a, b, c, d]),
             time_step: self.time_step_s,
             implicit_added_mass: self.flags & IMPLICIT_ADDED_MASS != 0,
+            physics: match self.flags & (HYDROSTATIC | QUASI_STEADY) {
+                0 => Physics::Full,
+                HYDROSTATIC => Physics::Hydrostatic,
+                QUASI_STEADY => Physics::QuasiSteady,
+                _ => return Err(InvalidState { field: Field::Physics, problem: Problem::Unknown }),
+            },
         })
     }
 
@@ -89,8 +100,16 @@ impl From<&State> for Query {
                 | flag(state.implicit_added_mass, IMPLICIT_ADDED_MASS)
                 | flag(state.heading.is_some(), HAS_HEADING)
                 | flag(state.depth_rate.is_some(), HAS_DEPTH_RATE)
-                | flag(state.wheel_speeds.is_some(), HAS_WHEEL_SPEEDS),
+                | flag(state.wheel_speeds.is_some(), HAS_WHEEL_SPEEDS)
+                | flag(state.water_level.is_some(), HAS_WATER_LEVEL)
+                | flag(state.bed_clearance.is_some(), HAS_BED_CLEARANCE)
+                | flag(state.bed.is_some(), HAS_BED)
+                | flag(state.physics == Physics::Hydrostatic, HYDROSTATIC)
+                | flag(state.physics == Physics::QuasiSteady, QUASI_STEADY),
             depth_m: state.depth,
+            water_level_m: state.water_level.unwrap_or(f32::NAN),
+            bed_clearance_m: state.bed_clearance.unwrap_or(f32::NAN),
+            bed: state.bed.unwrap_or(f32::NAN),
             density_kgpm3: state.density,
             velocity_mps: state.velocity,
             current_mps: state.current,
@@ -120,6 +139,14 @@ impl Answer {
         self.moment_nm = single(&forces.wrench.moment);
         self.about_m = single(&model.vehicle().center_of_mass);
         self.force_deviation_n = single(&forces.uncertainty);
+        self.moment_deviation_nm = single(&forces.moment_uncertainty);
+        if let Some(base) = &forces.base {
+            self.water_level_m = base.water_level as f32;
+            self.bed_clearance_m = base.bed_clearance as f32;
+            self.bed = base.bed as f32;
+            self.damping = by_rows(&base.damping);
+            self.flags |= HAS_DAMPING;
+        }
         for (slot, excess) in self.outside.iter_mut().zip(forces.outside.excess) {
             *slot = excess as f32;
         }
@@ -129,13 +156,15 @@ impl Answer {
         for (slot, load) in self.surfaces.iter_mut().zip(&forces.surfaces) {
             slot.force_n = single(&load.force);
             slot.point_m = single(&load.point);
+            slot.couple_nm = single(&load.couple);
             slot.wetted_fraction = load.wetted_fraction as f32;
+        }
+        if let Some(matrix) = added_mass(effects) {
+            self.added_mass = matrix;
+            self.flags |= HAS_ADDED_MASS;
         }
         if effects.loads.is_empty() {
             return;
-        }
-        if let Some(matrix) = added_mass(effects) {
-            (self.flags, self.added_mass) = (HAS_ADDED_MASS, matrix);
         }
         for (slot, excess) in self.effects_outside.iter_mut().zip(effects.outside) {
             *slot = excess as f32;

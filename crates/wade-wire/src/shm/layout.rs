@@ -107,6 +107,10 @@ pub const HAS_BED_CLEARANCE: u64 = 64;
 pub const HAS_BED: u64 = 128;
 /// Flag of [`Query::flags`]: `wheel_water_level_m` is set.
 pub const HAS_WHEEL_LEVELS: u64 = 256;
+/// Flag of [`Query::flags`]: of the physical base the pressure of still water alone.
+pub const HYDROSTATIC: u64 = 512;
+/// Flag of [`Query::flags`]: of the physical base the pressure of still water and the drag.
+pub const QUASI_STEADY: u64 = 1024;
 /// Flag of [`Answer::flags`]: the server polls, so that waking it is of no use.
 pub const SERVER_POLLS: u64 = 1;
 /// Flag of [`Answer::flags`]: the session begins with this query, at rest and dry. In the middle of a run it says that the

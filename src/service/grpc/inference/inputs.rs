@@ -10,8 +10,11 @@ use wade_wire::proto::inference::{InferParameter, ModelInferRequest};
 use wade_wire::{Field, InvalidState, Problem, Refusal, TensorFault};
 
 /// The inputs with their values a state, by the names of the arrays of a batch. All are FP32.
-pub const INPUTS: [(Field, usize); 11] = [
+pub const INPUTS: [(Field, usize); 14] = [
     (Field::Depth, 1),
+    (Field::WaterLevel, 1),
+    (Field::BedClearance, 1),
+    (Field::Bed, 1),
     (Field::Velocity, 3),
     (Field::Current, 3),
     (Field::AngularVelocity, 3),
@@ -74,9 +77,10 @@ fn names() -> String {
     INPUTS.map(|(field, _)| field.name()).join(", ")
 }
 
-/// The number of states: the rows of depth_m.
+/// The number of states: the rows of depth_m, or of water_level_m where there are none.
 fn rows(inputs: &[InferInputTensor], max: usize) -> Result<usize, Refusal> {
-    let depth = inputs.iter().find(|input| input.name == Field::Depth.name()).ok_or(TensorFault::NoDepth)?;
+    let named = |field: Field| inputs.iter().find(|input| input.name == field.name());
+    let depth = named(Field::Depth).or_else(|| named(Field::WaterLevel)).ok_or(TensorFault::NoDepth)?;
     let rows = match depth.shape.as_slice() {
         &[rows] => usize::try_from(rows).ok(),
         _ => None,
@@ -145,9 +149,10 @@ fn array(batch: &mut proto::EvaluateBatchRequest, field: Field) -> Option<&mut V
         Field::DepthRate => &mut batch.depth_rate_mps,
         Field::WheelSpeed => &mut batch.wheel_speed_radps,
         Field::Quaternion | Field::RollPitch | Field::GroundContact | Field::TimeStep => return None,
-        Field::WaterLevel | Field::BedClearance | Field::Bed | Field::WheelWaterLevel | Field::Flags => {
-            return None;
-        }
+        Field::WaterLevel => &mut batch.water_level_m,
+        Field::BedClearance => &mut batch.bed_clearance_m,
+        Field::Bed => &mut batch.bed,
+        Field::WheelWaterLevel | Field::Flags | Field::Physics => return None,
     })
 }
 
