@@ -23,12 +23,14 @@ use wade_core::vehicle::shipped;
 use wade_core::vehicle::spec::VehicleSpec;
 use wade_learn::files::StagedFile;
 
+use super::import::ImportVehicle;
 use super::running::Running;
 use super::{Vehicles, emit};
 
 /// Build, check and show vehicle bundles
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  wade vehicle import robot.urdf --out vehicles/robot
   wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover
   wade vehicle check vehicles/husky
   wade vehicle show husky
@@ -61,6 +63,7 @@ enum Command {
         #[arg(long)]
         sdf: bool,
     },
+    Import(ImportVehicle),
     /// Make the bundle of a vehicle that comes with wade, from its dimensions
     #[command(after_help = "Example: wade vehicle generate husky --out vehicles/husky")]
     Generate {
@@ -175,6 +178,7 @@ impl Vehicle {
                 build(&text, &bytes, &out, Made { seal, sdf })
                     .with_context(|| format!("{} with {}", stl.display(), spec.display()))?;
             }
+            Command::Import(command) => command.run()?,
             Command::Generate { vehicle, out } => {
                 let (shipped, text) = match vehicle {
                     Shipped::Husky => (shipped::husky()?, shipped::HUSKY_SPEC),
