@@ -14,6 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use wade_core::vehicle::Vehicle;
 use wade_learn::dataset::import::{Format, Import, LEFT_OUT};
+use wade_learn::dataset::lift;
 use wade_learn::dataset::sections::Sections;
 use wade_learn::dataset::split::{self, By};
 use wade_learn::dataset::summary::Summary;
@@ -263,10 +264,10 @@ impl ImportCases {
             Solver::Fluent => (Format::Fluent, "fluent"),
         };
         let vehicles = read_vehicles(&self.vehicles, self.vehicle.iter())?;
-        let names = |vehicle: Vehicle| vehicle.surfaces.into_iter().map(|surface| surface.name).collect();
+        let names = |vehicle: &Vehicle| vehicle.surfaces.iter().map(|surface| surface.name.clone()).collect();
         let import = Import {
             format,
-            vehicles: vehicles.into_iter().map(|(name, vehicle)| (name, names(vehicle))).collect(),
+            vehicles: vehicles.iter().map(|(name, vehicle)| (name.clone(), names(vehicle))).collect(),
             sections,
             cut_off: if self.running { CutOff::Drop } else { CutOff::Refuse },
             provenance: self.provenance.unwrap_or_else(|| name.to_owned()),
@@ -290,6 +291,9 @@ impl ImportCases {
                 "warning: {count} of the cases, `{first}` the first, have no moments: where their forces act can neither be \
                  trained on nor judged"
             );
+        }
+        for question in lift::questions(&data, &vehicles) {
+            eprintln!("warning: {question}");
         }
         write(&self.out, &data)
     }

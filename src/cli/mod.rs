@@ -6,6 +6,7 @@ mod doctor;
 mod eval;
 mod gap;
 mod gap_bench;
+mod import;
 mod log;
 mod log_limit;
 mod outside;

@@ -18,18 +18,21 @@ use wade_core::geometry::distance::SignedDistanceGrid;
 use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::geometry::mesh::Mesh;
 use wade_core::physics::Radiation;
-use wade_core::vehicle::build::build_reporting;
+use wade_core::vehicle::build::{Built, build_reporting};
+use wade_core::vehicle::plausible::{Floating, Rounded, questions};
 use wade_core::vehicle::shipped;
 use wade_core::vehicle::spec::VehicleSpec;
 use wade_learn::files::StagedFile;
 use wade_learn::panel_code::Capytaine;
 
+use super::import::ImportVehicle;
 use super::running::Running;
 use super::{Vehicles, emit};
 
 /// Build, check and show vehicle bundles
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  wade vehicle import robot.urdf --out vehicles/robot
   wade vehicle build --stl rover.stl --spec rover.toml --out vehicles/rover
   wade vehicle check vehicles/husky
   wade vehicle show husky
@@ -62,6 +65,7 @@ enum Command {
         #[arg(long)]
         sdf: bool,
     },
+    Import(ImportVehicle),
     /// Make the bundle of a vehicle that comes with wade, from its dimensions
     #[command(after_help = "Example: wade vehicle generate husky --out vehicles/husky")]
     Generate {
@@ -194,6 +198,7 @@ impl Vehicle {
                 build(&text, &bytes, &out, Made { seal, sdf })
                     .with_context(|| format!("{} with {}", stl.display(), spec.display()))?;
             }
+            Command::Import(command) => command.run()?,
             Command::Generate { vehicle, out } => {
                 let (shipped, text) = match vehicle {
                     Shipped::Husky => (shipped::husky()?, shipped::HUSKY_SPEC),
@@ -341,9 +346,27 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
         true => Some(bundle::read(out).context("the bundle in place cannot be read; move it away first")?),
         false => None,
     };
-    let (vehicle, sealing) = build_reporting(&spec, stl, made.seal)?;
+    let Built { vehicle, tidying, sealing, overlap_m3 } = build_reporting(&spec, stl, made.seal)?;
+    if !tidying.is_nothing() {
+        eprintln!(
+            "mended: {} corners joined that differed by rounding, {} faces without area dropped",
+            tidying.joined_corners, tidying.dropped_faces
+        );
+    }
     if let Some(sealing) = sealing {
-        eprintln!("sealed: {sealing:?}");
+        eprintln!("sealed: {sealing}");
+    }
+    if overlap_m3 > 0.0 {
+        let percent = 100.0 * overlap_m3 / vehicle.hull.mesh.volume();
+        eprintln!(
+            "warning: parts overlap: {:.3} l, {percent:.1} % of the volume, are displaced twice",
+            overlap_m3 * 1e3
+        );
+    }
+    let floating = Floating::of(&vehicle);
+    let summary = summary(&vehicle, &floating);
+    for question in questions(&vehicle, &floating) {
+        eprintln!("warning: {question}");
     }
     let distance = if made.sdf { Some(signed_distance(&vehicle.hull.mesh)?) } else { None };
     let vehicle_translation = vehicle.translation;
@@ -352,11 +375,17 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let bundle = Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance, spec };
     let version = bundle::succeed(out, bundle)?;
     let t = vehicle_translation;
-    println!("{}: version {version}, no weights yet", out.display());
+    println!("{}: version {version}, answers by physics alone until it is trained", out.display());
     if let Some(Bundle { vehicle, version, trained: Some(_), .. }) = before {
         println!("version {version} is kept: wade vehicle rollback {} puts it back", vehicle.name);
     }
-    println!("body frame = axes and scale of the STL, then moved by ({:.4}, {:.4}, {:.4}) m", t.x, t.y, t.z);
+    print!("{summary}");
+    println!(
+        "body frame = axes and scale of the STL, then moved by ({}, {}, {}) m",
+        Rounded(t.x),
+        Rounded(t.y),
+        Rounded(t.z)
+    );
     Ok(())
 }
 
@@ -372,6 +401,26 @@ fn panel_code(python: Option<PathBuf>, vehicle: &wade_core::vehicle::Vehicle) ->
     })?;
     bar.finish_and_clear();
     Ok(radiation)
+}
+
+/// Size, mass, displaced volume and floating position, a line each.
+pub(super) fn summary(vehicle: &wade_core::vehicle::Vehicle, floating: &Floating) -> String {
+    let d = &vehicle.dimensions;
+    let mut text = format!("length {:.3} m, width {:.3} m, height {:.3} m\n", d.length, d.width, d.height);
+    // writing to a String cannot fail
+    let _ = writeln!(
+        text,
+        "mass {:.3} kg, displaced volume {:.3} l",
+        vehicle.mass,
+        floating.displaced_volume * 1e3
+    );
+    let _ = match floating.depth {
+        Some(depth) => {
+            writeln!(text, "floats in fresh water {depth:.3} m deep; trim {}", floating.trim_in_words())
+        }
+        None => writeln!(text, "does not float in fresh water: it weighs more than it displaces"),
+    };
+    text
 }
 
 /// The paper's grid, with a progress bar on a terminal.
@@ -472,7 +521,11 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     ));
     line(format!("{:<18} {:<7} {:>8}  centroid [m]            normal", "surface", "kind", "area m2"));
     for s in &vehicle.surfaces {
-        let vector = |v: &wade_core::frame::Vec3| format!("{:7.3} {:7.3} {:7.3}", v.x, v.y, v.z);
+        // a rounded zero has no sign
+        let vector = |v: &wade_core::frame::Vec3| {
+            let [x, y, z] = [v.x, v.y, v.z].map(|c| (c * 1e3).round() / 1e3 + 0.0);
+            format!("{x:7.3} {y:7.3} {z:7.3}")
+        };
         let kind = format!("{:?}", s.kind).to_lowercase();
         line(format!(
             "{:<18} {kind:<7} {:>8.4}  {} {}",

@@ -30,6 +30,7 @@ fn every_subcommand_shows_an_example() {
         "soak",
         "vehicle",
         "vehicle build",
+        "vehicle import",
         "vehicle generate",
         "vehicle check",
         "vehicle list",

@@ -19,6 +19,7 @@ mod gap_bench;
 mod gap_cli;
 mod grpc;
 mod http;
+mod import;
 mod inference;
 mod install;
 mod page;

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::{output, root};
 
 /// What each crate may depend on, and does.
-const EDGES: [(&str, &[&str]); 9] = [
+const EDGES: [(&str, &[&str]); 10] = [
     ("wade-core", &[]),
     ("wade-wire", &["wade-core"]),
     ("wade-client", &["wade-core", "wade-wire"]),
@@ -19,7 +19,12 @@ const EDGES: [(&str, &[&str]); 9] = [
     ("wade-gap", &["wade-core", "wade-learn"]),
     // blind: it does not know the workflow that it scores
     ("wade-gap-bench", &["wade-core", "wade-learn"]),
-    ("wade", &["wade-client", "wade-core", "wade-gap", "wade-gap-bench", "wade-learn", "wade-wire"]),
+    // files of robots and CAD programs to a vehicle: no learning, no server
+    ("wade-import", &["wade-core"]),
+    (
+        "wade",
+        &["wade-client", "wade-core", "wade-gap", "wade-gap-bench", "wade-import", "wade-learn", "wade-wire"],
+    ),
 ];
 
 /// The modules of a crate from the lowest layer to the highest, with the folder of its sources.

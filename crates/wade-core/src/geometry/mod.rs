@@ -1,7 +1,7 @@
 //! Geometry of a hull: from an STL file to the quantities that the forces are computed from.
 //!
 //! Everything here is in SI units; after `vehicle::build` it is in the body frame as well.
-//! Reading order: `mesh` and `stl` (triangles in and out), `parts`, `watertight` and `seal` (refuse or repair), `surfaces`
+//! Reading order: `mesh` and `stl` (triangles in and out), `parts`, `tidy`, `watertight` and `seal` (refuse or repair), `surfaces`
 //! (named patches), `immersion` and `hydrostatics` (clipping at the water plane, pressure), `submergence` (samples),
 //! `wetting` (pressure and wet area in the time of a query), `distance` (signed distance grid), `parametric` (closed parts by formula).
 
@@ -22,6 +22,8 @@ pub mod seal;
 pub mod stl;
 pub mod submergence;
 pub mod surfaces;
+#[cfg(feature = "build")]
+pub mod tidy;
 #[cfg(feature = "build")]
 pub mod watertight;
 pub mod wetting;

@@ -1,6 +1,6 @@
 //! The connected parts of a mesh: are their edges closed, how do they lie to each other?
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::mesh::{Bounds, Mesh};
 use super::parry::{Solid, convex_hull};
@@ -44,8 +44,55 @@ fn find(root: &mut [usize], mut face: usize) -> usize {
 }
 
 /// The undirected edges of a face, and whether the face runs along each from the smaller index to the larger.
-fn edges(&[a, b, c]: &[u32; 3]) -> [((u32, u32), bool); 3] {
+pub(super) fn edges(&[a, b, c]: &[u32; 3]) -> [((u32, u32), bool); 3] {
     [(a, b), (b, c), (c, a)].map(|(p, q)| ((p.min(q), p.max(q)), p < q))
+}
+
+/// How often each edge is run along from the smaller index to the larger, and back.
+fn edge_uses(mesh: &Mesh) -> HashMap<(u32, u32), (usize, usize)> {
+    let mut uses: HashMap<(u32, u32), (usize, usize)> = HashMap::new();
+    for (edge, forward) in mesh.faces.iter().flat_map(edges) {
+        let count = uses.entry(edge).or_default();
+        if forward { count.0 += 1 } else { count.1 += 1 }
+    }
+    uses
+}
+
+/// A connected set of edges whose faces do not cancel: the rim of a hole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hole {
+    /// Center of the box around its corners [m].
+    pub center: Vec3,
+    /// Diagonal of that box [m].
+    pub extent: f64,
+    /// Number of its edges.
+    pub edges: usize,
+}
+
+/// The rims of all holes, the largest first.
+pub fn holes(mesh: &Mesh) -> Vec<Hole> {
+    let uses = edge_uses(mesh);
+    let open = || uses.iter().filter(|(_, (forward, backward))| forward != backward).map(|(edge, _)| *edge);
+    let mut root: Vec<usize> = (0..mesh.vertices.len()).collect();
+    for (a, b) in open() {
+        let (a, b) = (find(&mut root, a as usize), find(&mut root, b as usize));
+        root[a.max(b)] = a.min(b);
+    }
+    let mut rims: BTreeMap<usize, (Bounds, usize)> = BTreeMap::new();
+    for (a, b) in open() {
+        let [p, q] = [a, b].map(|v| mesh.vertices[v as usize]);
+        let rim = rims.entry(find(&mut root, a as usize)).or_insert((Bounds { min: p, max: p }, 0));
+        rim.0 = Bounds { min: rim.0.min.inf(&p).inf(&q), max: rim.0.max.sup(&p).sup(&q) };
+        rim.1 += 1;
+    }
+    let hole = |(bounds, edges): (Bounds, usize)| Hole {
+        center: bounds.center(),
+        extent: bounds.extent().norm(),
+        edges,
+    };
+    let mut holes: Vec<Hole> = rims.into_values().map(hole).collect();
+    holes.sort_by(|a, b| b.extent.total_cmp(&a.extent));
+    holes
 }
 
 /// Counts of faulty edges.
@@ -57,14 +104,9 @@ pub(super) struct EdgeFaults {
 }
 
 impl EdgeFaults {
-    fn of(mesh: &Mesh) -> Self {
-        let mut uses: HashMap<(u32, u32), (usize, usize)> = HashMap::new();
-        for (edge, forward) in mesh.faces.iter().flat_map(edges) {
-            let count = uses.entry(edge).or_default();
-            if forward { count.0 += 1 } else { count.1 += 1 }
-        }
+    pub(super) fn of(mesh: &Mesh) -> Self {
         let mut faults = Self::default();
-        for count in uses.values() {
+        for count in edge_uses(mesh).values() {
             match *count {
                 // two bodies that share an edge have four faces there and are closed all the same
                 (forward, backward) if forward == backward => {}
@@ -77,7 +119,11 @@ impl EdgeFaults {
     }
 
     pub(super) fn closed(&self) -> bool {
-        self.open + self.non_manifold + self.inverted == 0
+        self.count() == 0
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.open + self.non_manifold + self.inverted
     }
 }
 
@@ -109,6 +155,11 @@ impl Part {
 
     pub(super) fn share_of_hull(&self) -> Option<f64> {
         convex_hull(&self.mesh.vertices).map(|hull| self.volume.abs() / hull.volume())
+    }
+
+    /// Center of its box [m].
+    pub(super) fn middle(&self) -> Vec3 {
+        self.bounds.center()
     }
 
     fn tolerance(&self) -> f64 {
@@ -154,4 +205,37 @@ impl Part {
             })
         })
     }
+
+    /// The common volume of two closed parts, counted on a grid over the box that they share.
+    pub(super) fn common_volume(&self, other: &Self) -> Common {
+        let (min, max) = (self.bounds.min.sup(&other.bounds.min), self.bounds.max.inf(&other.bounds.max));
+        let step = (max - min) / OVERLAP_POINTS as f64;
+        let (mut count, mut sum) = (0_usize, Vec3::zeros());
+        for index in 0..OVERLAP_POINTS.pow(3) {
+            let [i, j, k] = [index, index / OVERLAP_POINTS, index / OVERLAP_POINTS.pow(2)]
+                .map(|n| (n % OVERLAP_POINTS) as f64 + 0.5);
+            let point = min + Vec3::new(i, j, k).component_mul(&step);
+            if self.depth_inside(&point) > 0.0 && other.depth_inside(&point) > 0.0 {
+                count += 1;
+                sum += point;
+            }
+        }
+        let middle = (min + max) * 0.5;
+        Common {
+            volume: step.product() * count as f64,
+            center: if count > 0 { sum / count as f64 } else { middle },
+        }
+    }
+}
+
+/// Points a direction by which a common volume is counted: 5 % for a sphere.
+const OVERLAP_POINTS: usize = 20;
+
+/// What two parts share.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Common {
+    /// Volume [m3].
+    pub(super) volume: f64,
+    /// Its center [m].
+    pub(super) center: Vec3,
 }

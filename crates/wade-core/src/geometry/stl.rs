@@ -47,12 +47,6 @@ pub enum StlError {
         /// Index of the face in the file.
         face: usize,
     },
-    /// A face without area.
-    #[error("face {face} is degenerate: two corners coincide or all three lie on a line")]
-    Degenerate {
-        /// Index of the face in the file.
-        face: usize,
-    },
     /// An ASCII file that breaks the grammar.
     #[error("ASCII STL, line {line}: expected {expected}")]
     Grammar {
@@ -65,7 +59,8 @@ pub enum StlError {
 
 /// Reads a binary or ASCII STL in the file's own frame and unit; corners that are equal in f32 become one vertex.
 ///
-/// Stored normals are ignored: the winding decides.
+/// Stored normals are ignored: the winding decides. Faces without area are kept, since a mesh may need them to be closed;
+/// `tidy` drops those that it does not need.
 pub fn read_stl(bytes: &[u8]) -> Result<Mesh, StlError> {
     let is_binary =
         declared_faces(bytes).is_some_and(|n| n.checked_mul(RECORD) == Some(bytes.len() - HEADER));
@@ -86,6 +81,9 @@ fn read_binary(bytes: &[u8]) -> Result<Mesh, StlError> {
     let held = records.len();
     if declared != held || !records.remainder().is_empty() {
         return Err(StlError::FaceCount { declared, held, bytes: bytes.len() });
+    }
+    if held > MAX_FACES {
+        return Err(StlError::TooManyFaces { faces: held });
     }
     let mut welder = Welder::default();
     for record in records {
@@ -150,7 +148,7 @@ impl Welder {
         }
         let corners = corners.map(|c| self.vertex(c));
         self.mesh.faces.push(corners);
-        if is_degenerate(self.mesh.triangle(face)) { Err(StlError::Degenerate { face }) } else { Ok(()) }
+        Ok(())
     }
 
     fn vertex(&mut self, [x, y, z]: [f32; 3]) -> u32 {
@@ -164,11 +162,6 @@ impl Welder {
     fn finish(self) -> Result<Mesh, StlError> {
         if self.mesh.faces.is_empty() { Err(StlError::Empty) } else { Ok(self.mesh) }
     }
-}
-
-fn is_degenerate([a, b, c]: [Vec3; 3]) -> bool {
-    let longest = (b - a).norm_squared().max((c - a).norm_squared()).max((c - b).norm_squared());
-    (b - a).cross(&(c - a)).norm() <= 1e-9 * longest
 }
 
 /// Writes a binary STL in the mesh's own frame [m, rounded to f32].

@@ -65,16 +65,40 @@ impl Patch {
         (self.area_vector.norm() > 1e-3 * self.area).then(|| self.area_vector.normalize())
     }
 
-    /// True when `other` is this patch reflected in the plane through the origin across `axis`, within a millionth
-    /// of its size in area, centroid, normals and spread.
-    pub fn is_mirror_of(&self, other: &Self, axis: usize) -> bool {
+    /// How far `other` is from this patch reflected in the plane through the origin across `axis`: the largest of the
+    /// differences in centroid, and in area, normals and spread as lengths.
+    pub fn mirror_fault(&self, other: &Self, axis: usize) -> MirrorFault {
         let mut flip = Matrix3::identity();
         flip[(axis, axis)] = -1.0;
-        let (size, tolerance) = (self.area.sqrt(), 1e-6);
-        (self.area - other.area).abs() <= tolerance * self.area
-            && (flip * self.centroid - other.centroid).norm() <= tolerance * (size + self.centroid.norm())
-            && (flip * self.area_vector - other.area_vector).norm() <= tolerance * self.area
-            && (flip * self.spread * flip - other.spread).norm()
-                <= tolerance * self.area.max(self.spread.norm())
+        let size = self.area.sqrt();
+        let place = flip * self.centroid;
+        let spread = (flip * self.spread * flip - other.spread).norm() / self.spread.norm().sqrt().max(size);
+        let distance = (place - other.centroid)
+            .norm()
+            .max((self.area - other.area).abs() / size)
+            .max((flip * self.area_vector - other.area_vector).norm() / size)
+            .max(spread);
+        MirrorFault { distance, place, tolerance: MIRROR_TOLERANCE * (size + self.centroid.norm()) }
+    }
+}
+
+/// Share of its size by which a surface may miss its mirror image.
+const MIRROR_TOLERANCE: f64 = 1e-6;
+
+/// A surface beside the mirror image of its partner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MirrorFault {
+    /// By how much they differ [m].
+    pub distance: f64,
+    /// Centroid of the mirror image [m].
+    pub place: Vec3,
+    /// Difference that rounding explains [m].
+    pub tolerance: f64,
+}
+
+impl MirrorFault {
+    /// True for mirror images.
+    pub fn is_mirrored(&self) -> bool {
+        self.distance <= self.tolerance
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::patches::{assign, index_of};
+use super::plausible::{Implausible, check_size};
 use super::spec::{ContactSpec, PatchSpec, VehicleSpec};
 use super::{ContactPatch, Dimensions, Hull, Surface, SurfaceKind, Vehicle, VehicleError};
 use crate::frame::Vec3;
@@ -10,8 +11,9 @@ use crate::geometry::mesh::{Mesh, StlError, read_stl, write_stl};
 use crate::geometry::sampling::{Partners, sample_hull};
 use crate::geometry::seal::{Sealing, seal};
 use crate::geometry::submergence::SamplesError;
-use crate::geometry::surfaces::Patch;
-use crate::geometry::watertight::{Allowances, LeakError, check_allowing};
+use crate::geometry::surfaces::{MirrorFault, Patch};
+use crate::geometry::tidy::{Tidying, tidy};
+use crate::geometry::watertight::{Allowances, LeakError, inspect};
 
 /// Why no vehicle could be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -61,7 +63,10 @@ pub enum BuildError {
         name: String,
     },
     /// Mirror partners that are not mirror images although the file claims it.
-    #[error("`{name}` and `{partner}` are not mirror images; correct the patches or set {flag} = false")]
+    #[error(
+        "`{name}` and `{partner}` are not mirror images: the image of `{name}` about ({:.4}, {:.4}, {:.4}) m differs from `{partner}` by {:.6} m, and {:.7} m is allowed; correct the patches or set {flag} = false",
+        fault.place.x, fault.place.y, fault.place.z, fault.distance, fault.tolerance
+    )]
     NotMirrored {
         /// One surface.
         name: String,
@@ -69,20 +74,56 @@ pub enum BuildError {
         partner: String,
         /// The claim in the vehicle file.
         flag: &'static str,
+        /// By how much and where.
+        fault: MirrorFault,
     },
+    /// A claim of symmetry for a surface without counterpart.
+    #[error(
+        "`{name}` names no front_rear counterpart; name one, itself where it is its own mirror image, or set symmetric_front_rear = false"
+    )]
+    NoCounterpart {
+        /// The surface.
+        name: String,
+    },
+    /// No center of mass, or two.
+    #[error(
+        "state the center of mass once: center_of_mass_m from the center of the hull's bounding box, or center_of_mass_stl in the frame and unit of the STL"
+    )]
+    CenterOfMass,
+    /// A size and a mass that no vehicle has.
+    #[error(transparent)]
+    Implausible(#[from] Implausible),
+}
+
+/// A vehicle, and what had to be done to the mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Built {
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// Corners joined and faces dropped.
+    pub tidying: Tidying,
+    /// What sealing did; `None` when the mesh was sound.
+    pub sealing: Option<Sealing>,
+    /// Volume that overlapping parts displace twice [m3], where the vehicle file allows it.
+    pub overlap_m3: f64,
+}
+
+/// A hull whose faces have their surfaces already, for `build_from_hull`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AssignedHull {
+    /// Closed mesh, axes of the body, any origin [m].
+    pub mesh: Mesh,
+    /// The surface of each face, an index into the patches of the vehicle file.
+    pub face_surface: Vec<u16>,
 }
 
 /// Builds a vehicle; `sealed` allows leaky and double-skinned parts to be replaced by their convex hulls.
 pub fn build(spec: &VehicleSpec, stl: &[u8], sealed: bool) -> Result<Vehicle, BuildError> {
-    build_reporting(spec, stl, sealed).map(|(vehicle, _)| vehicle)
+    build_reporting(spec, stl, sealed).map(|built| built.vehicle)
 }
 
-/// As `build`, and says what sealing did; `None` when the mesh was sound.
-pub fn build_reporting(
-    spec: &VehicleSpec,
-    stl: &[u8],
-    sealed: bool,
-) -> Result<(Vehicle, Option<Sealing>), BuildError> {
+/// As `build`, and says what was done to the mesh.
+pub fn build_reporting(spec: &VehicleSpec, stl: &[u8], sealed: bool) -> Result<Built, BuildError> {
     let transform = spec.body_from_stl.matrix();
     let determinant = transform.determinant();
     if !(determinant > 0.0 && determinant.is_finite()) {
@@ -90,22 +131,47 @@ pub fn build_reporting(
     }
     let mut mesh = read_stl(stl)?;
     mesh.vertices.iter_mut().for_each(|v| *v = transform * *v);
-    let (mesh, sealing) = closed(mesh, spec, sealed)?;
+    let (mesh, tidying) = tidy(mesh);
+    let (mesh, sealing, overlap_m3) = closed(mesh, spec, sealed)?;
     let (mesh, translation) = centered(mesh)?;
-    let vehicle = assemble(spec, mesh, translation)?;
-    vehicle.validate()?;
-    Ok((vehicle, sealing))
+    let face_surface = assign(spec, &mesh)?;
+    let vehicle = assemble(spec, Hull { mesh, face_surface }, translation)?;
+    Ok(Built { vehicle, tidying, sealing, overlap_m3 })
 }
 
-fn closed(mesh: Mesh, spec: &VehicleSpec, sealed: bool) -> Result<(Mesh, Option<Sealing>), BuildError> {
+/// Builds a vehicle from a closed hull whose faces have their surfaces; the rules of the vehicle file are not used.
+///
+/// `center_of_mass_stl` and the mesh share one frame. Faces that the rounding of the bundle's STL makes vanish go.
+pub fn build_from_hull(spec: &VehicleSpec, hull: AssignedHull) -> Result<Vehicle, BuildError> {
+    let AssignedHull { mut mesh, face_surface } = hull;
+    let center = mesh.bounds().ok_or(LeakError::Empty)?.center();
+    mesh.vertices.iter_mut().for_each(|v| *v -= center);
+    let mesh = read_stl(&write_stl(&mesh))?;
+    let stays = |face: &usize| {
+        let [a, b, c] = mesh.faces[*face];
+        a != b && b != c && c != a
+    };
+    let kept: Vec<usize> = (0..mesh.faces.len()).filter(stays).collect();
+    let face_surface = kept.iter().map(|face| face_surface[*face]).collect();
+    // parts of the last face alone may be gone with it
+    let mesh = read_stl(&write_stl(&mesh.part(&kept)))?;
+    assemble(spec, Hull { mesh, face_surface }, -center)
+}
+
+/// The closed mesh, what sealing did, and the volume that overlapping parts displace twice [m3].
+fn closed(mesh: Mesh, spec: &VehicleSpec, sealed: bool) -> Result<(Mesh, Option<Sealing>, f64), BuildError> {
     let allow = Allowances { thin_parts: spec.allow_thin_parts, overlaps: spec.allow_overlaps };
-    match check_allowing(&mesh, allow) {
-        Ok(()) => Ok((mesh, None)),
+    let report = inspect(&mesh);
+    match report.verdict(allow) {
+        Ok(()) => Ok((mesh, None, report.overlap_volume())),
         Err(leak) if !sealed => Err(leak.into()),
         Err(_) => {
             let (mesh, sealing) = seal(&mesh);
-            check_allowing(&mesh, allow)?;
-            Ok((mesh, Some(sealing)))
+            // hulls may have flat faces
+            let (mesh, _) = tidy(mesh);
+            let report = inspect(&mesh);
+            report.verdict(allow)?;
+            Ok((mesh, Some(sealing), report.overlap_volume()))
         }
     }
 }
@@ -114,34 +180,50 @@ fn closed(mesh: Mesh, spec: &VehicleSpec, sealed: bool) -> Result<(Mesh, Option<
 fn centered(mut mesh: Mesh) -> Result<(Mesh, Vec3), BuildError> {
     let center = mesh.bounds().ok_or(LeakError::Empty)?.center();
     mesh.vertices.iter_mut().for_each(|v| *v -= center);
-    Ok((read_stl(&write_stl(&mesh))?, -center))
+    let rounded = read_stl(&write_stl(&mesh))?;
+    let (tidied, tidying) = tidy(rounded);
+    // rounding may join corners; a mesh that changed is numbered in the order of its file again
+    let mesh = if tidying.is_nothing() { tidied } else { read_stl(&write_stl(&tidied))? };
+    Ok((mesh, -center))
 }
 
-fn assemble(spec: &VehicleSpec, mesh: Mesh, translation: Vec3) -> Result<Vehicle, BuildError> {
-    let bounds = mesh.bounds().ok_or(LeakError::Empty)?;
+fn assemble(spec: &VehicleSpec, hull: Hull, translation: Vec3) -> Result<Vehicle, BuildError> {
+    let bounds = hull.mesh.bounds().ok_or(LeakError::Empty)?;
     let [length, width, height] = spec.dimensions_m.unwrap_or(bounds.extent().into());
     let dimensions = Dimensions { length, width, height };
     let z0 = spec.z0_m.unwrap_or(bounds.min.z);
-    let hull = Hull { face_surface: assign(spec, &mesh)?, mesh };
+    check_size(spec.mass_kg, &bounds, hull.mesh.volume())?;
     let surfaces = surfaces(spec, &hull)?;
-    let partners = partners(spec, &hull, &surfaces)?;
+    let symmetry = Symmetry::of(spec, &hull, &surfaces)?;
+    let partners = symmetry.partners(&surfaces);
     let inertia = spec.inertia_kg_m2.map_or_else(|| box_inertia(spec.mass_kg, &dimensions), rows);
-    Ok(Vehicle {
+    let vehicle = Vehicle {
         name: spec.name.clone(),
         dimensions,
         z0,
         mass: spec.mass_kg,
         inertia,
-        center_of_mass: Vec3::from(spec.center_of_mass_m),
+        center_of_mass: center_of_mass(spec, translation)?,
         body_from_stl: spec.body_from_stl,
         translation,
-        symmetric_left_right: spec.symmetric_left_right,
-        symmetric_front_rear: spec.symmetric_front_rear,
+        symmetric_left_right: symmetry.left_right,
+        symmetric_front_rear: symmetry.front_rear,
         contacts: spec.contact.iter().map(|c| contact(spec, c, &surfaces, z0)).collect::<Result<_, _>>()?,
         samples: sample_hull(&hull, &partners, z0)?,
         surfaces,
         hull,
-    })
+    };
+    vehicle.validate()?;
+    Ok(vehicle)
+}
+
+/// In the body frame [m].
+fn center_of_mass(spec: &VehicleSpec, translation: Vec3) -> Result<Vec3, BuildError> {
+    match (spec.center_of_mass_m, spec.center_of_mass_stl) {
+        (Some(center), None) => Ok(Vec3::from(center)),
+        (None, Some(center)) => Ok(spec.body_from_stl.matrix() * Vec3::from(center) + translation),
+        _ => Err(BuildError::CenterOfMass),
+    }
 }
 
 fn rows(rows: [[f64; 3]; 3]) -> Matrix3<f64> {
@@ -184,27 +266,63 @@ fn normal(spec: &PatchSpec, moments: &Patch) -> Vec3 {
     })
 }
 
-/// The partners whose points may be mirrored, after the file's claims of symmetry have been checked.
-fn partners(spec: &VehicleSpec, hull: &Hull, surfaces: &[Surface]) -> Result<Vec<Partners>, BuildError> {
-    let moments: Vec<Option<Patch>> = (0..surfaces.len()).map(|s| hull.patch(s)).collect();
-    let claim = |index: usize, partner: usize, axis: usize, flag: &'static str| {
-        let mirrored = moments[index].zip(moments[partner]).is_some_and(|(a, b)| a.is_mirror_of(&b, axis));
-        let (name, partner_name) = (surfaces[index].name.clone(), surfaces[partner].name.clone());
-        if mirrored {
-            Ok(partner)
-        } else {
-            Err(BuildError::NotMirrored { name, partner: partner_name, flag })
-        }
-    };
-    let one = |(index, s): (usize, &Surface)| {
-        let left_right = spec.symmetric_left_right.then_some(s.mirror_left_right);
-        let front_rear = s.mirror_front_rear.filter(|_| spec.symmetric_front_rear);
-        Ok(Partners {
-            left_right: left_right.map(|p| claim(index, p, 1, "symmetric_left_right")).transpose()?,
-            front_rear: front_rear.map(|p| claim(index, p, 0, "symmetric_front_rear")).transpose()?,
+/// Across which planes the hull is its own mirror image.
+#[derive(Debug, Clone, Copy)]
+struct Symmetry {
+    left_right: bool,
+    front_rear: bool,
+}
+
+impl Symmetry {
+    /// What the vehicle file claims, checked; what the mesh says where it claims nothing.
+    fn of(spec: &VehicleSpec, hull: &Hull, surfaces: &[Surface]) -> Result<Self, BuildError> {
+        let moments: Vec<Option<Patch>> = (0..surfaces.len()).map(|s| hull.patch(s)).collect();
+        let left_right = |index: usize| Some(surfaces[index].mirror_left_right);
+        let front_rear = |index: usize| surfaces[index].mirror_front_rear;
+        let left_right = mirrored(surfaces, &moments, left_right, 1);
+        let front_rear = mirrored(surfaces, &moments, front_rear, 0);
+        let decide = |claim: Option<bool>, found: Result<(), BuildError>| match claim {
+            Some(false) => Ok(false),
+            Some(true) => found.map(|()| true),
+            None => Ok(found.is_ok()),
+        };
+        Ok(Self {
+            left_right: decide(spec.symmetric_left_right, left_right)?,
+            front_rear: decide(spec.symmetric_front_rear, front_rear)?,
         })
-    };
-    surfaces.iter().enumerate().map(one).collect()
+    }
+
+    /// The partners whose points may be mirrored.
+    fn partners(self, surfaces: &[Surface]) -> Vec<Partners> {
+        let partners = |surface: &Surface| Partners {
+            left_right: self.left_right.then_some(surface.mirror_left_right),
+            front_rear: surface.mirror_front_rear.filter(|_| self.front_rear),
+        };
+        surfaces.iter().map(partners).collect()
+    }
+}
+
+/// Every surface and its partner are mirror images across the plane through the origin across `axis`.
+fn mirrored(
+    surfaces: &[Surface],
+    moments: &[Option<Patch>],
+    partner: impl Fn(usize) -> Option<usize>,
+    axis: usize,
+) -> Result<(), BuildError> {
+    let flag = if axis == 1 { "symmetric_left_right" } else { "symmetric_front_rear" };
+    for (index, surface) in surfaces.iter().enumerate() {
+        let name = surface.name.clone();
+        let Some(partner) = partner(index) else { return Err(BuildError::NoCounterpart { name }) };
+        let Some((a, b)) = moments[index].zip(moments[partner]) else {
+            return Err(BuildError::EmptyPatch { name });
+        };
+        let fault = a.mirror_fault(&b, axis);
+        if !fault.is_mirrored() {
+            let partner = surfaces[partner].name.clone();
+            return Err(BuildError::NotMirrored { name, partner, flag, fault });
+        }
+    }
+    Ok(())
 }
 
 fn contact(

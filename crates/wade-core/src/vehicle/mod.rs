@@ -7,6 +7,8 @@ pub mod build;
 #[cfg(feature = "build")]
 mod patches;
 #[cfg(feature = "build")]
+pub mod plausible;
+#[cfg(feature = "build")]
 pub mod shipped;
 pub mod spec;
 mod validate;

@@ -14,8 +14,13 @@ pub struct VehicleSpec {
     pub name: String,
     /// Mass [kg].
     pub mass_kg: f64,
-    /// Center of mass in the body frame [m].
-    pub center_of_mass_m: [f64; 3],
+    /// Center of mass in the body frame [m], whose origin is the center of the hull's bounding box; this or
+    /// `center_of_mass_stl`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub center_of_mass_m: Option<[f64; 3]>,
+    /// Center of mass in the frame and the unit of the STL.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub center_of_mass_stl: Option<[f64; 3]>,
     /// Inertia about the center of mass [kg m2]; default: a solid box of the dimensions, an estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia_kg_m2: Option<[[f64; 3]; 3]>,
@@ -25,12 +30,13 @@ pub struct VehicleSpec {
     /// Height of the ground-contact plane in the body frame [m]; default: the lowest point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z0_m: Option<f64>,
-    /// Left and right are claimed, and checked, to be mirror images.
-    #[serde(default = "yes")]
-    pub symmetric_left_right: bool,
-    /// Front and rear are claimed, and checked, to be mirror images.
-    #[serde(default)]
-    pub symmetric_front_rear: bool,
+    /// Left and right are claimed, and checked, to be mirror images; default: what the mesh says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub symmetric_left_right: Option<bool>,
+    /// Front and rear are claimed, and checked, to be mirror images; default: what the mesh says, false where a surface
+    /// names no counterpart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub symmetric_front_rear: Option<bool>,
     /// Accept closed parts that fill little of their convex hull (frames that flood).
     #[serde(default)]
     pub allow_thin_parts: bool,
@@ -47,10 +53,6 @@ pub struct VehicleSpec {
     /// Contact patches of the tires.
     #[serde(default)]
     pub contact: Vec<ContactSpec>,
-}
-
-fn yes() -> bool {
-    true
 }
 
 /// Scale and axes of the STL; the hull is then centered on its bounding box.

@@ -40,6 +40,14 @@ pub enum VehicleError {
         /// The surface.
         name: String,
     },
+    /// A claim of symmetry for a surface without counterpart: no data of it could be mirrored.
+    #[error(
+        "surface `{name}` has no front_rear counterpart although the hull is symmetric_front_rear; name one in the vehicle file, or set symmetric_front_rear = false"
+    )]
+    NoCounterpart {
+        /// The surface.
+        name: String,
+    },
     /// The table from faces to surfaces does not fit.
     #[error("{entries} patch entries for {faces} faces, each must name one of {surfaces} surfaces")]
     FaceTable {
@@ -134,6 +142,9 @@ impl Vehicle {
             let back = |p: usize| partner(p).is_some_and(|p| p.mirror_front_rear == Some(index));
             if !left_right || !s.mirror_front_rear.is_none_or(back) {
                 return Err(VehicleError::Mirror { name });
+            }
+            if self.symmetric_front_rear && s.mirror_front_rear.is_none() {
+                return Err(VehicleError::NoCounterpart { name });
             }
         }
         Ok(())

@@ -15,6 +15,7 @@ pub mod fluent;
 pub mod history;
 pub mod import;
 pub mod label;
+pub mod lift;
 mod lines;
 mod merge;
 pub mod mirror;

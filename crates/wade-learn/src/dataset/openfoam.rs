@@ -3,7 +3,7 @@
 //! Three forms: vectors in parentheses (v1912), plain columns with the same names (v2212), and the Foundation's one
 //! `forces.dat` with the pressure and viscous parts of forces and moments and no totals. In all of them a run that was
 //! started again adds a folder named by its start time, and a file that is there already is not overwritten but joined by
-//! `force_<start time>.dat`. The header of all of them states the point that moments are taken about, `CofR`; a file
+//! `force_<time>.dat`, with the start time or the time of the first step. The header of all of them states the point that moments are taken about, `CofR`; a file
 //! that lost it is read, and says so.
 
 use std::fs;
@@ -79,6 +79,17 @@ pub enum OpenFoamError {
         /// What is wrong.
         fault: HistoryError,
     },
+    /// More than one run again from one start time, which no name puts in order.
+    #[error(
+        "{} and {} both come from runs that began again at one start time, and nothing says which is the later: move the other out of the folder",
+        .first.display(), .second.display()
+    )]
+    SeveralRuns {
+        /// One file.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
     /// A moment center that moves.
     #[error("{}: the moment center (CofR) differs from that of the files before", .path.display())]
     MomentCenter {
@@ -148,13 +159,15 @@ fn join(to: &mut Option<Loads>, later: Loads, since: f64) -> Result<(), OpenFoam
     Ok(())
 }
 
-/// The folders named by a time, in the order of time.
 /// True for the output of a function object that reports forces.
 pub fn has_forces(folder: &Path) -> bool {
-    let is_forces = |path: &Path| ["force.dat", "forces.dat"].iter().any(|name| path.join(name).exists());
+    let is_forces = |path: &Path| {
+        ["force", "forces"].iter().any(|stem| !matches!(runs(path, stem), Ok(runs) if runs.is_empty()))
+    };
     starts(folder).is_ok_and(|starts| starts.iter().any(|(_, path)| is_forces(path)))
 }
 
+/// The folders named by a time, in the order of time.
 fn starts(folder: &Path) -> Result<Vec<(f64, PathBuf)>, OpenFoamError> {
     let io = |fault| OpenFoamError::Io { path: folder.to_owned(), fault };
     let mut starts = Vec::new();
@@ -169,9 +182,33 @@ fn starts(folder: &Path) -> Result<Vec<(f64, PathBuf)>, OpenFoamError> {
 
 /// A file of a start time, and the one of a second run from the same time.
 fn parts(folder: &Path, start: f64, stem: &str, cut_off: CutOff) -> Result<Vec<Part>, OpenFoamError> {
-    let again = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    let paths = [format!("{stem}.dat"), format!("{stem}_{again}.dat")].map(|name| folder.join(name));
-    paths.into_iter().filter(|path| path.exists()).map(|path| Part::read(path, start, cut_off)).collect()
+    runs(folder, stem)?.into_iter().map(|path| Part::read(path, start, cut_off)).collect()
+}
+
+/// `<stem>.dat`, then `<stem>_<time>.dat`, whatever the time.
+fn runs(folder: &Path, stem: &str) -> Result<Vec<PathBuf>, OpenFoamError> {
+    let io = |fault| OpenFoamError::Io { path: folder.to_owned(), fault };
+    let (mut first, mut again) = (Vec::new(), Vec::new());
+    if !folder.is_dir() {
+        return Ok(first);
+    }
+    for entry in fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        let Some(rest) = name.strip_suffix(".dat").and_then(|name| name.strip_prefix(stem)) else { continue };
+        let is_time = |text: &str| text.parse::<f64>().is_ok_and(f64::is_finite);
+        match rest.strip_prefix('_') {
+            _ if rest.is_empty() => first.push(path),
+            Some(time) if is_time(time) => again.push(path),
+            _ => {}
+        }
+    }
+    again.sort();
+    if let [first, second, ..] = &again[..] {
+        return Err(OpenFoamError::SeveralRuns { first: first.clone(), second: second.clone() });
+    }
+    first.extend(again);
+    Ok(first)
 }
 
 /// One file: the groups of three columns by their names, and the rows.
@@ -312,6 +349,27 @@ mod tests {
             (plain("0 0 0", &[1.0, 9.0]), plain("0 0 0", &[9.5]), plain("0 0 0", &[10.5]));
         let files = [("10/force.dat", &*third), ("0/force.dat", &*first), ("9/force.dat", &*second)];
         assert_eq!(output(&files).unwrap().force.times(), [1.0, 9.0, 9.5, 10.5]);
+    }
+
+    #[test]
+    fn a_second_run_from_one_start_time_replaces_the_first() {
+        // the Foundation names it by its first step, others by the start time
+        for name in ["0/force_0.5.dat", "0/force_0.dat"] {
+            let (first, second) = (plain("0 0 0", &[0.5, 1.0, 9.0]), plain("0 0 0", &[0.5, 0.75]));
+            let load = output(&[("0/force.dat", &first), (name, &second)]).unwrap();
+            assert_eq!(load.force.times(), [0.5, 0.75], "{name}");
+            let alone = output(&[(name, &second)]).unwrap();
+            assert_eq!(alone.force.times(), [0.5, 0.75], "{name} alone");
+        }
+    }
+
+    #[test]
+    fn several_second_runs_are_refused_by_name() {
+        let run = plain("0 0 0", &[1.0]);
+        let files = [("0/force.dat", &*run), ("0/force_0.1.dat", &*run), ("0/force_0.2.dat", &*run)];
+        let error = output(&files).unwrap_err();
+        assert!(matches!(error, OpenFoamError::SeveralRuns { .. }), "{error}");
+        assert!(error.to_string().contains("force_0.1.dat") && error.to_string().contains("force_0.2.dat"));
     }
 
     #[test]

@@ -569,3 +569,37 @@ fn sets_of_cases_are_taken_alone() {
     both.keep_sets(&[other, "wide".into()]).unwrap();
     assert_eq!(both.samples.len(), all);
 }
+
+#[test]
+fn a_wrong_unit_or_half_a_hull_shows_beside_the_lift_at_rest() {
+    use wade_learn::dataset::lift::{Cause, questions};
+    let right = data(40);
+    assert_eq!(questions(&right, &vehicles()), []);
+    for (factor, cause) in [
+        (1e-3, Cause::OverDensity),
+        (0.5, Cause::HalfDomain),
+        (1e3, Cause::Unit),
+        (-1.0, Cause::Axis),
+        (0.1, Cause::NoHydrostaticPressure),
+        (4.0, Cause::Unknown),
+    ] {
+        let mut wrong = right.clone();
+        let warthogs = wrong.samples.iter_mut().filter(|sample| sample.vehicle == "warthog");
+        warthogs.flat_map(|sample| &mut sample.surfaces).for_each(|load| load.force *= factor);
+        let found = questions(&wrong, &vehicles());
+        assert_eq!(found.len(), 1, "{factor}: {found:?}");
+        assert_eq!((found[0].vehicle.as_str(), found[0].cause), ("warthog", cause), "{}", found[0]);
+        assert!(found[0].to_string().contains("Archimedes"));
+    }
+}
+
+#[test]
+fn the_vertical_force_of_our_own_cfd_raises_no_question() {
+    use wade_learn::dataset::lift::questions;
+    for vehicle in [husky(), warthog()] {
+        let campaigns = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../campaigns");
+        let data = dataset::read(&campaigns.join(&vehicle.name).join("sections.parquet")).unwrap();
+        let found = questions(&data, &vehicles());
+        assert!(found.is_empty(), "{}", found[0]);
+    }
+}

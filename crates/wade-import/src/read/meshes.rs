@@ -1,0 +1,140 @@
+//! Mesh files: by themselves the parts of a vehicle, or the shapes of a robot's links.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Isometry3;
+use wade_core::frame::Vec3;
+use wade_core::geometry::mesh::{Mesh, read_stl};
+use wade_core::geometry::parts::parts;
+use wade_core::geometry::tidy::{weld_tolerance, welded};
+
+use super::{Kind, ReadError, bytes, collada, gltf};
+use crate::file_name;
+use crate::limits::{MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
+use crate::scene::{Convention, Joint, Link, Role, Scene, Shape};
+
+/// A named part of a mesh file, in the frame of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Name in the file, or that of the file.
+    pub name: String,
+    /// Its faces.
+    pub mesh: Mesh,
+}
+
+/// The parts of a file.
+pub fn load(path: &Path) -> Result<Vec<Part>, ReadError> {
+    let parts = match Kind::of(path)? {
+        Kind::Obj => obj(path)?,
+        Kind::Gltf => gltf::load(path)?,
+        Kind::Collada => collada::load(path)?,
+        _ => {
+            let stl = |fault| ReadError::Stl { path: path.to_owned(), fault };
+            let mesh = read_stl(&bytes(path, MOST_MESH_BYTES)?).map_err(stl)?;
+            vec![Part { name: file_name(path), mesh }]
+        }
+    };
+    let faces: usize = parts.iter().map(|part| part.mesh.faces.len()).sum();
+    if faces > MOST_FACES {
+        return Err(ReadError::Faces { path: path.to_owned(), faces });
+    }
+    for part in &parts {
+        check(path, part)?;
+    }
+    Ok(parts)
+}
+
+fn check(path: &Path, part: &Part) -> Result<(), ReadError> {
+    let count = part.mesh.vertices.len();
+    let fault =
+        |what: String| ReadError::Mesh { path: path.to_owned(), what: format!("`{}`: {what}", part.name) };
+    if let Some(at) = part.mesh.vertices.iter().position(|v| !v.iter().all(|c| c.is_finite())) {
+        return Err(fault(format!("vertex {at} has a coordinate that is not a finite number")));
+    }
+    match part.mesh.faces.iter().position(|face| face.iter().any(|v| *v as usize >= count)) {
+        Some(at) => Err(fault(format!("face {at} names a vertex beyond the {count} that there are"))),
+        None => Ok(()),
+    }
+}
+
+fn obj(path: &Path) -> Result<Vec<Part>, ReadError> {
+    let mut reader = Cursor::new(bytes(path, MOST_MESH_BYTES)?);
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default()))
+        .map_err(|fault| ReadError::Obj { path: path.to_owned(), fault })?;
+    let part = |model: tobj::Model| {
+        let vertices = model.mesh.positions.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect();
+        let faces = model.mesh.indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
+        Part { name: model.name, mesh: Mesh { vertices, faces } }
+    };
+    Ok(models.into_iter().map(part).filter(|part| !part.mesh.faces.is_empty()).collect())
+}
+
+/// A vehicle of meshes alone: a link for each connected part, so that wheels can be recognized by their form.
+pub fn scene(files: &[PathBuf], kinds: &[Kind]) -> Result<Scene, ReadError> {
+    let mut links = Vec::new();
+    let mut faces = 0;
+    for path in files {
+        for part in load(path)? {
+            faces += part.mesh.faces.len();
+            if faces > MOST_FACES {
+                return Err(ReadError::Faces { path: path.clone(), faces });
+            }
+            for (number, mesh) in connected(&part.mesh).into_iter().enumerate() {
+                let name =
+                    if number == 0 { part.name.clone() } else { format!("{} part {number}", part.name) };
+                links.push(link(name, mesh));
+            }
+            if links.len() > MOST_LINKS {
+                return Err(ReadError::Many { path: path.clone(), what: "connected parts" });
+            }
+        }
+    }
+    let is_gltf = kinds.iter().all(|kind| *kind == Kind::Gltf);
+    let is_collada = kinds.iter().all(|kind| *kind == Kind::Collada);
+    let convention = match (is_gltf, is_collada) {
+        (true, _) => Convention::GLTF,
+        // turned and in meters by its own header
+        (_, true) => Convention::ROBOT,
+        _ => Convention::OPEN,
+    };
+    if links.is_empty() {
+        return Err(ReadError::Nothing { path: files[0].clone(), what: "triangle" });
+    }
+    let mut warnings = Vec::new();
+    if !is_gltf && kinds.contains(&Kind::Gltf) {
+        warnings
+            .push("glTF and other meshes are mixed: all are taken to have the same axes and unit".to_owned());
+    }
+    let notes = vec![format!("{} connected parts in {} files", links.len(), files.len())];
+    Ok(Scene { links, convention, notes, warnings })
+}
+
+/// The connected parts of a mesh, its corners joined first: the copies of a corner that a format writes for each face
+/// would make every face a part. A part with a cavity stays one with its shells.
+fn connected(mesh: &Mesh) -> Vec<Mesh> {
+    let (mesh, _) = welded(mesh, weld_tolerance(mesh));
+    let solid = |face: &[u32; 3]| face[0] != face[1] && face[1] != face[2] && face[2] != face[0];
+    let mesh = Mesh { faces: mesh.faces.iter().copied().filter(solid).collect(), vertices: mesh.vertices };
+    let shells: Vec<Mesh> = parts(&mesh).iter().map(|faces| mesh.part(faces)).collect();
+    // an inward shell is the cavity of another, or inside out: which of both is seen together alone
+    if shells.iter().any(|shell| shell.volume() <= 0.0) { vec![mesh] } else { shells }
+}
+
+fn link(name: String, mesh: Mesh) -> Link {
+    let shape = Shape { role: Role::Both, source: name.clone(), mesh };
+    Link {
+        name,
+        parent: None,
+        joint: Joint::Fixed,
+        pose: Isometry3::identity(),
+        shapes: vec![shape],
+        inertial: None,
+    }
+}

@@ -1,0 +1,9 @@
+//! What the import promises, on robots that the tests write themselves.
+
+mod bad_input;
+mod mass;
+mod solids;
+mod time;
+mod volume;
+mod wheels;
+mod write;

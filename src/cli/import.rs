@@ -1,0 +1,187 @@
+//! `wade vehicle import`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use wade_core::bundle::{self, Bundle};
+use wade_core::physics::Radiation;
+use wade_core::vehicle::Vehicle;
+use wade_core::vehicle::spec::Axis;
+use wade_import::{Imported, Options, Shapes};
+
+use super::emit;
+use super::vehicle::summary;
+
+/// Make a bundle from a robot description or meshes: URDF, SDF, MJCF, STL, OBJ, glTF
+///
+/// Shapes are placed, united where they overlap, and given surfaces by rule: a surface for each wheel, and front, rear,
+/// left, right and bottom of the body. What was guessed is printed, what looks wrong is a warning. A vehicle that
+/// cannot be made leaves nothing behind.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  wade vehicle import robot.urdf --out vehicles/robot
+  wade vehicle import hull.stl wheels.stl --scale 0.001 --mass 42 \\
+    --out vehicles/rover --json")]
+pub struct ImportVehicle {
+    /// One description with the meshes that it does not find by itself, or meshes that are the parts of one vehicle
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Folder of the bundle; one that is there is replaced, with the next version
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Name of the vehicle; in a folder of another name the bundle is DIR/NAME [default: the name of the folder]
+    #[arg(long)]
+    name: Option<String>,
+    /// Mass [kg] [default: the sum of the links]
+    #[arg(long, value_name = "KG")]
+    mass: Option<f64>,
+    /// Meters a unit of the files [default: what the format says; for STL and OBJ a guess by size]
+    #[arg(long, value_name = "METERS")]
+    scale: Option<f64>,
+    /// The axis of the files that points forward [default: x; z for glTF]
+    #[arg(long, value_enum, value_name = "AXIS", allow_hyphen_values = true)]
+    forward: Option<AxisName>,
+    /// The axis of the files that points up [default: z; y for glTF]
+    #[arg(long, value_enum, value_name = "AXIS", allow_hyphen_values = true)]
+    up: Option<AxisName>,
+    /// Which shapes of a link make its hull
+    #[arg(long, value_enum, default_value = "auto", value_name = "WHICH")]
+    shapes: ShapesName,
+    /// Close holes by flat caps, and say the volume before and after
+    #[arg(long)]
+    seal: bool,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ShapesName {
+    /// Those to be looked at; where they are open, those to collide
+    Auto,
+    /// Those to be looked at
+    Visual,
+    /// Those to collide
+    Collision,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum AxisName {
+    X,
+    #[value(name = "-x")]
+    MinusX,
+    Y,
+    #[value(name = "-y")]
+    MinusY,
+    Z,
+    #[value(name = "-z")]
+    MinusZ,
+}
+
+impl From<AxisName> for Axis {
+    fn from(name: AxisName) -> Self {
+        match name {
+            AxisName::X => Self::PlusX,
+            AxisName::MinusX => Self::MinusX,
+            AxisName::Y => Self::PlusY,
+            AxisName::MinusY => Self::MinusY,
+            AxisName::Z => Self::PlusZ,
+            AxisName::MinusZ => Self::MinusZ,
+        }
+    }
+}
+
+impl ImportVehicle {
+    /// Imports and writes the bundle.
+    pub fn run(self) -> Result<()> {
+        let (folder, name) = self.place()?;
+        // before the work
+        bundle::check_place(&folder, &name)?;
+        let options = Options {
+            name,
+            mass: self.mass,
+            scale: self.scale,
+            forward: self.forward.map(Axis::from),
+            up: self.up.map(Axis::from),
+            seal: self.seal,
+            shapes: match self.shapes {
+                ShapesName::Auto => Shapes::Auto,
+                ShapesName::Visual => Shapes::Visual,
+                ShapesName::Collision => Shapes::Collision,
+            },
+        };
+        let imported = wade_import::import(&self.files, &options)?;
+        let version = write_bundle(&folder, imported.vehicle.clone())?;
+        if self.json {
+            return emit(&format!("{:#}\n", document(&imported, &folder, version)));
+        }
+        for note in &imported.notes {
+            println!("{note}");
+        }
+        for warning in &imported.warnings {
+            eprintln!("warning: {warning}");
+        }
+        emit(&summary(&imported.vehicle, &imported.floating))?;
+        let surfaces: Vec<&str> =
+            imported.vehicle.surfaces.iter().map(|surface| surface.name.as_str()).collect();
+        println!("surfaces: {}", surfaces.join(", "));
+        println!("{}: version {version}", folder.display());
+        Ok(())
+    }
+
+    /// The folder of the bundle and the name of the vehicle, which are one.
+    fn place(&self) -> Result<(PathBuf, String)> {
+        let own = self.out.file_name().map(|name| name.to_string_lossy().into_owned());
+        match (&self.name, own) {
+            (Some(name), Some(own)) if *name == own => Ok((self.out.clone(), own)),
+            (Some(name), _) => Ok((self.out.join(name), name.clone())),
+            (None, Some(own)) => Ok((self.out.clone(), own)),
+            (None, None) => bail!("{} names no folder: add --name NAME", self.out.display()),
+        }
+    }
+}
+
+/// Writes a vehicle without weights as the next version of the bundle in its place, in one step of the file system.
+fn write_bundle(folder: &Path, vehicle: Vehicle) -> Result<u32> {
+    if let Some(parent) = folder.parent() {
+        std::fs::create_dir_all(parent).with_context(|| parent.display().to_string())?;
+    }
+    let radiation = Some(Radiation::estimate(&vehicle));
+    let bundle =
+        Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance: None, spec: None };
+    Ok(bundle::succeed(folder, bundle)?)
+}
+
+fn document(imported: &Imported, folder: &Path, version: u32) -> serde_json::Value {
+    let Imported { vehicle, floating, wheels, notes, warnings } = imported;
+    let surfaces = vehicle.surfaces.iter().map(|surface| {
+        json!({"name": surface.name, "kind": surface.kind, "area_m2": surface.area,
+            "centroid_m": surface.centroid.as_slice()})
+    });
+    let wheels = wheels.iter().map(|wheel| {
+        let center = wheel.center + vehicle.translation;
+        json!({"name": wheel.name, "source": wheel.source, "radius_m": wheel.radius, "width_m": wheel.width,
+            "center_m": center.as_slice(), "roundness": wheel.roundness})
+    });
+    let d = &vehicle.dimensions;
+    json!({
+        "name": vehicle.name,
+        "version": version,
+        "bundle": folder,
+        "surfaces": surfaces.collect::<Vec<_>>(),
+        "wheels": wheels.collect::<Vec<_>>(),
+        "length": d.length,
+        "width": d.width,
+        "height": d.height,
+        "mass": vehicle.mass,
+        "center_of_mass": vehicle.center_of_mass.as_slice(),
+        "displaced_volume": floating.displaced_volume,
+        "float_depth": floating.depth,
+        "trim_pitch_rad": floating.pitch,
+        "trim_roll_rad": floating.roll,
+        "notes": notes,
+        "warnings": warnings,
+    })
+}

@@ -1,0 +1,92 @@
+//! Promise: `wade vehicle import` writes a whole bundle or nothing, and says in JSON what it made.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+use wade_core::bundle;
+
+const CAR: &str = r#"<robot name="car">
+ <link name="base"><visual><origin xyz="0 0 0.07"/><geometry><box size="0.36 0.2 0.08"/></geometry></visual>
+  <inertial><mass value="3"/><inertia ixx="0.02" iyy="0.03" izz="0.04"/></inertial></link>
+ WHEELS</robot>"#;
+
+const WHEEL: &str = r#"<link name="NAME"><visual><origin rpy="1.5707963267948966 0 0"/><geometry><cylinder radius="0.05" length="0.06"/></geometry></visual>
+  <inertial><mass value="0.2"/><inertia ixx="1e-4" iyy="1e-4" izz="2e-4"/></inertial></link>
+ <joint name="j_NAME" type="continuous"><parent link="base"/><child link="NAME"/><origin xyz="X Y 0.05"/><axis xyz="0 1 0"/></joint>"#;
+
+fn car() -> String {
+    let wheel =
+        |(name, x, y): (&str, &str, &str)| WHEEL.replace("NAME", name).replace('X', x).replace('Y', y);
+    let wheels =
+        [("a", "0.12", "0.12"), ("b", "0.12", "-0.12"), ("c", "-0.12", "0.12"), ("d", "-0.12", "-0.12")];
+    CAR.replace("WHEELS", &wheels.map(wheel).concat())
+}
+
+fn import(folder: &Path, text: &str, further: &[&str]) -> Output {
+    let file = folder.join("car.urdf");
+    std::fs::write(&file, text).unwrap();
+    let out = folder.join("vehicles/car");
+    let fixed = ["vehicle", "import", file.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    Command::new(env!("CARGO_BIN_EXE_wade")).args([&fixed[..], further].concat()).output().unwrap()
+}
+
+#[test]
+fn a_robot_becomes_a_bundle_with_the_names_of_the_json() {
+    let folder = TempDir::new().unwrap();
+    let output = import(folder.path(), &car(), &["--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["name"], "car");
+    let surfaces: Vec<&str> = json["surfaces"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|surface| surface["name"].as_str().unwrap())
+        .collect();
+    let expected = "front rear left right bottom wheel_fl wheel_fr wheel_rl wheel_rr";
+    assert_eq!(surfaces, expected.split(' ').collect::<Vec<_>>());
+    let number = |name: &str| json[name].as_f64().unwrap();
+    for (name, value) in [("length", 0.36), ("width", 0.3), ("height", 0.11), ("mass", 3.8)] {
+        assert!((number(name) - value).abs() < 1e-6, "{name} {}", number(name));
+    }
+    // box and wheels less half of what they share
+    assert!((0.0065..0.0077).contains(&number("displaced_volume")), "{}", number("displaced_volume"));
+    assert!((0.03..0.11).contains(&number("float_depth")), "{}", number("float_depth"));
+    assert_eq!(json["warnings"].as_array().unwrap().len(), 0, "{}", json["warnings"]);
+    let bundle = bundle::read(&folder.path().join("vehicles/car")).unwrap();
+    assert!(
+        bundle.vehicle.symmetric_left_right && bundle.vehicle.symmetric_front_rear,
+        "a box with equal wheels"
+    );
+    assert_eq!(json["version"], bundle.version);
+}
+
+#[test]
+fn a_name_may_be_another_than_the_folder_and_the_mass_another_than_the_sum() {
+    let folder = TempDir::new().unwrap();
+    let output = import(folder.path(), &car(), &["--name", "rover", "--mass", "5"]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(said.contains("floats in fresh water") && said.contains("displaced volume"), "{said}");
+    assert!(!said.contains("-0.0"), "{said}");
+    let bundle = bundle::read(&folder.path().join("vehicles/car/rover")).unwrap();
+    assert_eq!((bundle.vehicle.name.as_str(), bundle.vehicle.mass), ("rover", 5.0));
+}
+
+#[test]
+fn an_import_that_fails_leaves_nothing_and_keeps_what_was_there() {
+    let folder = TempDir::new().unwrap();
+    let open = car().replace(r#"<box size="0.36 0.2 0.08"/>"#, r#"<mesh filename="no.stl"/>"#);
+    let output = import(folder.path(), &open, &[]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(!folder.path().join("vehicles").exists(), "nothing half-written");
+    assert!(import(folder.path(), &car(), &[]).status.success());
+    let place = folder.path().join("vehicles/car");
+    let before = bundle::read(&place).unwrap().version;
+    assert_eq!(import(folder.path(), &open, &[]).status.code(), Some(1));
+    assert_eq!(bundle::read(&place).unwrap().version, before);
+}
