@@ -49,6 +49,8 @@ def interpolate(points, t):
 
 
 def integral(points, start, end, step=0.0005):
+    if points[-1][0] < end:
+        return float("nan")  # the run ends before
     n = round((end - start) / step)
     values = []
     index = 0
