@@ -52,7 +52,12 @@ fn every_transport_names_the_same_bad_field_and_serves_the_next_request() {
     let served = Served::start();
     let good = State { depth: 0.1, ..State::default() };
     let bad = [
-        (State { depth: -1.0, ..good }, "depth_m"),
+        (State { depth: f32::INFINITY, ..good }, "depth_m"),
+        (State { depth: f32::NAN, ..good }, "depth_m"),
+        (State { water_level: Some(0.1), ..good }, "water_level_m"),
+        (State { gravity: [0.0, 0.0, 1.0], ..good }, "depth_m"),
+        (State { bed_clearance: Some(-1.0), ..good }, "bed_clearance_m"),
+        (State { bed: Some(2.0), ..good }, "bed"),
         (State { velocity: [f32::NAN, 0.0, 0.0], ..good }, "velocity_mps"),
         (State { density: 0.0, ..good }, "density_kgpm3"),
         (State { gravity: [0.0, 0.0, -2.0], ..good }, "gravity_direction"),

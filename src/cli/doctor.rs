@@ -358,7 +358,7 @@ fn ask(address: &Address, vehicle: &str) -> Result<u32, ClientError> {
             Client::Grpc(Box::new(GrpcClient::tcp(&url, vehicle, Method::Unary, TIMEOUT)?))
         }
     };
-    Ok(client.evaluate(&State::default())?.version)
+    Ok(client.evaluate(&State::still(0.0))?.version)
 }
 
 fn openfoam() -> Check {

@@ -31,6 +31,13 @@ pub fn warning(state: &StateArgs, outside: &Outside, domain: Option<&Domain>) ->
     let mut text =
         String::from("warning: the state is outside the training domain; these forces are not reliable\n");
     text += &lines(outside, domain);
+    text += &degrees(state);
+    Some(text)
+}
+
+/// A line for each angle of the attitude that is one of degrees.
+pub fn degrees(state: &StateArgs) -> String {
+    let mut text = String::new();
     for (flag, angle) in [("--roll", state.roll()), ("--pitch", state.pitch())] {
         // no attitude needs more than half a turn, so such a number is one of degrees
         if angle.abs() > PI {
@@ -39,7 +46,7 @@ pub fn warning(state: &StateArgs, outside: &Outside, domain: Option<&Domain>) ->
                 &format!("  {flag} {angle} is in radians: were {angle} degrees meant? {flag} {radians}\n");
         }
     }
-    Some(text)
+    text
 }
 
 /// A line for each quantity outside.

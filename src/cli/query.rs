@@ -96,7 +96,9 @@ impl Query {
     /// Prints the forces.
     pub fn run(self) -> Result<ExitCode> {
         let (mut client, about) = self.client()?;
-        let reply = client.evaluate(&self.state.state())?;
+        let reply = client
+            .evaluate(&self.state.state())
+            .inspect_err(|_| eprint!("{}", outside::degrees(&self.state)))?;
         let warnings = [
             outside::warning(&self.state, &reply.outside, about.domain.as_ref()),
             outside::effects_warning(&reply.effects_outside),

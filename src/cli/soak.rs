@@ -309,7 +309,7 @@ impl Soak {
         let start = Instant::now();
         for vehicle in &self.vehicle {
             loop {
-                match target.client(vehicle).and_then(|mut client| client.evaluate(&State::default())) {
+                match target.client(vehicle).and_then(|mut client| client.evaluate(&State::still(0.0))) {
                     Ok(_) => break,
                     Err(error @ ClientError::Refused { .. }) => return Err(error.into()),
                     Err(error) if server.is_none() || start.elapsed() > START => return Err(error.into()),
@@ -385,7 +385,7 @@ impl Target<'_> {
     /// A client that has had an answer.
     fn ask(&self, vehicle: &str) -> Result<Ask<'static>, ClientError> {
         let mut client = self.client(vehicle)?;
-        client.evaluate(&State::default())?;
+        client.evaluate(&State::still(0.0))?;
         Ok(Box::new(move |states| {
             client.compute(states).map_err(|error| match error {
                 ClientError::Timeout(_) => SendError::Lost,

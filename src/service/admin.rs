@@ -78,7 +78,10 @@ impl Reloader {
             match library.served(&name, self.isa) {
                 Ok(vehicle) => vehicles.push(vehicle),
                 Err(LibraryError::Bundle(BundleError { fault: Fault::NoWeights, .. })) => {
-                    tracing::warn!(vehicle = name, "not served: it has neither weights nor radiation.safetensors");
+                    tracing::warn!(
+                        vehicle = name,
+                        "not served: it has neither weights nor radiation.safetensors"
+                    );
                 }
                 Err(error) => return Err(error.into()),
             }

@@ -50,7 +50,7 @@ impl Probe {
     /// Whether a query is answered in this time.
     pub(crate) fn is_answered(&mut self, timeout: Duration) -> bool {
         self.sequence += 1;
-        let query = Query { sequence: self.sequence, ..Query::from(&State::default()) };
+        let query = Query { sequence: self.sequence, ..Query::from(&State::still(0.0)) };
         let Ok(pending) = self.client.send_copy(query) else { return false };
         let _ = self.wake.notify();
         let end = Instant::now() + timeout;

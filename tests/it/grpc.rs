@@ -264,7 +264,7 @@ fn a_stream_remembers_its_vehicle_and_ends_with_its_first_error() {
         let mut client = client(&served).await;
         let (sender, outgoing) = tokio::sync::mpsc::channel(8);
         let mut answers = None;
-        for (vehicle, depth) in [("husky", 0.1), ("", 0.12), ("warthog", 0.2), ("", -1.0)] {
+        for (vehicle, depth) in [("husky", 0.1), ("", 0.12), ("warthog", 0.2), ("", f32::INFINITY)] {
             sender.send(request(vehicle, depth)).await.expect("sent");
         }
         let outgoing = ReceiverStream::new(outgoing);

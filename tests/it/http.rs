@@ -23,8 +23,8 @@ fn address(served: &Served) -> SocketAddr {
 fn a_served_query_shows_in_the_metrics() {
     let served = Served::start();
     let mut client = served.tcp("husky", Method::Unary);
-    client.evaluate(&State { depth: 0.3, ..State::default() }).expect("answered");
-    client.evaluate(&State { depth: -0.1, ..State::default() }).expect_err("refused");
+    client.evaluate(&State::still(0.3)).expect("answered");
+    client.evaluate(&State::default()).expect_err("refused");
     post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
     post(address(&served), "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": -0.1}}"#);
     let text = get(address(&served), "/metrics").body;
@@ -245,7 +245,12 @@ fn bad_queries_are_refused_by_field_and_the_next_good_one_is_answered() {
         (r#"{"vehicle": "husky", "state": {"depth_m": "deep"}}"#, invalid("state.depth_m")),
         (r#"{"vehicle": "husky", "state": {"depth_m": 1e99}}"#, invalid("state.depth_m")),
         (r#"{"vehicle": "husky", "state": {"depth_m": "NaN"}}"#, invalid("state.depth_m")),
-        (r#"{"vehicle": "husky", "state": {"depth_m": -0.1}}"#, invalid("state.depth_m")),
+        (r#"{"vehicle": "husky", "state": {}}"#, invalid("state.depth_m")),
+        (
+            r#"{"vehicle": "husky", "state": {"depth_m": 0.1, "water_level_m": 0.1}}"#,
+            invalid("state.water_level_m"),
+        ),
+        (r#"{"vehicle": "husky", "state": {"depth_m": 0.1, "bed": 2}}"#, invalid("state.bed")),
         (r#"{"vehicle": "husky", "state": {"velocity_mps": [1, 2, 3]}}"#, invalid("state.velocity_mps")),
         (
             r#"{"vehicle": "husky", "state": {"velocity_mps": {"x": "Infinity"}}}"#,

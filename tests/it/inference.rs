@@ -312,7 +312,7 @@ fn a_wrong_tensor_is_named_and_the_next_request_is_answered() {
 
 /// Asks by a client that blocks, from a thread without a runtime.
 fn answers(served: &Served, vehicle: &str) -> bool {
-    let ask = || served.tcp(vehicle, Method::Unary).evaluate(&State::default()).is_ok();
+    let ask = || served.tcp(vehicle, Method::Unary).evaluate(&State::still(0.0)).is_ok();
     std::thread::scope(|scope| scope.spawn(ask).join().expect("joined"))
 }
 

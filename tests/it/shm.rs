@@ -12,8 +12,8 @@ use wade_client::{ClientError, ShmClient};
 use wade_wire::shm::Wait;
 use wade_wire::shm::layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, HAS_BED, HAS_BED_CLEARANCE, HAS_HEADING, HAS_WATER_LEVEL,
-    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, MAX_BATCH, MAX_WHEELS, Names, Query, SERVER_POLLS, Status,
-    SurfaceAnswer,
+    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, MAX_BATCH, MAX_WHEELS, Names, QUASI_STEADY, Query,
+    SERVER_POLLS, Status, SurfaceAnswer,
 };
 use wade_wire::{Field, InvalidState, Problem};
 
@@ -168,17 +168,19 @@ fn what_is_set_and_cannot_be_used_is_refused_by_name() {
     wheels[5] = 3.0;
     let six = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, f32::NAN, f32::NAN];
     let (level, clearance) = (0.1, 0.5);
-    use Problem::{Count, NotFinite, Unsupported, WithoutFlag};
+    use Problem::{
+        Count, Negative, NoLevel, NoShare, NotFinite, TwoLevels, Unknown, Unsupported, WithoutFlag,
+    };
     let cases = [
-        (Query { flags: HAS_WATER_LEVEL, water_level_m: level, ..good }, Field::WaterLevel, Unsupported),
+        (Query { flags: HAS_WATER_LEVEL, water_level_m: level, ..good }, Field::WaterLevel, TwoLevels),
         (Query { water_level_m: level, ..good }, Field::WaterLevel, WithoutFlag),
         (
-            Query { flags: HAS_BED_CLEARANCE, bed_clearance_m: clearance, ..good },
+            Query { flags: HAS_BED_CLEARANCE, bed_clearance_m: -clearance, ..good },
             Field::BedClearance,
-            Unsupported,
+            Negative,
         ),
         (Query { bed_clearance_m: 0.0, ..good }, Field::BedClearance, WithoutFlag),
-        (Query { flags: HAS_BED, bed: 1.0, ..good }, Field::Bed, Unsupported),
+        (Query { flags: HAS_BED, bed: 1.5, ..good }, Field::Bed, NoShare),
         (
             Query { flags: HAS_WHEEL_LEVELS, wheel_water_level_m: six, ..good },
             Field::WheelWaterLevel,
@@ -191,7 +193,8 @@ fn what_is_set_and_cannot_be_used_is_refused_by_name() {
         (Query { flags: HAS_HEADING, ..good }, Field::Heading, NotFinite),
         (Query { heading_rad: 0.0, ..good }, Field::Heading, WithoutFlag),
         (Query { flags: 1 << 63, ..good }, Field::Flags, Unsupported),
-        (Query { depth_m: f32::NAN, ..good }, Field::Depth, NotFinite),
+        (Query { depth_m: f32::NAN, ..good }, Field::Depth, NoLevel),
+        (Query { flags: HYDROSTATIC | QUASI_STEADY, ..good }, Field::Physics, Unknown),
     ];
     for (query, field, problem) in cases {
         let answer = asked(&raw, query);
@@ -214,7 +217,6 @@ fn what_no_model_answers_yet_is_unset_and_never_zero() {
         &surfaces.iter().flat_map(|load| [load.couple_nm, load.effect_force_n].concat()).collect::<Vec<_>>()
             [..],
         &answer.surfaces[surfaces.len()..].iter().flat_map(|load| load.force_n).collect::<Vec<_>>(),
-        &answer.moment_deviation_nm,
         &answer.effects_outside,
         &answer.outside[8..],
         &[answer.water_level_m, answer.bed_clearance_m, answer.bed],

@@ -132,7 +132,8 @@ impl From<&Answer> for Reply {
             force: load.force_n,
             point: load.point_m,
             wetted_fraction: load.wetted_fraction,
-            couple: load.couple_nm,
+            // of a bundle without the physical base it is not set
+            couple: load.couple_nm.map(|x| if x.is_nan() { 0.0 } else { x }),
         };
         let base = (answer.flags & HAS_DAMPING != 0).then_some(BaseReply {
             water_level: answer.water_level_m,

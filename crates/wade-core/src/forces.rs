@@ -4,7 +4,6 @@ use nalgebra::Matrix6;
 
 use crate::domain::Outside;
 use crate::frame::Vec3;
-use crate::vehicle::Dimensions;
 use crate::wrench::Wrench;
 
 /// The load on one surface, body frame.
@@ -54,16 +53,6 @@ pub struct Forces {
     pub outside: Outside,
     /// What the physical base tells; none of a bundle without one.
     pub base: Option<Base>,
-}
-
-/// Deviation of a moment whose forces have this one: their errors act a quarter of the hull from its middle, along each axis.
-pub fn moment_deviation(force: &Vec3, dimensions: &Dimensions) -> Vec3 {
-    let arm = Vec3::new(dimensions.length, dimensions.width, dimensions.height) * 0.25;
-    Vec3::new(
-        (force.y * arm.z).hypot(force.z * arm.y),
-        (force.x * arm.z).hypot(force.z * arm.x),
-        (force.x * arm.y).hypot(force.y * arm.x),
-    )
 }
 
 impl Forces {

@@ -88,6 +88,7 @@ fn evidence(report: &Report, trials: &Trials) -> Evidence {
         samples: report.samples,
         model_sha256: report.sources.model.clone(),
         weights_sha256: String::new(),
+        base: None,
         tool: report.sources.tool.clone(),
         closure: report.gap.held_out.get("all").and_then(|all| all.closure),
     }

@@ -210,7 +210,7 @@ pub fn response(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> proto::Ev
     reserve_surfaces(&mut response, model.vehicle().surfaces.len());
     let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
     push_surfaces(forces, force, point, &mut response.wetted_fraction);
-    response.surface_couple_nm.extend(forces.surfaces.iter().flat_map(|load| single(&load.couple)));
+    push_couples(forces, &mut response.surface_couple_nm);
     response
 }
 
@@ -259,7 +259,6 @@ fn outside_box(outside: &OutsideBox, index: u32) -> impl Iterator<Item = proto::
 fn reserve_surfaces(response: &mut proto::EvaluateResponse, surfaces: usize) {
     response.surface_force_n.reserve_exact(3 * surfaces);
     response.surface_point_m.reserve_exact(3 * surfaces);
-    response.surface_couple_nm.reserve_exact(3 * surfaces);
     response.wetted_fraction.reserve_exact(surfaces);
 }
 
@@ -268,6 +267,13 @@ fn push_surfaces(forces: &Forces, force: &mut Vec<f32>, point: &mut Vec<f32>, we
         force.extend(single(&load.force));
         point.extend(single(&load.point));
         wetted.push(load.wetted_fraction as f32);
+    }
+}
+
+/// Of a bundle without the physical base there are none.
+fn push_couples(forces: &Forces, couples: &mut Vec<f32>) {
+    if forces.base.is_some() {
+        couples.extend(forces.surfaces.iter().flat_map(|load| single(&load.couple)));
     }
 }
 
@@ -290,7 +296,6 @@ pub fn batch_response(
         about_m: Some(vector3(&model.vehicle().center_of_mass)),
         uncertainty_n: Vec::with_capacity(3 * len),
         moment_uncertainty_nm: Vec::with_capacity(3 * len),
-        surface_couple_nm: Vec::with_capacity(3 * rows),
         bundle_version: model.version(),
         provenance: model.provenance().to_owned(),
         effect_force_n: Vec::with_capacity(3 * len * codes.len()),
@@ -326,7 +331,7 @@ pub fn push(
     if with_surfaces {
         let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
         push_surfaces(forces, force, point, &mut response.wetted_fraction);
-        response.surface_couple_nm.extend(forces.surfaces.iter().flat_map(|load| single(&load.couple)));
+        push_couples(forces, &mut response.surface_couple_nm);
         response.effect_surface_force_n.extend(effects.surface_forces.iter().flat_map(single));
     }
 }

@@ -261,6 +261,11 @@ impl CheckedState {
 }
 
 impl State {
+    /// Level and at rest in fresh water of a depth [m].
+    pub fn still(depth: f32) -> Self {
+        Self { depth, ..Self::default() }
+    }
+
     /// The state with every field checked, or the first field that is wrong.
     pub fn check(&self) -> Result<CheckedState, InvalidState> {
         Ok(CheckedState { condition: self.condition()?, circumstances: self.circumstances()? })

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use super::place::{self, copy_folder, move_folder, sync_folder, write_synced};
 use super::source::{Source, read_bounded};
 use super::{
-    Bundle, BundleError, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, checksums, lock, read,
-    stage, staging_of, tensors,
+    Bundle, BundleError, Fault, NETWORK_FILE, SUMS_FILE, VEHICLE_FILE, VehicleFile, base_of, checksums, lock,
+    read, stage, staging_of, tensors,
 };
 use crate::at::At;
 use crate::digest::sha256;
@@ -104,10 +104,16 @@ pub fn apply(directory: &Path, effects: EffectsFile) -> Result<u32, BundleError>
     succeed(directory, bundle)
 }
 
-/// The bundle with these effects, fitted to its weights.
+/// The bundle with these effects, fitted to its weights and its base.
 pub(super) fn with_effects(bundle: Bundle, mut effects: EffectsFile) -> Result<Bundle, Fault> {
-    let Some((weights, _)) = &bundle.trained else { return Err(Fault::NoWeights) };
-    effects.evidence.weights_sha256 = sha256(&tensors::write_weights(weights));
+    let weights = bundle.trained.as_ref().map(|(weights, _)| weights);
+    if weights.is_none() && bundle.radiation.is_none() {
+        return Err(Fault::NoWeights);
+    }
+    let evidence = &mut effects.evidence;
+    evidence.weights_sha256 =
+        weights.map(|weights| sha256(&tensors::write_weights(weights))).unwrap_or_default();
+    evidence.base = base_of(weights, bundle.radiation.is_some()).map(str::to_owned);
     Ok(Bundle { effects: Some(effects), ..bundle })
 }
 

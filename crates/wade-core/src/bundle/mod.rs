@@ -38,7 +38,7 @@ use crate::geometry::stl::{read_stl, write_stl};
 use crate::geometry::submergence::Samples;
 use crate::geometry::surfaces::Hull;
 use crate::model::kernel::Isa;
-use crate::model::{Form, Model, Weights};
+use crate::model::{Model, PHYSICS, Weights};
 use crate::physics::{Base, Radiation};
 use crate::served::ServedVehicle;
 use crate::vehicle::Vehicle;
@@ -162,7 +162,7 @@ impl Files {
     ) -> Result<Bundle, BundleError> {
         let vehicle = self.vehicle(vehicle_file)?;
         Ok(Bundle {
-            effects: self.effects(&vehicle.name)?,
+            effects: self.effects(&vehicle.name, trained.as_ref().map(|(weights, _)| weights))?,
             vehicle,
             version: vehicle_file.version,
             trained,
@@ -203,19 +203,31 @@ impl Files {
         })
     }
 
-    fn effects(&self, vehicle: &str) -> Result<Option<EffectsFile>, BundleError> {
+    /// The effects, which belong to the weights and to the base under them.
+    fn effects(&self, vehicle: &str, weights: Option<&Weights>) -> Result<Option<EffectsFile>, BundleError> {
         if !self.files.contains_key(EFFECTS_FILE) {
             return Ok(None);
         }
         self.parse(EFFECTS_FILE, |bytes| {
             let effects = EffectsFile::parse(bytes, vehicle)?;
-            let weights = self.files.get(NETWORK_FILE).map(|bytes| sha256(bytes));
-            match weights.is_some_and(|sum| sum == effects.evidence.weights_sha256) {
-                true => Ok(Some(effects)),
-                false => Err(EffectsFileError::OtherWeights),
+            let sum = self.files.get(NETWORK_FILE).map(|bytes| sha256(bytes)).unwrap_or_default();
+            if sum != effects.evidence.weights_sha256 {
+                return Err(EffectsFileError::OtherWeights);
+            }
+            let expected = base_of(weights, self.files.contains_key(RADIATION_FILE)).map(str::to_owned);
+            let found = effects.evidence.base.clone();
+            if found == expected {
+                Ok(Some(effects))
+            } else {
+                Err(EffectsFileError::OtherBase { found, expected })
             }
         })
     }
+}
+
+/// What effects name as the base under weights; `None` of what came before the physical base.
+fn base_of(weights: Option<&Weights>, has_radiation: bool) -> Option<&'static str> {
+    (has_radiation && weights.is_none_or(Weights::takes_base)).then_some(PHYSICS)
 }
 
 /// Names of the folders that hold a bundle, sorted.
@@ -252,11 +264,10 @@ impl Source {
         let vehicle = files.vehicle(&vehicle_file)?;
         let trained = files.trained(&vehicle_file)?;
         let base = files.radiation()?.map(|radiation| Base::new(&vehicle, radiation));
-        let effects = files.effects(&vehicle.name)?;
+        let effects = files.effects(&vehicle.name, trained.as_ref().map(|(weights, _)| weights))?;
         let version = vehicle_file.version;
         let model = match (trained, base) {
-            // the paper's network answers the whole force, as published
-            (Some((weights, domain)), Some(base)) if matches!(weights.form, Form::Anchored(_)) => {
+            (Some((weights, domain)), Some(base)) if weights.takes_base() => {
                 Model::new(vehicle, version, domain, weights, isa).with_base(base)
             }
             (Some((weights, domain)), _) => Model::new(vehicle, version, domain, weights, isa),
@@ -339,7 +350,9 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
     if let Some(effects) = &bundle.effects {
         files.insert(EFFECTS_FILE, effects.to_toml().into_bytes());
         // nothing is written that would be refused when it is read
-        Files { directory: directory.to_owned(), files: files.clone() }.effects(&bundle.vehicle.name)?;
+        let weights = bundle.trained.as_ref().map(|(weights, _)| weights);
+        Files { directory: directory.to_owned(), files: files.clone() }
+            .effects(&bundle.vehicle.name, weights)?;
     }
     if let Some(spec) = &bundle.spec {
         files.insert(SPEC_FILE, spec.clone().into_bytes());

@@ -61,8 +61,11 @@ pub struct Evidence {
     pub samples: usize,
     /// Hash of the bundle that the effects were fitted to.
     pub model_sha256: String,
-    /// Hash of the weights in that bundle: with other weights the effects mean nothing.
+    /// Hash of the weights in that bundle: with other weights the effects mean nothing. Empty of a bundle without weights.
     pub weights_sha256: String,
+    /// What the weights stood on: "physics" for the physical base, and nothing for what came before it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<String>,
     /// Version and commit of the program.
     pub tool: String,
     /// Share of the gap above the noise that the effects close on trials that took no part.
@@ -188,6 +191,17 @@ pub enum EffectsFileError {
         "evidence.weights_sha256 is not that of the bundle's weights: effects are fitted to a model and go with it"
     )]
     OtherWeights,
+    /// Fitted to another base.
+    #[error(
+        "evidence.base is {}, and the bundle stands on {}: an effect is what a base lacks, so that it must be fitted again, by `wade gap`",
+        .found.as_deref().unwrap_or("a simple drag"), .expected.as_deref().unwrap_or("a simple drag")
+    )]
+    OtherBase {
+        /// In the file.
+        found: Option<String>,
+        /// Of the bundle.
+        expected: Option<String>,
+    },
     /// No effect.
     #[error("no [[effect]]: without an effect there is no file")]
     Empty,

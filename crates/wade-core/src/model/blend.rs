@@ -1,11 +1,11 @@
-//! The physical base with what was learnt beside it.
+//! The physical base with what was learned beside it.
 //!
 //! The learned part of a surface is its anchored load less the base's, both of the level part of the motion, and counts as far
-//! as the state is near those that the weights learnt from. Together it may spend power and never give any: where it would give
+//! as the state is near those that the weights were trained on. Together it may spend power and never give any: where it would give
 //! `P` to a hull whose base takes `P_0`, it is scaled by `k(r)` of `r = P / P_0`, 1 up to a half and `(1 - 1 / 4r) / r` from
 //! there, which is smooth and leaves `k r < 1`.
 
-use super::{Anchored, Learned, SPREAD, faded};
+use super::{Anchored, Learned, SPREAD, faded, moment_deviation};
 use crate::anchor::Reading;
 use crate::condition::Condition;
 use crate::domain::Quantity;
@@ -84,7 +84,7 @@ impl<'a> Blend<'a> {
             let answer = faded(output, 1.0);
             let force = known.force(&answer);
             let moment = known.moment(&answer) + known.center.cross(&force);
-            let share = trust * learned.learnt[*surface];
+            let share = trust * learned.coverage[*surface];
             self.learned[*surface] = (Wrench { force, moment } + base.load * -1.0) * share;
             doubtful += (force - base.load.force).abs() * Anchored::doubt(distance).min(share);
         }
@@ -127,7 +127,7 @@ impl<'a> Blend<'a> {
         let size = drag.force.norm().max(learned.force.norm());
         let unlearned = Vec3::repeat(BASE_DEVIATION * size) * (1.0 - self.weight);
         forces.uncertainty = self.learned_deviation * self.weight + unlearned;
-        forces.moment_uncertainty = forces::moment_deviation(&forces.uncertainty, &vehicle.dimensions);
+        forces.moment_uncertainty = moment_deviation(&forces.uncertainty, &vehicle.dimensions);
         let moved = base.moved_to(about);
         forces.base = Some(forces::Base {
             added_mass: moved.transpose() * loads.added_mass * moved,

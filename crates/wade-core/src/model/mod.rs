@@ -1,7 +1,7 @@
 //! A vehicle with what is known of its loads: condition in, forces out.
 //!
 //! There are three kinds. Weights alone, as the paper has them or anchored to a simple drag. The physical base alone
-//! ([`crate::physics`]). And the base with anchored weights: near the cases that these learnt from the answer is theirs, far from
+//! ([`crate::physics`]). And the base with anchored weights: near the cases that these were trained on the answer is theirs, far from
 //! them it is the base's, and [`Blend`] keeps the sum from ever putting power into the hull.
 
 mod blend;
@@ -16,11 +16,11 @@ use crate::anchor::{self, Anchor, Reading};
 use crate::condition::{Condition, GroundContact};
 use crate::domain::{Domain, Quantity};
 use crate::features;
-use crate::forces::{self, Forces, SurfaceForce};
+use crate::forces::{Forces, SurfaceForce};
 use crate::frame::Vec3;
 use crate::physics::drag::SurfaceDrag;
 use crate::physics::{Base, BaseLoads, Memory, Motion, Physics, STATED_NONE};
-use crate::vehicle::{MAX_SURFACES, Vehicle};
+use crate::vehicle::{Dimensions, MAX_SURFACES, Vehicle};
 use blend::Blend;
 use kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, MAX_OUTPUTS, StaticRows, WetSurface};
 
@@ -53,7 +53,7 @@ impl Default for Workspace {
     }
 }
 
-/// What weights that learnt nothing are labelled as.
+/// What weights that learned nothing are labelled as.
 pub const PHYSICS: &str = "physics";
 
 /// One version of a vehicle's bundle, ready to answer.
@@ -72,16 +72,16 @@ struct Learned {
     weights: Weights,
     kernel: Kernel,
     statics: StaticRows,
-    /// What is known of the vehicle before anything is learnt, where the weights build on it.
+    /// What is known of the vehicle before anything is learned, where the weights build on it.
     anchor: Option<Anchor>,
-    /// How much of the learnt part of each surface counts at most: nothing of one that no case wetted.
-    learnt: Vec<f64>,
+    /// How much of the learned part of each surface counts at most: nothing of one that no case wetted.
+    coverage: Vec<f64>,
 }
 
 impl Learned {
     fn new(vehicle: &Vehicle, weights: Weights, isa: Isa) -> Self {
         let network = &weights.network;
-        let (kernel, statics, anchor, learnt) = match &weights.form {
+        let (kernel, statics, anchor, coverage) = match &weights.form {
             Form::Paper(_) => {
                 let kernel = Kernel::new(network, (features::STATIC, features::DYNAMIC), isa);
                 let fixed =
@@ -93,11 +93,11 @@ impl Learned {
                 let kernel = Kernel::new(network, (anchor::STATIC, anchor::DYNAMIC), isa);
                 let anchor = Anchor::new(vehicle);
                 let statics = kernel.static_rows(&anchor.static_rows(vehicle));
-                let learnt = form.learnt(&anchor, vehicle);
-                (kernel, statics, Some(anchor), learnt)
+                let coverage = form.learnt(&anchor, vehicle);
+                (kernel, statics, Some(anchor), coverage)
             }
         };
-        Self { weights, kernel, statics, anchor, learnt }
+        Self { weights, kernel, statics, anchor, coverage }
     }
 
     /// What the network says of the wet surfaces of a reading, which are listed in `wet`.
@@ -123,7 +123,7 @@ impl Model {
         Self { vehicle, version, domain, learned, base: None }
     }
 
-    /// A vehicle of which nothing was learnt.
+    /// A vehicle of which nothing was learned.
     pub fn of_physics(vehicle: Vehicle, version: u32, base: Base) -> Self {
         Self { vehicle, version, domain: Domain::EVERYWHERE, learned: None, base: Some(base) }
     }
@@ -223,7 +223,7 @@ impl Model {
                 if let Some(learned) = learned.as_ref().filter(|_| motion.physics != Physics::Hydrostatic)
                     && let (Form::Anchored(form), Some(anchor)) = (&learned.weights.form, &learned.anchor)
                 {
-                    // learnt from hulls that neither rise nor turn
+                    // learned from hulls that neither rise nor turn
                     let level = blend::level(condition);
                     base.drag_into(&level, loads, level_drag);
                     anchor.read(&self.vehicle, &level, reading);
@@ -252,7 +252,7 @@ impl Model {
             (Form::Anchored(_), None) => unreachable!("made together by `new`"),
         }
         forces.sum_about(&self.vehicle.center_of_mass);
-        forces.moment_uncertainty = forces::moment_deviation(&forces.uncertainty, &self.vehicle.dimensions);
+        forces.moment_uncertainty = moment_deviation(&forces.uncertainty, &self.vehicle.dimensions);
     }
 
     fn evaluate_paper(
@@ -274,7 +274,7 @@ impl Model {
         forces.uncertainty = Vec3::from(form.held_out_rms) * condition.density;
     }
 
-    /// Hydrostatics and simple drag, and the network's remainder as far as the state is near those that it learnt from and the
+    /// Hydrostatics and simple drag, and the network's remainder as far as the state is near those that it was trained on and the
     /// surface was in the water there.
     fn evaluate_anchored(
         &self,
@@ -295,7 +295,7 @@ impl Model {
         let outputs = learned.answer(form, (reading, wet, buffers));
         let (mut doubtful, mut spread) = (Vec3::zeros(), 0.0);
         for (WetSurface { surface, .. }, output) in wet.iter().zip(outputs) {
-            let (known, learnt) = (&reading.surfaces[*surface], learned.learnt[*surface]);
+            let (known, learnt) = (&reading.surfaces[*surface], learned.coverage[*surface]);
             forces.surfaces[*surface] = known.load(&faded(output, trust * learnt));
             let doubt = Anchored::doubt(distance).max(1.0 - learnt);
             doubtful += (known.force(&faded(output, 1.0)) - known.drag).abs() * doubt;
@@ -347,6 +347,16 @@ impl Model {
 /// The answers that mean forces and their place, as far as they are trusted.
 fn faded(output: &[f32; MAX_OUTPUTS], trust: f64) -> [f32; anchor::OUTPUTS] {
     std::array::from_fn(|i| output[i] * trust as f32)
+}
+
+/// Deviation of a moment whose forces have this one: their errors act a quarter of the hull from its middle, along each axis.
+fn moment_deviation(force: &Vec3, dimensions: &Dimensions) -> Vec3 {
+    let arm = Vec3::new(dimensions.length, dimensions.width, dimensions.height) * 0.25;
+    Vec3::new(
+        (force.y * arm.z).hypot(force.z * arm.y),
+        (force.x * arm.z).hypot(force.z * arm.x),
+        (force.x * arm.y).hypot(force.y * arm.x),
+    )
 }
 
 // the buffers of the kernel hold what the anchored network is told and what it answers

@@ -48,7 +48,7 @@ impl Model {
         let mut reading = Reading::default();
         anchor.read(&self.vehicle, condition, &mut reading);
         let trust = Anchored::trust(form.distance(&reading.coordinates));
-        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&learned.learnt);
+        let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&learned.coverage);
         let force = surfaces.map(|((known, fixed), learnt)| {
             if known.wet_fraction == 0.0 {
                 return Vec3::zeros();

@@ -124,6 +124,12 @@ impl Form {
 }
 
 impl Weights {
+    /// True of weights that stand on the physical base where the bundle has one. The paper's network answers the whole force, as
+    /// published.
+    pub fn takes_base(&self) -> bool {
+        matches!(self.form, Form::Anchored(_))
+    }
+
     /// Convention for the contact patches that the weights have baked in; `None` where they serve both.
     pub fn ground_contact(&self) -> Option<GroundContact> {
         match &self.form {

@@ -27,7 +27,7 @@ pub const LEEWARD: f64 = 0.7;
 /// four diameters the downstream one keeps 0.2 to 0.6 of its drag (Zdravkovich, Flow Around Circular Cylinders, 1997).
 pub const SHELTERING: f64 = 0.5;
 /// Rise of the water over the lowest point of a vertical element by which it is as wet as it gets, over the height of the hull [-].
-const SIDE_FILM: f64 = 0.02;
+const SIDE_FILM: f64 = 0.01;
 /// The same of a horizontal element, which the water reaches at once: the time that a real bottom, with frame and tilt, takes.
 const BOTTOM_FILM: f64 = 0.5;
 /// Tangential coefficient of a tread [-]: lugs that close a tenth of the annulus they sweep, as plates of a coefficient of 1.2.
@@ -59,7 +59,7 @@ struct Block {
     area: Lane,
     /// Three times the spread: xx, yy, zz, and twice xy, xz, yz [m2].
     spread: [Lane; 6],
-    /// Films of the horizontal over those of the vertical are weighted with the square of the normal along up [m].
+    /// Films of vertical and of horizontal elements [m]; between them by the sixth power of the normal along up.
     film: [f64; 2],
 }
 
@@ -254,6 +254,7 @@ impl Block {
                 + s(5) * uy * uz;
             let reach = variance.max(0.0).sqrt();
             let facing = nx * ux + ny * uy + nz * uz;
+            let square = facing * facing;
             let [tx, ty, tz] = flow.tilting;
             let spreading = s(0) * ux * tx
                 + s(1) * uy * ty
@@ -262,8 +263,10 @@ impl Block {
                     * (s(3) * (ux * ty + uy * tx) + s(4) * (ux * tz + uz * tx) + s(5) * (uy * tz + uz * ty));
             let reach_rate = if reach > 0.0 { spreading / reach } else { 0.0 };
             let facing_rate = nx * tx + ny * ty + nz * tz;
-            let film_rate = 2.0 * (self.film[1] - self.film[0]) * facing * facing_rate;
-            let film = self.film[0] + (self.film[1] - self.film[0]) * facing * facing;
+            let film_rate = 6.0 * (self.film[1] - self.film[0]) * square * square * facing * facing_rate;
+            // of what is nearly horizontal alone
+            let sixth = square * square * square;
+            let film = self.film[0] + (self.film[1] - self.film[0]) * sixth;
             let depth = flow.offset - (x * ux + y * uy + z * uz);
             let range = 2.0 * reach + film;
             let share = ((depth + reach) / range).clamp(0.0, 1.0);

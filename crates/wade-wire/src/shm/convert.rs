@@ -156,7 +156,9 @@ impl Answer {
         for (slot, load) in self.surfaces.iter_mut().zip(&forces.surfaces) {
             slot.force_n = single(&load.force);
             slot.point_m = single(&load.point);
-            slot.couple_nm = single(&load.couple);
+            if forces.base.is_some() {
+                slot.couple_nm = single(&load.couple);
+            }
             slot.wetted_fraction = load.wetted_fraction as f32;
         }
         if let Some(matrix) = added_mass(effects) {
