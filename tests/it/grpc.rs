@@ -373,7 +373,7 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
     });
     runtime.block_on(answers.message()).expect("answered").expect("one");
     // long to compute, short to send
-    let request = proto::EvaluateBatchRequest { omit_surfaces: true, ..batch(1 << 14) };
+    let request = proto::EvaluateBatchRequest { omit_surfaces: true, ..batch(1 << 16) };
     let in_flight = runtime.spawn(async move { long.evaluate_batch(request).await });
     // the batch is in flight once it has taken a place
     let requests = served.running.metrics().held(wade::metrics::Resource::requests);
