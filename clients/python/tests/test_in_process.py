@@ -29,6 +29,7 @@ from effects_by_hand import LIBRARY, copy_with
 FINE: dict[str, Any] = {
     **{"depth_m": 0.15, "density_kgpm3": 1000.0, "gravity_direction": (0.0, 0.0, -1.0)},
     **{"heading_rad": 0.0, "depth_rate_mps": 0.0, "wheel_speed_radps": (0.0, 0.0, 0.0, 0.0)},
+    **{"water_level_m": np.nan, "bed_clearance_m": 0.0, "bed": 0.0},
 }
 #: States of which each input that an effect needs is given, too.
 ALL_STATES = [
@@ -123,7 +124,7 @@ def test_a_refusal_has_the_words_of_the_server(server: Server, name: str, value:
 
 def test_a_batch_that_is_refused_moves_no_session(vehicles: Path) -> None:
     client = wade.InProcess(vehicles)
-    states = wade.State(depth_m=[0.1, -0.1], session=[1, 2], time_step_s=0.05)
+    states = wade.State(depth_m=[0.1, np.inf], session=[1, 2], time_step_s=0.05)
     with pytest.raises(wade.InvalidState, match="state 1 of the batch"):
         client.evaluate_batch("husky", states)
     good = wade.State(depth_m=[0.1, 0.1], session=[1, 2], time_step_s=0.05)

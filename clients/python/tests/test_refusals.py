@@ -22,7 +22,10 @@ REFUSED = [
     ("angular_acceleration_radps2", (0, -1e9, 0), ""),
     ("gravity_direction", (0, 0, -0.5), "length 1"),
     ("gravity_direction", (0, NAN, -1), "finite"),
-    ("depth_m", -0.1, "negative"),
+    ("depth_m", NAN, "must be given"),
+    ("water_level_m", 0.1, "give one of the two"),
+    ("bed_clearance_m", -0.1, "negative"),
+    ("bed", 2.0, "between 0 (parked) and 1 (driving)"),
     ("depth_m", 1e39, "finite"),  # more than single precision holds
     ("density_kgpm3", 0.0, "greater than zero"),
     ("density_kgpm3", NAN, "finite"),

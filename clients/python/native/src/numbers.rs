@@ -64,6 +64,17 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
     }
 }
 
+/// A row of a batch, of which NaN says that it states none.
+fn stated(state: State) -> State {
+    let stated = |value: Option<f32>| value.filter(|value| !value.is_nan());
+    State {
+        water_level: stated(state.water_level),
+        bed_clearance: stated(state.bed_clearance),
+        bed: stated(state.bed),
+        ..state
+    }
+}
+
 /// The states of a batch, and the number of the session of each: none, or one a state.
 pub fn batch(numbers: &[u8], flags: u64, sessions: &[u8]) -> Result<(Vec<State>, Vec<u64>), Misshapen> {
     let misshapen = |what, len, expected| Misshapen { what, len, expected };
@@ -78,5 +89,5 @@ pub fn batch(numbers: &[u8], flags: u64, sessions: &[u8]) -> Result<(Vec<State>,
         return Err(misshapen("sessions", sessions.len(), "one a state"));
     }
     let numbered = numbered.iter().map(|&word| u64::from_le_bytes(word)).collect();
-    Ok((rows.iter().map(|row| state(row, flags)).collect(), numbered))
+    Ok((rows.iter().map(|row| stated(state(row, flags))).collect(), numbered))
 }

@@ -158,6 +158,11 @@ class ShmClient:
 
 
 _NAN = (math.nan,)
+_PER_ROW = {
+    "water_level_m": layout.HAS_WATER_LEVEL,
+    "bed_clearance_m": layout.HAS_BED_CLEARANCE,
+    "bed": layout.HAS_BED,
+}
 _WHEELS = TOLD["wheel_speed_radps"]
 
 
@@ -192,6 +197,10 @@ def _write_batch(
     queries[...] = layout.UNSET_QUERY
     queries["session"] = sessions[chunk]
     queries["flags"] = flags
+    for name, flag in _PER_ROW.items():
+        if name in rows:
+            # of a row of a batch NaN says that it states none
+            queries["flags"] &= ~np.where(np.isnan(rows[name][chunk]), flag, 0).astype(np.uint64)
     for name, array in rows.items():
         place = queries[name][:, :_WHEELS] if name == "wheel_speed_radps" else queries[name]
         place[...] = array[chunk]

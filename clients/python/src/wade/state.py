@@ -69,8 +69,9 @@ class State:
     """One state, or N of them for a batch. Body frame: x forward, y left, z up; SI units.
 
     Exactly one of `depth_m` and `water_level_m` is given; of a vehicle on its side or its back the latter. In a single
-    state a vector is any sequence of three numbers. In a batch that one is `[N]`, a vector is `[N, 3]` or,
-    where all have the same, `[3]`, and any other number `[N]` or one number. What is left out has the server's default.
+    state a vector is any sequence of three numbers. In a batch that one is `[N]`, a vector is `[N, 3]` or, where all
+    have the same, `[3]`, and any other number `[N]` or one number; NaN in a row states no level, clearance or bed. What
+    is left out has the server's default.
     """
 
     #: Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
@@ -103,7 +104,7 @@ class State:
     water_level_m: ArrayLike | None = None
     #: Distance from the ground-contact plane down to the bed [m]. None: on the bed until the vehicle floats.
     bed_clearance_m: ArrayLike | None = None
-    #: Share of the motion through the water that is motion over the bed, 0 parked to 1 driving. None: from the velocities.
+    #: Share of the motion through the water that is motion over the bed, 0 parked to 1 driving. None: from velocities.
     bed: ArrayLike | None = None
     #: How much of the physical base answers, for tests. One for the whole batch.
     physics: Physics = Physics.FULL
