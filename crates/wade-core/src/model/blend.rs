@@ -17,7 +17,7 @@ use crate::physics::{Base, BaseLoads};
 use crate::vehicle::{MAX_SURFACES, Vehicle};
 use crate::wrench::Wrench;
 
-/// Deviation of a component of the base's drag, over the size of the drag [-]: `docs/src/results/physics.md`.
+/// Deviation of a component of the base's drag, over the size of the drag [-]: `docs/src/concepts/physics.md`.
 const BASE_DEVIATION: f64 = 0.3;
 
 /// An answer that is being put together.

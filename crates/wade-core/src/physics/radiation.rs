@@ -26,7 +26,7 @@ pub const SUNK_STEPS: usize = 3;
 /// Rows of a table: dry, the steps to covered, and those below.
 pub const NODES: usize = 1 + STEPS + SUNK_STEPS;
 
-/// Elements of the estimate; `docs/src/results/physics.md` has its error.
+/// Elements of the estimate; `docs/src/concepts/physics.md` has its error.
 const PANELS: usize = 600;
 /// Share of the volume at which a hull counts as covered [-]: the last of it comes over a fifth of the height.
 const ALL_BUT: f64 = 0.98;
