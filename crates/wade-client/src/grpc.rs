@@ -251,7 +251,8 @@ impl From<&Reply> for proto::EvaluateResponse {
                 water_level_m: base.water_level,
                 bed_clearance_m: base.bed_clearance,
                 bed: base.bed,
-                shaft_power_w: 0.0,
+                // it does not travel in shared memory
+                shaft_power_w: f32::NAN,
                 damping: base.damping.to_vec(),
             }),
             in_domain: reply.outside.is_inside(),

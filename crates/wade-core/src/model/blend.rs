@@ -13,7 +13,7 @@ use crate::forces::{self, Forces, SurfaceForce};
 use crate::frame::Vec3;
 use crate::model::kernel::{MAX_OUTPUTS, WetSurface};
 use crate::physics::drag::SurfaceDrag;
-use crate::physics::{Base, BaseLoads};
+use crate::physics::{BaseLoads, origin_from};
 use crate::vehicle::{MAX_SURFACES, Vehicle};
 use crate::wrench::Wrench;
 
@@ -93,7 +93,7 @@ impl<'a> Blend<'a> {
     }
 
     /// Limits the learned part and sums.
-    pub fn finish(self, vehicle: &Vehicle, base: &Base, forces: &mut Forces) {
+    pub fn finish(self, vehicle: &Vehicle, forces: &mut Forces) {
         let Self { condition, loads, .. } = self;
         let power = |load: &Wrench| {
             load.force.dot(&condition.velocity) + load.moment.dot(&condition.angular_velocity)
@@ -128,7 +128,7 @@ impl<'a> Blend<'a> {
         let unlearned = Vec3::repeat(BASE_DEVIATION * size) * (1.0 - self.weight);
         forces.uncertainty = self.learned_deviation * self.weight + unlearned;
         forces.moment_uncertainty = moment_deviation(&forces.uncertainty, &vehicle.dimensions);
-        let moved = base.moved_to(about);
+        let moved = origin_from(about);
         forces.base = Some(forces::Base {
             added_mass: moved.transpose() * loads.added_mass * moved,
             damping: moved.transpose() * loads.damping * moved,

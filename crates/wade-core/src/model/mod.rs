@@ -230,7 +230,7 @@ impl Model {
                     let outputs = learned.answer(form, (reading, wet, buffers));
                     blend.add((learned, form, reading), (wet, outputs), level_drag, forces);
                 }
-                blend.finish(&self.vehicle, base, forces);
+                blend.finish(&self.vehicle, forces);
             }
             (None, Some(learned)) => self.evaluate_learned(learned, condition, workspace, forces),
             (None, None) => unreachable!("a model has weights or a base"),

@@ -1,11 +1,11 @@
 //! The loads of the base on a vehicle in any state: still water exactly, drag by elements, added mass and waves.
 //!
 //! `W = W_hydrostatic + sum_elements f + W_added + W_waves` with
-//! `W_added = -(A nu_dot + C_A(nu) nu + y'+ dA/dy nu)` about the body origin. `nu` is the velocity through the water, `C_A`
+//! `W_added = -(A nu_dot + C_A(nu) nu + k max(y', 0) dA/dy nu)` about the body origin. `nu` is the velocity through the water, `C_A`
 //! Kirchhoff's cross terms (Newman, Marine Hydrodynamics, section 4.14), `y` the place in the table of [`Radiation`], which
-//! rises with the volume under water. The last term is the momentum that entering water is given (von Karman 1929); it acts
-//! while `y` rises alone: half of its work goes into the spray, and a hull that leaves the water gets nothing back. So the
-//! energy of body, added mass, memory and position never rises by what the water does.
+//! rises with the volume under water. The last term is the momentum that entering water is given (von Karman 1929), by the
+//! share [`ENTRY`] that conserves energy; it acts while `y` rises alone, so that a hull that leaves the water gets nothing
+//! back. So the energy of body, added mass, memory and position never rises by what the water does.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -141,8 +141,19 @@ pub struct Base {
     float_volume: f64,
     rigid: Matrix6<f64>,
     contacts: Vec<ContactPatch>,
+    /// Of the whole hull [m2].
+    area: f64,
     areas: Vec<f64>,
     centers: Vec<Vec3>,
+}
+
+/// Takes velocities of a point `about` and of the body to those of the origin: a matrix `A` about the origin is
+/// `T^T A T` about the point.
+pub fn origin_from(about: &Vec3) -> Matrix6<f64> {
+    let mut matrix = Matrix6::identity();
+    // v at the origin is v at the point less omega x about
+    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&about.cross_matrix());
+    matrix
 }
 
 /// Added mass and damping of a row at one frequency.
@@ -173,6 +184,7 @@ impl Base {
             float_volume,
             rigid: rigid_mass(vehicle),
             contacts: vehicle.contacts.clone(),
+            area: vehicle.surfaces.iter().map(|s| s.area).sum(),
             areas: vehicle.surfaces.iter().map(|s| s.area).collect(),
             centers: vehicle.surfaces.iter().map(|s| s.centroid).collect(),
         }
@@ -181,15 +193,6 @@ impl Base {
     /// The table of waves.
     pub fn radiation(&self) -> &Radiation {
         &self.radiation
-    }
-
-    /// Takes velocities of a point `about` and of the body to those of the origin: a matrix `A` about the origin is
-    /// `T^T A T` about the point.
-    pub fn moved_to(&self, about: &Vec3) -> Matrix6<f64> {
-        let mut matrix = Matrix6::identity();
-        // v at the origin is v at the point less omega x about
-        matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&about.cross_matrix());
-        matrix
     }
 
     /// Elements that are evaluated a query.
@@ -283,9 +286,9 @@ impl Base {
         let (density, up) = (condition.density, condition.up.into_inner());
         let (v, omega) = (condition.velocity, condition.angular_velocity);
         let nu = joined(&v, &omega);
-        let rising = -up.dot(&v);
+        let sinking = -up.dot(&v);
         let flux: f64 = out.drags.iter().map(|drag| drag.flux).sum();
-        let place = self.place(out.volume, flux, self.sunk(&condition.water_plane(self.z0)), rising);
+        let place = self.place(out.volume, flux, self.sunk(&condition.water_plane(self.z0)), sinking);
         let bed = self.near_bed(out.bed_clearance);
         let remembers = memory.is_some();
         // a state alone is answered at the natural frequency of heave
@@ -303,7 +306,7 @@ impl Base {
             bed_adds += added * weight;
         }
         // elements know the hull's lowest points by their spread alone
-        let reached = (soaked / (REACHED * self.areas.iter().sum::<f64>())).min(1.0);
+        let reached = (soaked / (REACHED * self.area)).min(1.0);
         let mass = mass * (density * reached);
         // entry gives momentum to the water; so does a hull that sinks toward the bed
         let closing = match condition.bed_clearance {
@@ -359,7 +362,7 @@ impl Base {
     }
 
     /// Where a hull is in the table, and how fast it goes down there.
-    fn place(&self, volume: f64, flux: f64, sunk: f64, rising: f64) -> Place {
+    fn place(&self, volume: f64, flux: f64, sunk: f64, sinking: f64) -> Place {
         let step = self.radiation.volume_step;
         let depth = sunk / self.height;
         let below = depth * depth / (depth + SUNK_ONSET) / SUNK_STEP;
@@ -368,7 +371,7 @@ impl Base {
         let v = (volume / step).clamp(0.0, STEPS as f64);
         let square = v * v;
         let y = v + 0.5 * square / (square + 1.0) + below;
-        let rate = (1.0 + v / (square + 1.0).powi(2)) * flux / step + below_rate * rising / self.height;
+        let rate = (1.0 + v / (square + 1.0).powi(2)) * flux / step + below_rate * sinking / self.height;
         let end = NODES as f64 - 1e-9;
         let (y, rate) = if y < end { (y, rate) } else { (end, 0.0) };
         let row = (y.floor() as usize).min(NODES - 1);

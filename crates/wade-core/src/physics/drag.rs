@@ -68,8 +68,6 @@ struct Block {
 pub struct SurfaceDrag {
     /// Force and moment about the body origin [N, N m].
     pub load: Wrench,
-    /// Sum of the wet areas [m2].
-    pub wet_area: f64,
     /// Power that a turning wheel must be given at its shaft [W]: what the rim's own velocity takes.
     pub shaft_power: f64,
     /// Volume over the wet parts of the elements, as they get wet [m3]: those of all surfaces sum to the volume under water,
@@ -193,7 +191,6 @@ impl Drag {
 struct Sums {
     force: [Lane; 3],
     moment: [Lane; 3],
-    wet: Lane,
     power: Lane,
     volume: Lane,
     flux: Lane,
@@ -206,7 +203,6 @@ impl Sums {
         let vector = |lanes: &[Lane; 3]| Vec3::from(lanes.each_ref().map(sum));
         SurfaceDrag {
             load: Wrench { force: vector(&self.force), moment: vector(&self.moment) },
-            wet_area: sum(&self.wet),
             shaft_power: sum(&self.power),
             volume: sum(&self.volume),
             flux: sum(&self.flux),
@@ -302,7 +298,6 @@ impl Block {
             sums.moment[0][i] += y * fz - z * fy;
             sums.moment[1][i] += z * fx - x * fz;
             sums.moment[2][i] += x * fy - y * fx;
-            sums.wet[i] += wet;
             // the integral of the share over the depth
             let height = 0.5 * range * share * share + (depth + reach - range).max(0.0);
             sums.volume[i] -= self.area[i] * facing * height;

@@ -9,5 +9,5 @@ pub mod elements;
 pub mod panel;
 pub mod radiation;
 
-pub use base::{Base, BaseLoads, Memory, Motion, Physics, STATED_NONE};
+pub use base::{Base, BaseLoads, Memory, Motion, Physics, STATED_NONE, origin_from};
 pub use radiation::Radiation;

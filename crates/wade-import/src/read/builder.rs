@@ -54,6 +54,13 @@ impl Shaper {
         }
     }
 
+    /// The `<visual>` and `<collision>` elements of a link that are asked for, with what they are.
+    pub fn wanted_elements<'a, 'i>(&self, link: Element<'a, 'i>) -> Vec<(Role, Element<'a, 'i>)> {
+        let roles = [("visual", Role::Visual), ("collision", Role::Collision)].into_iter();
+        let wanted = roles.filter(|(_, role)| self.wants(*role));
+        wanted.flat_map(|(tag, role)| link.children(tag).map(move |element| (role, element))).collect()
+    }
+
     /// A primitive at a pose.
     pub fn primitive(
         &mut self,

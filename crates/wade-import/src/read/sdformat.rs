@@ -231,20 +231,14 @@ fn shapes(
     shaper: &mut Shaper,
 ) -> Result<Vec<Shape>, ReadError> {
     let mut shapes = Vec::new();
-    for (tag, role) in [("visual", Role::Visual), ("collision", Role::Collision)] {
-        if !shaper.wants(role) {
-            continue;
-        }
-        for element in link.children(tag) {
-            let (own, relative) = own_pose(element)?;
-            let at = match relative {
-                Some(name) => frames.pose(name)? * own,
-                None => frame * own,
-            };
-            let geometry = element.child("geometry").and_then(Element::first);
-            let geometry = geometry.ok_or_else(|| element.fault("has no <geometry>".to_owned()))?;
-            shapes.extend(shape(link.required("name")?, geometry, (role, &at), shaper)?);
-        }
+    for (role, element) in shaper.wanted_elements(link) {
+        let (own, relative) = own_pose(element)?;
+        let at = match relative {
+            Some(name) => frames.pose(name)? * own,
+            None => frame * own,
+        };
+        let geometry = element.geometry()?;
+        shapes.extend(shape(link.required("name")?, geometry, (role, &at), shaper)?);
     }
     Ok(shapes)
 }

@@ -179,16 +179,10 @@ fn shapes(
     shaper: &mut Shaper,
 ) -> Result<Vec<Shape>, ReadError> {
     let mut shapes = Vec::new();
-    for (tag, role) in [("visual", Role::Visual), ("collision", Role::Collision)] {
-        if !shaper.wants(role) {
-            continue;
-        }
-        for element in link.children(tag) {
-            let at = frame * origin(element)?;
-            let geometry = element.child("geometry").and_then(Element::first);
-            let geometry = geometry.ok_or_else(|| element.fault("has no <geometry>".to_owned()))?;
-            shapes.push(shape(link.required("name")?, geometry, (role, &at), shaper)?);
-        }
+    for (role, element) in shaper.wanted_elements(link) {
+        let at = frame * origin(element)?;
+        let geometry = element.geometry()?;
+        shapes.push(shape(link.required("name")?, geometry, (role, &at), shaper)?);
     }
     Ok(shapes)
 }

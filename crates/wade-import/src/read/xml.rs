@@ -54,6 +54,12 @@ impl<'a, 'input> Element<'a, 'input> {
         self.children(name).next()
     }
 
+    /// What stands in the `<geometry>` of a shape.
+    pub fn geometry(self) -> Result<Self, ReadError> {
+        let geometry = self.child("geometry").and_then(Self::first);
+        geometry.ok_or_else(|| self.fault("has no <geometry>".to_owned()))
+    }
+
     /// The first child element of any name.
     pub fn first(self) -> Option<Self> {
         self.node.first_element_child().map(|node| Self { node, ..self })
