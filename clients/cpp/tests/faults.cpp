@@ -216,7 +216,6 @@ void a_wrong_state_is_named(const std::string &address) {
   const Case cases[] = {
       {[](wade::State &state, float value) { state.velocity_mps[1] = value; }, "velocity_mps"},
       {[](wade::State &state, float value) { state.depth_m = value; }, "depth_m"},
-      {[](wade::State &state, float) { state.depth_m = -0.1F; }, "depth_m"},
       {[](wade::State &state, float) { state.density_kgpm3 = 0.0F; }, "density_kgpm3"},
       {[](wade::State &state, float) { std::memset(state.gravity_direction, 0, sizeof state.gravity_direction); },
        "gravity_direction"},
