@@ -10,10 +10,13 @@
 #include <string.h>
 
 // Version of everything in this header. A library of another one refuses to open a client.
-#define WADE_ABI_VERSION 1
+#define WADE_ABI_VERSION 2
 
 // Most surfaces of a vehicle.
 #define WADE_MAX_SURFACES 64
+
+// Most wheels whose speed a state has.
+#define WADE_MAX_WHEELS 8
 
 // Most effects of a vehicle.
 #define WADE_MAX_EFFECTS 14
@@ -42,6 +45,21 @@
 // Flag of a state: `wheel_speed_radps` holds values.
 #define WADE_HAS_WHEEL_SPEEDS 16
 
+// Flag of a state: `water_level_m` holds the level, and `depth_m` is not read.
+#define WADE_HAS_WATER_LEVEL 32
+
+// Flag of a state: `bed_clearance_m` holds a value.
+#define WADE_HAS_BED_CLEARANCE 64
+
+// Flag of a state: `bed` holds a value.
+#define WADE_HAS_BED 128
+
+// Flag of a state: of the physical base the pressure of still water alone.
+#define WADE_PHYSICS_HYDROSTATIC 512
+
+// Flag of a state: of the physical base the pressure of still water and the drag.
+#define WADE_PHYSICS_QUASI_STEADY 1024
+
 // Flag of forces: no quantity lies outside the training domain.
 #define WADE_IN_DOMAIN 1
 
@@ -51,6 +69,9 @@
 
 // Flag of forces: `added_mass` holds a matrix.
 #define WADE_HAS_ADDED_MASS 4
+
+// Flag of forces: the bundle has the physical base, and `damping`, `water_level_m`, `bed_clearance_m` and `bed` hold values.
+#define WADE_HAS_BASE 8
 
 // What came of a call.
 typedef enum {
@@ -136,10 +157,20 @@ typedef struct {
   // Number of a run of states that follow each other, for effects that remember; 0 for none. Over shared memory a client may
   // run many at a time; over gRPC another number begins another run, and batches have none.
   uint64_t session;
-  // WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, WADE_HAS_HEADING, WADE_HAS_DEPTH_RATE, WADE_HAS_WHEEL_SPEEDS
+  // WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, those named WADE_HAS_ and one of those named WADE_PHYSICS_
   uint32_t flags;
-  // Undisturbed water surface above the ground-contact plane at the body origin [m].
+  // Entries of `wheel_speed_radps` that hold a value, where the flags say so; 0 for four.
+  uint32_t wheel_count;
+  // Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
   float depth_m;
+  // Signed height of the still-water plane above the body origin along up [m], for any attitude.
+  float water_level_m;
+  // Distance from the ground-contact plane down to the bed [m]. Not given: on the bed up to the level at which the vehicle
+  // floats, and off it from there.
+  float bed_clearance_m;
+  // Share of the motion through the water that is motion over the bed: 0 parked to 1 driving. Not given: from the
+  // velocities.
+  float bed;
   // Density of the water [kg/m3].
   float density_kgpm3;
   // Velocity over ground [m/s]; through the water where there is no current.
@@ -158,8 +189,8 @@ typedef struct {
   float heading_rad;
   // Rate at which the water rises at the body origin [m/s].
   float depth_rate_mps;
-  // Front left, front right, rear left, rear right [rad/s].
-  float wheel_speed_radps[4];
+  // By axle from the front, left before right [rad/s]: front left, front right, rear left, rear right.
+  float wheel_speed_radps[WADE_MAX_WHEELS];
   // Time since the state before it in the session [s]. The steps of states that could not be asked for want of time are added
   // to the next one that is.
   float time_step_s;
@@ -186,7 +217,7 @@ typedef struct {
   uint64_t answer;
   // The server's own time [ns]; in a batch over gRPC that of the whole.
   uint64_t compute_ns;
-  // WADE_IN_DOMAIN, WADE_SESSION_BEGINS, WADE_HAS_ADDED_MASS
+  // WADE_IN_DOMAIN, WADE_SESSION_BEGINS, WADE_HAS_ADDED_MASS, WADE_HAS_BASE
   uint32_t flags;
   // Which field of this call's state is wrong, where the status says so; see `wade_field_name`. Else 0.
   uint32_t invalid_field;
@@ -208,16 +239,29 @@ typedef struct {
   float about_m[3];
   // One standard deviation of the net force [N].
   float uncertainty_n[3];
+  // One standard deviation of the net moment [N m].
+  float moment_uncertainty_nm[3];
+  // Height of the still-water plane above the body origin along up [m], as used.
+  float water_level_m;
+  // Distance from the ground-contact plane to the bed [m], as used.
+  float bed_clearance_m;
+  // Share of the motion through the water that is motion over the bed, as used.
+  float bed;
   // How far each `wade_quantity` lies outside the training domain, in its unit: negative below, positive above, 0 within.
   float outside[8];
   // How far the state lies outside the box in which the effects were seen: depth, speed, acceleration, angular speed, density.
   float effects_outside[5];
   // Added mass and inertia about `about_m` by rows, forces first [kg, kg m, kg m2], where the flags say so.
   float added_mass[36];
+  // Linear damping by waves about `about_m` by rows, forces first [kg/s, kg m/s, kg m2/s]: the wrench is -B nu. Zero in a
+  // session, whose memory has it.
+  float damping[36];
   // Force on each surface [N].
   float surface_force_n[WADE_MAX_SURFACES][3];
   // Point at which it acts [m].
   float surface_point_m[WADE_MAX_SURFACES][3];
+  // Moment of the load of each surface about that point [N m].
+  float surface_couple_nm[WADE_MAX_SURFACES][3];
   // Share of each surface under water.
   float wetted_fraction[WADE_MAX_SURFACES];
   // Share of the effects' forces that acts on each surface [N]: a part of `effects`, not to be added to them.

@@ -71,6 +71,14 @@ using Vector3 = float[3];
   return state;
 }
 
+// A vehicle at rest and level, in fresh water whose surface is this far above the body origin [m].
+[[nodiscard]] inline State at_water_level(float water_level_m) noexcept {
+  State state = wade_default_state();
+  state.flags = WADE_HAS_WATER_LEVEL;
+  state.water_level_m = water_level_m;
+  return state;
+}
+
 // How old the forces are; none where there was no answer yet.
 [[nodiscard]] inline std::optional<nanoseconds> age(const Forces &forces) noexcept {
   if (forces.age_ns == WADE_NEVER) return std::nullopt;
@@ -90,6 +98,11 @@ using Vector3 = float[3];
   return {forces.surface_point_m, forces.surface_count};
 }
 
+// Moment of the load of each surface about that point [N m].
+[[nodiscard]] inline Span<const Vector3> surface_couples(const Forces &forces) noexcept {
+  return {forces.surface_couple_nm, forces.surface_count};
+}
+
 // Share of each surface under water.
 [[nodiscard]] inline Span<const float> wetted_fractions(const Forces &forces) noexcept {
   return {forces.wetted_fraction, forces.surface_count};
@@ -104,6 +117,12 @@ using Vector3 = float[3];
 [[nodiscard]] inline std::optional<Span<const float>> added_mass(const Forces &forces) noexcept {
   if ((forces.flags & WADE_HAS_ADDED_MASS) == 0) return std::nullopt;
   return Span<const float>(forces.added_mass, 36);
+}
+
+// Damping by waves, 6 x 6 by rows; none where the bundle has no physical base.
+[[nodiscard]] inline std::optional<Span<const float>> damping(const Forces &forces) noexcept {
+  if ((forces.flags & WADE_HAS_BASE) == 0) return std::nullopt;
+  return Span<const float>(forces.damping, 36);
 }
 
 // The surfaces of a vehicle, in the order of the answers.

@@ -5,9 +5,11 @@
 use std::ffi::c_char;
 
 /// Version of everything in this header. A library of another one refuses to open a client.
-pub const WADE_ABI_VERSION: u32 = 1;
+pub const WADE_ABI_VERSION: u32 = 2;
 /// Most surfaces of a vehicle.
 pub const WADE_MAX_SURFACES: usize = 64;
+/// Most wheels whose speed a state has.
+pub const WADE_MAX_WHEELS: usize = 8;
 /// Most effects of a vehicle.
 pub const WADE_MAX_EFFECTS: usize = 14;
 /// Most states of one batch.
@@ -27,6 +29,16 @@ pub const WADE_HAS_HEADING: u32 = 4;
 pub const WADE_HAS_DEPTH_RATE: u32 = 8;
 /// Flag of a state: `wheel_speed_radps` holds values.
 pub const WADE_HAS_WHEEL_SPEEDS: u32 = 16;
+/// Flag of a state: `water_level_m` holds the level, and `depth_m` is not read.
+pub const WADE_HAS_WATER_LEVEL: u32 = 32;
+/// Flag of a state: `bed_clearance_m` holds a value.
+pub const WADE_HAS_BED_CLEARANCE: u32 = 64;
+/// Flag of a state: `bed` holds a value.
+pub const WADE_HAS_BED: u32 = 128;
+/// Flag of a state: of the physical base the pressure of still water alone.
+pub const WADE_PHYSICS_HYDROSTATIC: u32 = 512;
+/// Flag of a state: of the physical base the pressure of still water and the drag.
+pub const WADE_PHYSICS_QUASI_STEADY: u32 = 1024;
 
 /// Flag of forces: no quantity lies outside the training domain.
 pub const WADE_IN_DOMAIN: u32 = 1;
@@ -35,6 +47,8 @@ pub const WADE_IN_DOMAIN: u32 = 1;
 pub const WADE_SESSION_BEGINS: u32 = 2;
 /// Flag of forces: `added_mass` holds a matrix.
 pub const WADE_HAS_ADDED_MASS: u32 = 4;
+/// Flag of forces: the bundle has the physical base, and `damping`, `water_level_m`, `bed_clearance_m` and `bed` hold values.
+pub const WADE_HAS_BASE: u32 = 8;
 
 /// What came of a call.
 #[repr(C)]
@@ -125,10 +139,20 @@ pub struct WadeState {
     /// Number of a run of states that follow each other, for effects that remember; 0 for none. Over shared memory a client may
     /// run many at a time; over gRPC another number begins another run, and batches have none.
     pub session: u64,
-    /// WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, WADE_HAS_HEADING, WADE_HAS_DEPTH_RATE, WADE_HAS_WHEEL_SPEEDS
+    /// WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, those named WADE_HAS_ and one of those named WADE_PHYSICS_
     pub flags: u32,
-    /// Undisturbed water surface above the ground-contact plane at the body origin [m].
+    /// Entries of `wheel_speed_radps` that hold a value, where the flags say so; 0 for four.
+    pub wheel_count: u32,
+    /// Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
     pub depth_m: f32,
+    /// Signed height of the still-water plane above the body origin along up [m], for any attitude.
+    pub water_level_m: f32,
+    /// Distance from the ground-contact plane down to the bed [m]. Not given: on the bed up to the level at which the vehicle
+    /// floats, and off it from there.
+    pub bed_clearance_m: f32,
+    /// Share of the motion through the water that is motion over the bed: 0 parked to 1 driving. Not given: from the
+    /// velocities.
+    pub bed: f32,
     /// Density of the water [kg/m3].
     pub density_kgpm3: f32,
     /// Velocity over ground [m/s]; through the water where there is no current.
@@ -147,8 +171,8 @@ pub struct WadeState {
     pub heading_rad: f32,
     /// Rate at which the water rises at the body origin [m/s].
     pub depth_rate_mps: f32,
-    /// Front left, front right, rear left, rear right [rad/s].
-    pub wheel_speed_radps: [f32; 4],
+    /// By axle from the front, left before right [rad/s]: front left, front right, rear left, rear right.
+    pub wheel_speed_radps: [f32; WADE_MAX_WHEELS],
     /// Time since the state before it in the session [s]. The steps of states that could not be asked for want of time are added
     /// to the next one that is.
     pub time_step_s: f32,
@@ -179,7 +203,7 @@ pub struct WadeForces {
     pub answer: u64,
     /// The server's own time [ns]; in a batch over gRPC that of the whole.
     pub compute_ns: u64,
-    /// WADE_IN_DOMAIN, WADE_SESSION_BEGINS, WADE_HAS_ADDED_MASS
+    /// WADE_IN_DOMAIN, WADE_SESSION_BEGINS, WADE_HAS_ADDED_MASS, WADE_HAS_BASE
     pub flags: u32,
     /// Which field of this call's state is wrong, where the status says so; see `wade_field_name`. Else 0.
     pub invalid_field: u32,
@@ -201,16 +225,29 @@ pub struct WadeForces {
     pub about_m: [f32; 3],
     /// One standard deviation of the net force [N].
     pub uncertainty_n: [f32; 3],
+    /// One standard deviation of the net moment [N m].
+    pub moment_uncertainty_nm: [f32; 3],
+    /// Height of the still-water plane above the body origin along up [m], as used.
+    pub water_level_m: f32,
+    /// Distance from the ground-contact plane to the bed [m], as used.
+    pub bed_clearance_m: f32,
+    /// Share of the motion through the water that is motion over the bed, as used.
+    pub bed: f32,
     /// How far each `wade_quantity` lies outside the training domain, in its unit: negative below, positive above, 0 within.
     pub outside: [f32; 8],
     /// How far the state lies outside the box in which the effects were seen: depth, speed, acceleration, angular speed, density.
     pub effects_outside: [f32; 5],
     /// Added mass and inertia about `about_m` by rows, forces first [kg, kg m, kg m2], where the flags say so.
     pub added_mass: [f32; 36],
+    /// Linear damping by waves about `about_m` by rows, forces first [kg/s, kg m/s, kg m2/s]: the wrench is -B nu. Zero in a
+    /// session, whose memory has it.
+    pub damping: [f32; 36],
     /// Force on each surface [N].
     pub surface_force_n: [[f32; 3]; WADE_MAX_SURFACES],
     /// Point at which it acts [m].
     pub surface_point_m: [[f32; 3]; WADE_MAX_SURFACES],
+    /// Moment of the load of each surface about that point [N m].
+    pub surface_couple_nm: [[f32; 3]; WADE_MAX_SURFACES],
     /// Share of each surface under water.
     pub wetted_fraction: [f32; WADE_MAX_SURFACES],
     /// Share of the effects' forces that acts on each surface [N]: a part of `effects`, not to be added to them.
@@ -322,4 +359,4 @@ pub struct WadeVehicle {
 }
 
 // nothing lies between the fields, so that equal values are equal bytes
-const _: () = assert!(size_of::<WadeState>() == 120 && size_of::<WadeForces>() == 3368);
+const _: () = assert!(size_of::<WadeState>() == 152 && size_of::<WadeForces>() == 4304);

@@ -4,19 +4,39 @@ use std::ffi::c_char;
 use std::time::Instant;
 
 use wade_client::Reply;
+use wade_core::physics::Physics;
 use wade_wire::shm::layout::{self, Answer, Status};
-use wade_wire::{InvalidState, State};
+use wade_wire::{Field, InvalidState, Problem, State};
 
 use crate::abi::{
-    WADE_DRY_CONTACT, WADE_HAS_ADDED_MASS, WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WHEEL_SPEEDS,
+    WADE_DRY_CONTACT, WADE_HAS_ADDED_MASS, WADE_HAS_BASE, WADE_HAS_BED, WADE_HAS_BED_CLEARANCE,
+    WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WATER_LEVEL, WADE_HAS_WHEEL_SPEEDS,
     WADE_IMPLICIT_ADDED_MASS, WADE_IN_DOMAIN, WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE,
-    WADE_NEVER, WADE_SESSION_BEGINS, WadeEffectLoad, WadeForces, WadeState, WadeStatus,
+    WADE_NEVER, WADE_PHYSICS_HYDROSTATIC, WADE_PHYSICS_QUASI_STEADY, WADE_SESSION_BEGINS, WadeEffectLoad,
+    WadeForces, WadeState, WadeStatus,
 };
 use crate::last::nanoseconds_since;
+
+/// Wheels whose speed effects and base take.
+const WHEELS: u32 = 4;
+
+/// Flags of a state that are known.
+const STATE_FLAGS: u32 = WADE_DRY_CONTACT
+    | WADE_IMPLICIT_ADDED_MASS
+    | WADE_HAS_HEADING
+    | WADE_HAS_DEPTH_RATE
+    | WADE_HAS_WHEEL_SPEEDS
+    | WADE_HAS_WATER_LEVEL
+    | WADE_HAS_BED_CLEARANCE
+    | WADE_HAS_BED
+    | WADE_PHYSICS_HYDROSTATIC
+    | WADE_PHYSICS_QUASI_STEADY;
 
 impl From<&WadeState> for State {
     fn from(state: &WadeState) -> Self {
         let has = |flag: u32| state.flags & flag != 0;
+        let [front_left, front_right, rear_left, rear_right, ..] = state.wheel_speed_radps;
+        let wheel_speeds = [front_left, front_right, rear_left, rear_right];
         Self {
             velocity: state.velocity_mps,
             current: state.current_mps,
@@ -24,21 +44,41 @@ impl From<&WadeState> for State {
             acceleration: state.acceleration_mps2,
             angular_acceleration: state.angular_acceleration_radps2,
             gravity: state.gravity_direction,
-            depth: state.depth_m,
+            depth: if has(WADE_HAS_WATER_LEVEL) { f32::NAN } else { state.depth_m },
+            water_level: has(WADE_HAS_WATER_LEVEL).then_some(state.water_level_m),
+            bed_clearance: has(WADE_HAS_BED_CLEARANCE).then_some(state.bed_clearance_m),
+            bed: has(WADE_HAS_BED).then_some(state.bed),
             density: state.density_kgpm3,
             dry_contact: has(WADE_DRY_CONTACT),
             heading: has(WADE_HAS_HEADING).then_some(state.heading_rad),
             depth_rate: has(WADE_HAS_DEPTH_RATE).then_some(state.depth_rate_mps),
-            wheel_speeds: has(WADE_HAS_WHEEL_SPEEDS).then_some(state.wheel_speed_radps),
+            wheel_speeds: has(WADE_HAS_WHEEL_SPEEDS).then_some(wheel_speeds),
             time_step: state.time_step_s,
             implicit_added_mass: has(WADE_IMPLICIT_ADDED_MASS),
-            ..Self::default()
+            physics: if has(WADE_PHYSICS_HYDROSTATIC) {
+                Physics::Hydrostatic
+            } else if has(WADE_PHYSICS_QUASI_STEADY) {
+                Physics::QuasiSteady
+            } else {
+                Physics::Full
+            },
         }
     }
 }
 
 /// A state as it travels, or what the server would refuse in it.
 pub fn checked(state: &WadeState) -> Result<State, InvalidState> {
+    let wrong = |field, problem| Err(InvalidState { field, problem });
+    let has = |flags: u32| state.flags & flags == flags;
+    if state.flags & !STATE_FLAGS != 0 {
+        return wrong(Field::Flags, Problem::Unsupported);
+    }
+    if has(WADE_PHYSICS_HYDROSTATIC | WADE_PHYSICS_QUASI_STEADY) {
+        return wrong(Field::Physics, Problem::Unknown);
+    }
+    if has(WADE_HAS_WHEEL_SPEEDS) && !matches!(state.wheel_count, 0 | WHEELS) {
+        return wrong(Field::WheelSpeed, Problem::Count);
+    }
     let state = State::from(state);
     state.check()?;
     Ok(state)
@@ -64,11 +104,17 @@ impl WadeForces {
         moment_nm: [0.0; 3],
         about_m: [0.0; 3],
         uncertainty_n: [0.0; 3],
+        moment_uncertainty_nm: [0.0; 3],
+        water_level_m: 0.0,
+        bed_clearance_m: 0.0,
+        bed: 0.0,
         outside: [0.0; 8],
         effects_outside: [0.0; 5],
         added_mass: [0.0; 36],
+        damping: [0.0; 36],
         surface_force_n: [[0.0; 3]; WADE_MAX_SURFACES],
         surface_point_m: [[0.0; 3]; WADE_MAX_SURFACES],
+        surface_couple_nm: [[0.0; 3]; WADE_MAX_SURFACES],
         wetted_fraction: [0.0; WADE_MAX_SURFACES],
         effect_surface_force_n: [[0.0; 3]; WADE_MAX_SURFACES],
         effects: [NO_LOAD; WADE_MAX_EFFECTS],
@@ -113,12 +159,14 @@ impl From<&Answer> for WadeForces {
     fn from(answer: &Answer) -> Self {
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let (surfaces, effects) = (answer.surfaces(), answer.effects());
-        let has_added_mass = answer.flags & layout::HAS_ADDED_MASS != 0;
+        let has = |flag: u64| answer.flags & flag != 0;
+        let (has_added_mass, has_base) = (has(layout::HAS_ADDED_MASS), has(layout::HAS_DAMPING));
         let mut forces = Self {
             compute_ns: answer.compute_ns,
             flags: flag(!answer.is_outside(), WADE_IN_DOMAIN)
-                | flag(answer.flags & layout::SESSION_BEGINS != 0, WADE_SESSION_BEGINS)
-                | flag(has_added_mass, WADE_HAS_ADDED_MASS),
+                | flag(has(layout::SESSION_BEGINS), WADE_SESSION_BEGINS)
+                | flag(has_added_mass, WADE_HAS_ADDED_MASS)
+                | flag(has_base, WADE_HAS_BASE),
             bundle_version: answer.bundle_version,
             surface_count: surfaces.len().min(WADE_MAX_SURFACES) as u32,
             effect_count: effects.len().min(WADE_MAX_EFFECTS) as u32,
@@ -128,12 +176,21 @@ impl From<&Answer> for WadeForces {
             uncertainty_n: answer.force_deviation_n,
             outside: answer.outside().excess.map(|excess| excess as f32),
             effects_outside: answer.effects_outside().map(|excess| excess as f32),
+            moment_uncertainty_nm: answer.moment_deviation_nm,
             added_mass: if has_added_mass { answer.added_mass } else { [0.0; 36] },
             ..Self::NONE
         };
+        if has_base {
+            forces.damping = answer.damping;
+            (forces.water_level_m, forces.bed_clearance_m) = (answer.water_level_m, answer.bed_clearance_m);
+            forces.bed = answer.bed;
+        }
         for (i, load) in surfaces.iter().take(WADE_MAX_SURFACES).enumerate() {
             forces.surface_force_n[i] = load.force_n;
             forces.surface_point_m[i] = load.point_m;
+            if has_base {
+                forces.surface_couple_nm[i] = load.couple_nm;
+            }
             forces.wetted_fraction[i] = load.wetted_fraction;
             if !effects.is_empty() {
                 forces.effect_surface_force_n[i] = load.effect_force_n;
@@ -159,7 +216,8 @@ impl From<&Reply> for WadeForces {
         let mut forces = Self {
             compute_ns: reply.compute_ns,
             flags: flag(outside == [0.0; 8], WADE_IN_DOMAIN)
-                | flag(reply.added_mass.is_some(), WADE_HAS_ADDED_MASS),
+                | flag(reply.added_mass.is_some(), WADE_HAS_ADDED_MASS)
+                | flag(reply.base.is_some(), WADE_HAS_BASE),
             bundle_version: reply.version,
             surface_count: reply.surfaces.len().min(WADE_MAX_SURFACES) as u32,
             effect_count: reply.effects.len().min(WADE_MAX_EFFECTS) as u32,
@@ -167,14 +225,21 @@ impl From<&Reply> for WadeForces {
             moment_nm: reply.moment,
             about_m: reply.about,
             uncertainty_n: reply.uncertainty,
+            moment_uncertainty_nm: reply.moment_uncertainty,
             outside,
             effects_outside: reply.effects_outside.map(|excess| excess as f32),
             added_mass: reply.added_mass.unwrap_or([0.0; 36]),
             ..Self::NONE
         };
+        if let Some(base) = &reply.base {
+            forces.damping = base.damping;
+            (forces.water_level_m, forces.bed_clearance_m) = (base.water_level, base.bed_clearance);
+            forces.bed = base.bed;
+        }
         for (i, surface) in reply.surfaces.iter().take(WADE_MAX_SURFACES).enumerate() {
             forces.surface_force_n[i] = surface.force;
             forces.surface_point_m[i] = surface.point;
+            forces.surface_couple_nm[i] = surface.couple;
             forces.wetted_fraction[i] = surface.wetted_fraction;
         }
         for (slot, force) in forces.effect_surface_force_n.iter_mut().zip(&reply.effect_surface_forces) {

@@ -18,13 +18,22 @@ std::vector<wade::State> states(std::size_t count) {
     state.velocity_mps[0] = 0.3F + share;
     state.velocity_mps[1] = 0.2F - share;
     wade_gravity_from_roll_pitch(0.1F * share, -0.05F * share, state.gravity_direction);
+    if (i % 3 == 1) {
+      state.flags |= WADE_HAS_WATER_LEVEL;
+      state.water_level_m = 0.1F * share - 0.05F;
+    }
+    if (i % 5 == 2) {
+      state.flags |= WADE_HAS_BED_CLEARANCE | WADE_HAS_BED;
+      state.bed_clearance_m = 0.3F * share;
+      state.bed = share;
+    }
     states.push_back(state);
   }
   return states;
 }
 
-static_assert(sizeof(wade_state) == 120, "no padding");
-static_assert(sizeof(wade_forces) == 3368, "no padding");
+static_assert(sizeof(wade_state) == 152, "no padding");
+static_assert(sizeof(wade_forces) == 4304, "no padding");
 
 // What does not depend on the call: bit by bit. Shared memory carries the first 32 bytes of the provenance.
 bool same(wade::Forces left, wade::Forces right) {

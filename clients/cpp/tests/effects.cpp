@@ -40,7 +40,7 @@ std::filesystem::path husky_with_effects(const std::filesystem::path &folder) {
   std::ofstream(husky / "effects.toml")
       << "format = 1\nvehicle = \"husky\"\n"
       << "[evidence]\ntrials = [\"none\"]\ntrials_sha256 = \"\"\ngenerated = \"made up for a test\"\nsamples = 1\n"
-      << "model_sha256 = \"\"\nweights_sha256 = \"" << weights << "\"\ntool = \"a test\"\n"
+      << "model_sha256 = \"\"\nweights_sha256 = \"" << weights << "\"\nbase = \"physics\"\ntool = \"a test\"\n"
       << "[validity]\ndepth_m = [0.0, 1.0]\nspeed_mps = [0.0, 10.0]\nacceleration_mps2 = [0.0, 10.0]\n"
       << "angular_speed_radps = [0.0, 10.0]\ndensity_kgpm3 = [900.0, 2000.0]\n"
       << "[[effect]]\nname = \"added_mass\"\nequation = \"\"\nprovisional = false\nshare_of_gap = 0.5\nshape = [0.0, 0.0, 0.0]\n"

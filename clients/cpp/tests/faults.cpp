@@ -221,6 +221,23 @@ void a_wrong_state_is_named(const std::string &address) {
        "gravity_direction"},
       {[](wade::State &state, float value) { state.time_step_s = value; }, "time_step_s"},
       {[](wade::State &state, float value) {
+         state.flags = WADE_HAS_WATER_LEVEL;
+         state.water_level_m = value;
+       },
+       "water_level_m"},
+      {[](wade::State &state, float) {
+         state.flags = WADE_HAS_BED;
+         state.bed = 1.5F;
+       },
+       "bed"},
+      {[](wade::State &state, float) {
+         state.flags = WADE_HAS_WHEEL_SPEEDS;
+         state.wheel_count = 3;
+       },
+       "wheel_speed_radps"},
+      {[](wade::State &state, float) { state.flags = WADE_PHYSICS_HYDROSTATIC | WADE_PHYSICS_QUASI_STEADY; }, "physics"},
+      {[](wade::State &state, float) { state.flags = 1U << 31; }, "flags"},
+      {[](wade::State &state, float value) {
          state.flags = WADE_HAS_HEADING;
          state.heading_rad = value;
        },
