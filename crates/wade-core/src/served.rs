@@ -27,6 +27,11 @@ pub struct Session {
 }
 
 impl Session {
+    /// Along a recording: its accelerations are those that the body had, not those that a loop goes on from.
+    pub fn of_recording() -> Self {
+        Self { base: Memory::of_recording(), ..Self::default() }
+    }
+
     fn split(&mut self) -> (&mut Memory, &mut EffectsSession) {
         (&mut self.base, &mut self.effects)
     }
@@ -99,7 +104,7 @@ impl ServedVehicle {
                 let known =
                     self.model.weights().is_some_and(|weights| matches!(weights.form, Form::Paper(_)));
                 let at_edge = effects.edge(condition).map(|state| {
-                    self.model.evaluate(&state, workspace, edge);
+                    self.model.evaluate_moving(&state, (&motion, None), workspace, edge);
                     edge.wrench
                 });
                 let answer = Answer { condition, forces, wet_parts_known: known, at_edge };

@@ -1,13 +1,16 @@
 //! The shipped vehicles, carried by the program itself: an installation needs no other file.
 
-use super::{HULL_FILE, NETWORK_FILE, PATCHES_FILE, SPEC_FILE, SUBMERGENCE_FILE, SUMS_FILE, VEHICLE_FILE};
+use super::{
+    HULL_FILE, NETWORK_FILE, PATCHES_FILE, RADIATION_FILE, SPEC_FILE, SUBMERGENCE_FILE, SUMS_FILE,
+    VEHICLE_FILE,
+};
 
 /// A bundle inside the program. Its files are verified against its checksums whenever it is read, as those on disk are.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Carried {
     /// Name of the vehicle.
     pub name: &'static str,
-    files: [(&'static str, &'static [u8]); 7],
+    files: [(&'static str, &'static [u8]); 8],
 }
 
 macro_rules! carried {
@@ -28,6 +31,10 @@ macro_rules! carried {
                 (
                     NETWORK_FILE,
                     include_bytes!(concat!("../../../../vehicles/", $name, "/network.safetensors")),
+                ),
+                (
+                    RADIATION_FILE,
+                    include_bytes!(concat!("../../../../vehicles/", $name, "/radiation.safetensors")),
                 ),
                 (SPEC_FILE, include_bytes!(concat!("../../../../vehicles/", $name, "/spec.toml"))),
                 (SUMS_FILE, include_bytes!(concat!("../../../../vehicles/", $name, "/SHA256SUMS"))),

@@ -80,6 +80,8 @@ impl Law for AddedMass {
         name: "added_mass",
         summary: "inertia of the water that moves with the hull",
         equation: "W = -(M_A nu_dot + C_A(nu) nu), M_A = rho V diag(surge, sway, heave, roll (b2+d2)/12, pitch (l2+d2)/12, yaw (l2+b2)/12), or heave, roll, pitch with rho pi b A_wp / 8 for rho V",
+        corrects: "added mass",
+        total: "positive, in every direction",
         // sway and heave in shallow water reach a few times the deep-water value (Zhou, Lo, Tan 2005)
         coefficients: &[
             Coefficient::published("surge", 0.0, 6.0, [0.05, 1.5]),

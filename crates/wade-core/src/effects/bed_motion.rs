@@ -36,6 +36,8 @@ impl Law for BedMotion {
         name: "bed_motion",
         summary: "the vehicle drives over the bed; the model's is parked in a current",
         equation: "F = 1/2 rho A |v_g| (-C_D v_g - C_S v_gy y + C_L |v_g| up), A the wet front or underside or |D| / (1/2 rho K v^2) with the model's drag D; the drag and the side force at the bed, the lift under the center of buoyancy",
+        corrects: "none: the bed acts on added mass alone",
+        total: "either across the motion; takes power along it",
         coefficients: &[
             Coefficient::new("drag", "1", -4.0, 4.0),
             Coefficient::new("lift", "1", -4.0, 4.0),

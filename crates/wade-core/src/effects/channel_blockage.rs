@@ -31,6 +31,8 @@ impl Law for ChannelBlockage {
         name: "channel_blockage",
         summary: "side walls accelerate the flow",
         equation: "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d), or W = k D (((1 - m)(1 - s / d))^-2 - 1) with m and s of squat in a channel",
+        corrects: "none: the base is in open water",
+        total: "adds to the drag",
         coefficients: &[Coefficient::published("strength", 0.0, 5.0, [0.5, 1.5])],
         parameters: &[Parameter { name: "faded_at", unit: "1" }],
         inputs: &[Quantity::Velocity, Quantity::ChannelWidth],

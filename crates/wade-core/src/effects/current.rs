@@ -28,6 +28,8 @@ impl Law for Current {
         name: "current",
         summary: "water that moves over ground",
         equation: "f = D(v - R^T u) - D(v) with the model's drag D",
+        corrects: "none: the velocity through the water, unless a state has a current",
+        total: "either",
         coefficients: &[
             Coefficient::new("east", "m/s", -3.0, 3.0).up_to(1.0),
             Coefficient::new("north", "m/s", -3.0, 3.0).up_to(1.0),

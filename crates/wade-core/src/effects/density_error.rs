@@ -16,6 +16,8 @@ impl Law for DensityError {
         name: "density_error",
         summary: "the water is denser than stated",
         equation: "W = e W_model",
+        corrects: "every term, in proportion",
+        total: "a positive density",
         coefficients: &[Coefficient::new("relative_error", "1", -0.3, 1.0).up_to(0.2)],
         inputs: &[Quantity::ModelWrench],
         experiment: "stand still at three depths, and weigh a liter of the water; a wrong density grows with the depth",

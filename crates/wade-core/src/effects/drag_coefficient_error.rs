@@ -36,6 +36,8 @@ impl Law for DragCoefficientError {
         name: "drag_coefficient_error",
         summary: "quadratic drag with another coefficient",
         equation: "f_i = -1/2 rho C_i A_i |v| v_i",
+        corrects: "drag of the elements, and what was learned of it",
+        total: "takes power: at least zero with the base's",
         // the difference of two coefficients that each lie in 0 to 4
         coefficients: &[
             Coefficient::published("surge", -4.0, 4.0, [-1.0, 1.0]),

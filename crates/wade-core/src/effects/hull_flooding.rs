@@ -30,6 +30,8 @@ impl Law for HullFlooding {
         name: "hull_flooding",
         summary: "water enters the hull",
         equation: "W = -phi rho g V h_in / h_out upwards, dh_in/dt = r sign(h_out - h_in) sqrt(2 g |h_out - h_in|)",
+        corrects: "pressure of still water: the volume displaced",
+        total: "down, by at most the buoyancy",
         coefficients: &[
             Coefficient::new("flooded_share", "1", 0.0, 1.0),
             Coefficient::new("arm_x", "m", -2.0, 2.0),

@@ -252,6 +252,8 @@ mod tests {
         [
             (spec.name.is_empty() || spec.summary.is_empty(), "name or summary"),
             (spec.equation.is_empty() == is_physics, "an equation for physics, and none for a fault"),
+            (spec.corrects.is_empty() == is_physics, "the term of the base that physics corrects"),
+            (spec.total.is_empty() == is_physics, "what base and physics may be together"),
             (spec.coefficients.is_empty(), "coefficients"),
             (!spec.coefficients.iter().all(is_ordered), "bounds in order, about 0"),
             (names().any(|name| name.is_empty() || is_twice(name)), "different names"),
@@ -275,6 +277,8 @@ mod tests {
         let whole = *Effect::AddedMass.spec();
         for broken in [
             EffectSpec { equation: "", ..whole },
+            EffectSpec { corrects: "", ..whole },
+            EffectSpec { total: "", ..whole },
             EffectSpec { kind: Kind::Sensor, ..whole },
             EffectSpec { inputs: &[], ..whole },
             EffectSpec { inputs: &[Quantity::Velocity], ..whole },

@@ -20,6 +20,8 @@ impl Law for LinearDamping {
         name: "linear_damping",
         summary: "drag in proportion to speed",
         equation: "f_i = -c_i rho sqrt(g L) A_i u_i, u = v + omega x r",
+        corrects: "radiation damping and skin friction",
+        total: "takes power",
         coefficients: &[
             Coefficient::published("surge", 0.0, 5.0, [0.0, 0.5]),
             Coefficient::published("sway", 0.0, 5.0, [0.0, 0.5]),

@@ -35,6 +35,8 @@ impl Law for Rotation {
         name: "rotation",
         summary: "local velocity from the angular velocity",
         equation: "f = D(v + omega x r) - D(v), D_i(u) = -1/2 rho C A_i |u| u_i",
+        corrects: "drag with the local velocity v + omega x r",
+        total: "takes power",
         coefficients: &[Coefficient::published("drag_coefficient", 0.0, 6.0, [0.4, 2.1])],
         inputs: &[Quantity::Velocity, Quantity::AngularVelocity],
         rates: &[Rate::Attitude],

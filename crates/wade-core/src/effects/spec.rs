@@ -25,6 +25,10 @@ pub struct EffectSpec {
     pub summary: &'static str,
     /// Equation of a physical effect in a line, without what is common to all: loads act on the wet hull.
     pub equation: &'static str,
+    /// Term of the physical base that a physical effect corrects.
+    pub corrects: &'static str,
+    /// What base and effect together may be.
+    pub total: &'static str,
     /// The coefficients in which the effect is linear; sensor effects have one a wrench component.
     pub coefficients: &'static [Coefficient],
     /// What the coefficients refer to, where their names do not say it.
@@ -55,6 +59,8 @@ impl EffectSpec {
         kind: Kind::Physics,
         summary: "",
         equation: "",
+        corrects: "",
+        total: "",
         coefficients: &[],
         reference: "",
         parameters: &[],

@@ -35,6 +35,8 @@ impl Law for Squat {
         name: "squat",
         summary: "the hull sinks with its own speed",
         equation: "Fz = -c rho g A_wp s, s = v^2 / 2g (or / sqrt(|1 - Fr_h^2|), at most twice), in a channel s / d = Fr_h^2 / 2 (((1 - m)(1 - s / d))^-2 - 1) up to Schijf's limit and from there to 0 at faded_at, m = V / (L w d) but at most b / w, and a trim",
+        corrects: "none: the base has no lift from speed",
+        total: "down",
         coefficients: &[
             Coefficient::published("sinkage", 0.0, 4.0, [0.1, 1.5]),
             Coefficient::new("trim", "1", -2.0, 2.0),

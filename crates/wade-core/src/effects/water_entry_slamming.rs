@@ -36,6 +36,8 @@ impl Law for WaterEntrySlamming {
         name: "water_entry_slamming",
         summary: "impact on entering the water",
         equation: "F = C rho dV/dd w^2 upwards and -C_h rho dV/dd w u across, w the rate of the depth d, on entry only; V the water displaced, or pi l (b d / h)^2 / 8 until d = h, wet_at, on each strip of length l with its own d and w",
+        corrects: "entry",
+        total: "takes power on entry, nothing on exit",
         // von Karman's impact has no reserve: Wagner's is pi/2 of it
         coefficients: &[
             Coefficient::published("vertical", 0.0, 8.0, [0.3, 2.0]),

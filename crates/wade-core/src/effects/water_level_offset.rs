@@ -19,6 +19,8 @@ impl Law for WaterLevelOffset {
         name: "water_level_offset",
         summary: "the water level is higher than stated",
         equation: "W = offset dF/dd: rho g A_wp upwards, and the model's drag in proportion to the depth",
+        corrects: "pressure of still water: its level",
+        total: "either",
         coefficients: &[Coefficient::new("offset", "m", -0.2, 0.2).up_to(0.05)],
         inputs: &[Quantity::Velocity, Quantity::ModelWrench],
         acts_on_own_drag: true,

@@ -39,6 +39,8 @@ impl Law for WaveMemory {
         name: "wave_memory",
         summary: "memory of the waves that the hull made",
         equation: "f_i = -k_i rho V sqrt(g / L) Re z_i, or -k_i rho V (g / (L W)) Im z_i, z' = -(1/T - i W) z + dv/dt in body axes",
+        corrects: "waves",
+        total: "takes power in each period",
         coefficients: &[
             Coefficient::new("surge", "1", -10.0, 10.0),
             Coefficient::new("sway", "1", -10.0, 10.0),

@@ -37,6 +37,8 @@ impl Law for WheelPaddleThrust {
         name: "wheel_paddle_thrust",
         summary: "rotating wheels push water",
         equation: "F = 1/2 rho C pi r^2 wet |omega r| (omega r - v_x) on each wheel, or F = 1/2 rho C r^2 int |u| u cos(phi) dphi over its wet lugs, u = omega r - v_x cos(phi); torque -1/2 rho C_t r^3 of the same without the cosine",
+        corrects: "rim velocity and lugs of the wheels",
+        total: "gives at most the power of the shafts",
         coefficients: &[
             Coefficient::published("thrust", 0.0, 6.0, [0.1, 2.0]),
             Coefficient::new("torque", "1", -12.0, 12.0),

@@ -53,9 +53,20 @@ pub struct Memory {
     waves: [[Vector6<f64>; 2]; POLES],
     /// Acceleration that the added mass resists in explicit integration.
     rate: Option<Vector6<f64>>,
+    /// The states are of a recording.
+    recorded: bool,
 }
 
 impl Memory {
+    /// Of a recording: its accelerations are those that the body had, not those that a loop goes on from.
+    pub fn of_recording() -> Self {
+        Self { recorded: true, ..Self::default() }
+    }
+
+    fn is_empty(&self) -> bool {
+        *self == Self { recorded: self.recorded, ..Self::default() }
+    }
+
     /// Energy in the oscillators over the density, `sum (y^2 + w^2 q^2) / 2` [m5/s2].
     pub fn energy(&self, poles: &[Pole; POLES]) -> f64 {
         let stored = |([y, q], pole): (&[Vector6<f64>; 2], &Pole)| {
@@ -230,6 +241,8 @@ impl Base {
         out.bed_clearance = condition.bed_clearance.unwrap_or_else(|| self.usual_clearance(out.volume));
         (out.hull, out.added_mass, out.damping) = Default::default();
         if motion.physics == Physics::Full {
+            // in a session in which no time has passed yet there is nothing to remember
+            let memory = memory.filter(|memory| motion.time_step > 0.0 || !memory.is_empty());
             self.add_waves(condition, motion, memory, out);
         }
     }
@@ -468,6 +481,9 @@ impl Memory {
         measured: Vector6<f64>,
         dt: f64,
     ) -> Vector6<f64> {
+        if self.recorded {
+            return measured;
+        }
         let before = self.rate.unwrap_or(measured);
         if dt > 0.0 || self.rate.is_none() {
             let right = rigid * measured + added * before;

@@ -10,6 +10,9 @@
 //! cylinder in open-channel flow (Qi, Eames, Johnson, JFM 2014). `C_f` is the ITTC 1957 line (UFC 4-159-03). `s` is the
 //! share that the shelter of the parts upstream leaves.
 //!
+//! Elements of a wheel whose speed `W` is stated have the velocity of its rim too, and besides `C_f` the coefficient
+//! [`TREAD`] `(W r)^2 / ((W r)^2 + |u|^2)` of its lugs: a wheel that stands still has the drag of one of which nothing is stated.
+//!
 //! Every term opposes the velocity of its own element and every factor is positive, so the sum over the elements takes
 //! power from the motion through the water in every state; wheels that turn put in their shaft power at most.
 
@@ -30,7 +33,7 @@ pub const SHELTERING: f64 = 0.5;
 const SIDE_FILM: f64 = 0.01;
 /// The same of a horizontal element, which the water reaches at once: the time that a real bottom, with frame and tilt, takes.
 const BOTTOM_FILM: f64 = 0.5;
-/// Tangential coefficient of a tread [-]: lugs that close a tenth of the annulus they sweep, as plates of a coefficient of 1.2.
+/// Tangential coefficient of a tread that spins in still water [-]: lugs that close a tenth of the annulus they sweep, as plates of a coefficient of 1.2.
 /// Uncertain by a factor of two.
 pub const TREAD: f64 = 0.12;
 /// Reynolds number below which the friction line is held.
@@ -42,8 +45,8 @@ pub struct Drag {
     blocks: Vec<Block>,
     /// Blocks of each surface: from, to.
     ranges: Vec<[usize; 2]>,
-    /// Center of each surface that is a wheel [m].
-    wheels: Vec<Option<Vec3>>,
+    /// Center and radius of each surface that is a wheel [m].
+    wheels: Vec<Option<(Vec3, f64)>>,
     half_length: f64,
     half_width: f64,
     length: f64,
@@ -104,13 +107,19 @@ impl Drag {
             blocks.extend(own.chunks(LANES).map(|chunk| Block::new(chunk, film)));
             ranges.push([from, blocks.len()]);
         }
-        let wheel = |surface: &crate::vehicle::Surface| {
-            (surface.kind == SurfaceKind::Wheel).then_some(surface.centroid)
+        let wheel = |(index, surface): (usize, &crate::vehicle::Surface)| {
+            let from_axle = |e: &Element| {
+                let arm = e.center - surface.centroid;
+                arm.x.hypot(arm.z)
+            };
+            let own = elements.iter().filter(|e| e.surface == index);
+            let radius = own.map(from_axle).fold(0.0, f64::max);
+            (surface.kind == SurfaceKind::Wheel).then_some((surface.centroid, radius))
         };
         Self {
             blocks,
             ranges,
-            wheels: vehicle.surfaces.iter().map(wheel).collect(),
+            wheels: vehicle.surfaces.iter().enumerate().map(wheel).collect(),
             half_length: 0.5 * vehicle.dimensions.length,
             half_width: 0.5 * vehicle.dimensions.width,
             length: vehicle.dimensions.length,
@@ -142,7 +151,12 @@ impl Drag {
             let speed = wheel_speeds[surface];
             let rim = self.wheels[surface].filter(|_| !speed.is_nan());
             let mut sums = Sums::default();
-            let rim = rim.map(|center| [speed, center.x, center.z]);
+            let rim = rim.map(|(center, radius)| {
+                let axle = condition.velocity + condition.angular_velocity.cross(&center);
+                let (spin, past) = ((speed * radius).powi(2), axle.norm_squared());
+                let lugs = if spin > 0.0 { TREAD * spin / (spin + past) } else { 0.0 };
+                [speed, center.x, center.z, lugs]
+            });
             for block in &self.blocks[from..to] {
                 block.add(&flow, rim, &mut sums);
             }
@@ -233,10 +247,10 @@ impl Block {
     }
 
     #[inline(always)]
-    fn add(&self, flow: &Flow, rim: Option<[f64; 3]>, sums: &mut Sums) {
+    fn add(&self, flow: &Flow, rim: Option<[f64; 4]>, sums: &mut Sums) {
         let [ux, uy, uz] = flow.up;
-        let [speed, axle_x, axle_z] = rim.unwrap_or_default();
-        let tangential = if rim.is_some() { flow.friction + TREAD } else { flow.friction };
+        let [speed, axle_x, axle_z, lugs] = rim.unwrap_or_default();
+        let tangential = flow.friction + lugs;
         let pi = std::f64::consts::PI;
         for i in 0..LANES {
             let [x, y, z] = [self.center[0][i], self.center[1][i], self.center[2][i]];

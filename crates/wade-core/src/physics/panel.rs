@@ -51,6 +51,11 @@ impl Basin {
     }
 }
 
+/// Gap between panels, over the smaller of them, that they cannot resolve [-].
+const NARROW: f64 = 0.3;
+/// Cosine between normals from which panels face each other [-].
+const OPPOSITE: f64 = -0.9;
+
 /// The wet parts of elements under level water.
 pub fn wet_panels(elements: &[Element], level: f64) -> Vec<Panel> {
     let panel = |element: &Element| {
@@ -63,6 +68,21 @@ pub fn wet_panels(elements: &[Element], level: f64) -> Vec<Panel> {
         (share > 0.02).then_some(Panel { area: element.area * share, normal: element.normal, center, axes })
     };
     elements.iter().filter_map(panel).collect()
+}
+
+/// Without those that face each other across a gap of less than [`NARROW`] of their size: the water between them moves with the
+/// hull, and panels do not resolve it.
+pub fn without_gaps(panels: Vec<Panel>) -> Vec<Panel> {
+    let faces = |one: &Panel, other: &Panel| {
+        let away = other.center - one.center;
+        let (gap, size) = (away.dot(&one.normal), one.area.min(other.area).sqrt());
+        let within = |axis: &Vec3| away.dot(axis).abs() <= axis.norm_squared();
+        one.normal.dot(&other.normal) < OPPOSITE
+            && (0.0..NARROW * size).contains(&gap)
+            && other.axes.iter().all(within)
+    };
+    let is_open = |panel: &&Panel| !panels.iter().any(|other| faces(panel, other));
+    panels.iter().filter(is_open).cloned().collect()
 }
 
 /// Half axes of a rectangle in the plane of an element with its second moments, which the water reaches to a share.

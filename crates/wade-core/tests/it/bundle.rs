@@ -206,11 +206,11 @@ fn weights_of_another_release_do_not_stand_in_the_way_of_new_ones() {
 }
 
 #[test]
-fn an_untrained_bundle_is_sound_but_not_served() {
+fn a_bundle_without_weights_and_base_is_sound_but_not_served() {
     let copy = copy_of_vehicles();
     let folder = copy.path().join("husky");
     let mut untrained = bundle::read(&folder).expect("sound");
-    untrained.trained = None;
+    (untrained.trained, untrained.radiation) = (None, None);
     bundle::write(&folder, &untrained).expect("written");
     assert!(bundle::read(&folder).expect("sound").trained.is_none());
     assert!(refusal(&folder).contains("train"));
@@ -220,9 +220,9 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn a_flipped_bit_anywhere_is_found(file in 0..6_usize, place in 0.0..1.0_f64, bit in 0..8_u8) {
+    fn a_flipped_bit_anywhere_is_found(file in 0..7_usize, place in 0.0..1.0_f64, bit in 0..8_u8) {
         let names = ["vehicle.toml", "hull.stl", "patches.safetensors", "submergence.safetensors", "network.safetensors",
-                     "SHA256SUMS"];
+                     "radiation.safetensors", "SHA256SUMS"];
         let copy = copy_of_vehicles();
         let path = copy.path().join("husky").join(names[file]);
         let mut bytes = std::fs::read(&path).expect("readable");

@@ -3,7 +3,7 @@
 use crate::common::{Numbers, VEHICLES, model};
 use wade_core::condition::{Condition, GroundContact};
 use wade_core::domain::Quantity;
-use wade_core::forces::Forces;
+use wade_core::forces::{Forces, SurfaceForce};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::model::{Model, Weights, Workspace};
 
@@ -52,8 +52,8 @@ fn the_net_wrench_is_that_of_the_surfaces_about_the_center_of_mass() {
         for _ in 0..50 {
             let forces = evaluate(&model, &numbers.condition());
             let force: Vec3 = forces.surfaces.iter().map(|load| load.force).sum();
-            let moment: Vec3 =
-                forces.surfaces.iter().map(|load| (load.point - about).cross(&load.force)).sum();
+            let of = |load: &SurfaceForce| (load.point - about).cross(&load.force) + load.couple;
+            let moment: Vec3 = forces.surfaces.iter().map(of).sum();
             assert!((forces.wrench.force - force).norm() <= 1e-9 * (1.0 + force.norm()));
             assert!((forces.wrench.moment - moment).norm() <= 1e-9 * (1.0 + moment.norm()));
         }

@@ -1,21 +1,38 @@
-//! The physical base in random states of the whole space: any attitude, dry to drowned, up to 6 m/s and 3 rad/s.
+//! The physical base, alone and below the shipped weights, in random states of the whole space: any attitude, dry to drowned,
+//! up to 6 m/s and 3 rad/s.
+
+use std::f64::consts::TAU;
 
 use nalgebra::{UnitQuaternion, UnitVector3};
 use wade_core::condition::Condition;
+use wade_core::forces::Forces;
 use wade_core::frame::{GRAVITY, Vec3};
-use wade_core::geometry::hydrostatics::surface_hydrostatics;
-use wade_core::physics::{Base, BaseLoads, Motion, Physics};
+use wade_core::geometry::hydrostatics::{float_depth, surface_hydrostatics};
+use wade_core::model::{Model, Workspace};
+use wade_core::physics::{Base, BaseLoads, Memory, Motion, Physics};
 use wade_core::vehicle::{MAX_SURFACES, Vehicle};
 use wade_core::wrench::Wrench;
 
 use crate::bodies::{bodies, radiation};
+use crate::common::{VEHICLES, model};
 use crate::random::Random;
+use crate::release::Release;
 
 const STATES: usize = 100_000;
 
 struct Subject {
     vehicle: Vehicle,
     base: Base,
+    /// Weights and base, of what is shipped.
+    model: Option<Model>,
+}
+
+/// Room for answers.
+#[derive(Default)]
+struct Answer {
+    base: BaseLoads,
+    forces: Forces,
+    workspace: Workspace,
 }
 
 fn subjects() -> &'static [Subject] {
@@ -23,9 +40,15 @@ fn subjects() -> &'static [Subject] {
     ALL.get_or_init(|| {
         let subject = |vehicle: Vehicle| {
             let base = Base::new(&vehicle, radiation(&vehicle));
-            Subject { vehicle, base }
+            Subject { vehicle, base, model: None }
         };
-        bodies().into_iter().map(subject).collect()
+        let shipped = |name: &str| {
+            let model = model(name);
+            let base = model.base().expect("the shipped bundles have it").clone();
+            let vehicle = Vehicle { name: format!("{name}, trained"), ..model.vehicle().clone() };
+            Subject { vehicle, base, model: Some(model) }
+        };
+        bodies().into_iter().map(subject).chain(VEHICLES.map(shipped)).collect()
     })
 }
 
@@ -59,11 +82,19 @@ impl Subject {
         }
     }
 
-    fn loads(&self, state: &Condition, speeds: &[f64], physics: Physics, out: &mut BaseLoads) -> [Wrench; 2] {
+    /// Load of still water and the rest, about the body origin.
+    fn loads(&self, state: &Condition, speeds: &[f64], physics: Physics, out: &mut Answer) -> [Wrench; 2] {
         let motion = Motion { wheel_speeds: speeds, time_step: 0.0, implicit_added_mass: false, physics };
-        self.base.evaluate(state, &motion, None, out);
-        let still = out.surfaces.iter().fold(Wrench::default(), |sum, s| sum + s.hydrostatic);
-        let moving = out.surfaces.iter().fold(out.hull, |sum, s| sum + s.drag);
+        self.base.evaluate(state, &motion, None, &mut out.base);
+        let still = out.base.surfaces.iter().fold(Wrench::default(), |sum, s| sum + s.hydrostatic);
+        let moving = match &self.model {
+            None => out.base.surfaces.iter().fold(out.base.hull, |sum, s| sum + s.drag),
+            Some(model) => {
+                model.evaluate_moving(state, (&motion, None), &mut out.workspace, &mut out.forces);
+                let about = &self.vehicle.center_of_mass;
+                out.forces.wrench.moved(about, &Vec3::zeros()) + still * -1.0
+            }
+        };
         [still, moving]
     }
 }
@@ -81,7 +112,7 @@ fn power(load: &Wrench, state: &Condition) -> f64 {
 
 #[test]
 fn motion_through_the_water_costs_power_in_every_state() {
-    let mut out = BaseLoads::default();
+    let mut out = Answer::default();
     for subject in subjects() {
         let mut random = Random::new(1);
         let mut worst = f64::NEG_INFINITY;
@@ -91,15 +122,29 @@ fn motion_through_the_water_costs_power_in_every_state() {
             let speeds = if index % 2 == 0 { &NO_WHEELS } else { &turning };
             let [_, moving] = subject.loads(&state, speeds, Physics::Full, &mut out);
             let scale = subject.weight() * (state.velocity.norm() + 0.1 * state.angular_velocity.norm());
-            worst = worst.max((power(&moving, &state) - out.shaft_power.max(0.0)) / scale);
+            worst = worst.max((power(&moving, &state) - out.base.shaft_power.max(0.0)) / scale);
         }
         assert!(worst <= 1e-4, "{}: {worst}", subject.vehicle.name);
     }
 }
 
 #[test]
+fn a_wheel_that_stands_still_is_one_of_which_nothing_is_stated() {
+    let mut out = Answer::default();
+    for subject in subjects() {
+        let mut random = Random::new(8);
+        for _ in 0..200 {
+            let state = subject.random(&mut random);
+            let [_, unstated] = subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
+            let [_, still] = subject.loads(&state, &[0.0; MAX_SURFACES], Physics::Full, &mut out);
+            assert_eq!(unstated, still, "{}", subject.vehicle.name);
+        }
+    }
+}
+
+#[test]
 fn at_rest_force_and_moment_are_those_of_the_clipped_hull() {
-    let mut out = BaseLoads::default();
+    let mut out = Answer::default();
     for subject in subjects() {
         let mut random = Random::new(2);
         for _ in 0..STATES / 20 {
@@ -125,7 +170,7 @@ fn at_rest_force_and_moment_are_those_of_the_clipped_hull() {
 
 #[test]
 fn above_the_water_nothing_acts() {
-    let mut out = BaseLoads::default();
+    let mut out = Answer::default();
     for subject in subjects() {
         let mut random = Random::new(3);
         for _ in 0..STATES / 20 {
@@ -141,7 +186,7 @@ fn above_the_water_nothing_acts() {
             state.water_level = Some(lowest - 1e-9 - 0.1 * random.unit());
             let [still, moving] = subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
             assert_eq!((still, moving), (Wrench::default(), Wrench::default()), "{}", subject.vehicle.name);
-            assert_eq!(out.added_mass.norm(), 0.0);
+            assert_eq!(out.base.added_mass.norm(), 0.0);
         }
     }
 }
@@ -150,7 +195,7 @@ fn above_the_water_nothing_acts() {
 fn a_mirrored_state_has_a_mirrored_load() {
     let flip = |v: &Vec3| Vec3::new(v.x, -v.y, v.z);
     let turn = |v: &Vec3| Vec3::new(-v.x, v.y, -v.z);
-    let mut out = BaseLoads::default();
+    let mut out = Answer::default();
     for subject in subjects() {
         let mut random = Random::new(4);
         for _ in 0..STATES / 10 {
@@ -174,13 +219,13 @@ fn a_mirrored_state_has_a_mirrored_load() {
 
 #[test]
 fn added_mass_and_damping_are_symmetric_and_not_negative() {
-    let mut out = BaseLoads::default();
+    let mut out = Answer::default();
     for subject in subjects() {
         let mut random = Random::new(5);
         for _ in 0..STATES / 50 {
             let state = subject.random(&mut random);
             subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
-            for matrix in [out.added_mass, out.damping] {
+            for matrix in [out.base.added_mass, out.base.damping] {
                 let size = matrix.norm().max(1e-9);
                 assert!((matrix - matrix.transpose()).norm() <= 1e-12 * size);
                 let least = matrix.symmetric_eigenvalues().min();
@@ -195,7 +240,7 @@ fn added_mass_and_damping_are_symmetric_and_not_negative() {
 fn no_line_through_the_states_has_a_jump() {
     const LINES: usize = 1_667;
     const STEPS: usize = 40;
-    let mut out = BaseLoads::default();
+    let mut out = Answer::default();
     for subject in subjects() {
         let mut random = Random::new(6);
         let (mut steepest, mut jump) = (0.0_f64, 0.0_f64);
@@ -255,10 +300,10 @@ fn no_line_through_the_states_has_a_jump() {
 #[test]
 fn what_the_water_does_never_adds_energy() {
     let mut out = BaseLoads::default();
-    for subject in subjects() {
+    for subject in subjects().iter().filter(|subject| subject.model.is_none()) {
         let mut random = Random::new(7);
         for _ in 0..20 {
-            let mut run = crate::release::Release::random(&subject.vehicle, &mut random);
+            let mut run = Release::random(&subject.vehicle, &mut random);
             let start = run.energy(&subject.base, &mut out);
             let scale = subject.weight() * subject.size();
             let (mut highest, mut least) = (0.0_f64, start);
@@ -270,5 +315,82 @@ fn what_the_water_does_never_adds_energy() {
             }
             assert!(highest < 1e-3, "{}: energy rose by {highest}", subject.vehicle.name);
         }
+    }
+}
+
+fn shipped(name: &str) -> &'static Subject {
+    subjects().iter().find(|subject| subject.vehicle.name == name).expect("shipped")
+}
+
+fn afloat(subject: &Subject) -> Release<'_> {
+    let vehicle = &subject.vehicle;
+    let mut run = Release::at(vehicle, float_depth(&vehicle.hull.mesh, vehicle.z0, vehicle.mass));
+    run.memory = Some(Memory::default());
+    run
+}
+
+/// Period [s] and damping ratio of a swing about its last value, by its extremes.
+fn decay(swing: &[f64], dt: f64) -> (f64, f64) {
+    let rest = swing[swing.len() - 1];
+    let extremes: Vec<(f64, f64)> = (1..swing.len() - 1)
+        .filter(|&i| (swing[i] - swing[i - 1]) * (swing[i + 1] - swing[i]) < 0.0)
+        .map(|i| (i as f64 * dt, (swing[i] - rest).abs()))
+        .collect();
+    let (first, third) = (extremes[0], extremes[2]);
+    let decrement = (first.1 / third.1).ln();
+    (third.0 - first.0, decrement / decrement.hypot(TAU))
+}
+
+/// Heave, roll and pitch of the Warthog from 5 cm and 3 degrees, with the estimate of its waves. The periods are capytaine's for
+/// 308 panels, and so are the damping ratios of radiation, to which drag adds.
+#[test]
+fn a_floating_hull_that_is_let_go_swings_nearly_as_the_panel_method_says() {
+    let subject = shipped("warthog");
+    let mut out = BaseLoads::default();
+    for (mode, period, ratios) in [(2, 1.43, [0.17, 0.38]), (3, 1.33, [0.014, 0.1]), (4, 1.40, [0.05, 0.15])]
+    {
+        let mut run = afloat(subject);
+        if mode == 2 {
+            run.height += 0.05;
+        } else {
+            run.attitude = UnitQuaternion::from_scaled_axis(Vec3::ith(mode - 3, 3.0_f64.to_radians()));
+        }
+        let dt = 2e-3;
+        let swing: Vec<f64> = (0..6_000)
+            .map(|_| {
+                run.step(&subject.base, dt, &mut out);
+                if mode == 2 { run.height } else { run.attitude.scaled_axis()[mode - 3] }
+            })
+            .collect();
+        let (found, ratio) = decay(&swing, dt);
+        assert!((found / period - 1.0).abs() < 0.2, "mode {mode}: {found} s");
+        assert!(ratio > ratios[0] / 1.5 && ratio < ratios[1] * 1.5, "mode {mode}: {ratio}");
+    }
+}
+
+#[test]
+fn a_hull_that_is_held_across_a_current_stays_where_it_is() {
+    let subject = shipped("warthog");
+    let mut out = BaseLoads::default();
+    for speed in [1.0, 1.5, 2.0] {
+        let mut run = afloat(subject);
+        run.current = Vec3::y() * speed;
+        let at = run.height;
+        let (mut moved, mut tilt, mut late) = (0.0_f64, 0.0_f64, [f64::INFINITY, f64::NEG_INFINITY]);
+        for step in 0..15_000 {
+            run.step(&subject.base, 2e-3, &mut out);
+            // held: it goes up and down and tilts alone
+            let v = run.attitude * run.nu.fixed_rows::<3>(0).into_owned();
+            let free = run.attitude.inverse() * Vec3::new(0.0, 0.0, v.z);
+            run.nu.fixed_rows_mut::<3>(0).copy_from(&free);
+            run.nu[5] = 0.0;
+            moved = moved.max((run.height - at).abs());
+            tilt = tilt.max((run.attitude * Vec3::z()).z.clamp(-1.0, 1.0).acos());
+            if step > 10_000 {
+                late = [late[0].min(run.height), late[1].max(run.height)];
+            }
+        }
+        assert!(moved < 0.1 && tilt < 0.3, "{speed} m/s: {moved} m, {tilt} rad");
+        assert!(late[1] - late[0] < 1e-3, "{speed} m/s: it heaves by itself");
     }
 }

@@ -122,7 +122,8 @@ impl<'a> Release<'a> {
     /// Kinetic energy of body and added mass, potential energy of body and displaced water, energy of the memory [J].
     pub fn energy(&mut self, base: &Base, out: &mut BaseLoads) -> f64 {
         let memory = self.memory;
-        self.loads(base, 0.0, out);
+        // a session in which no time has passed answers as a state alone
+        self.loads(base, f64::MIN_POSITIVE, out);
         self.memory = memory;
         let kinetic = 0.5 * self.nu.dot(&((self.rigid + out.added_mass) * self.nu));
         let plane = self.condition().water_plane(self.vehicle.z0);

@@ -8,7 +8,7 @@ use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
 use wade_core::physics::elements::elements;
-use wade_core::physics::panel::{Panel, wet_panels};
+use wade_core::physics::panel::{Basin, Panel, impulse, wet_panels, without_gaps};
 use wade_core::physics::radiation::{Radiation, Solved, frequencies};
 use wade_core::vehicle::Vehicle;
 
@@ -18,6 +18,12 @@ const HOW_TO_INSTALL: &str = "`python3 -m pip install capytaine==3.0.0 trimesh m
 
 /// What solves a case: JSON in, a line of JSON a case out.
 const SCRIPT: &str = include_str!("solve.py");
+
+/// Most that an added mass may differ from its transpose, over its norm [-]. Panels that are sound come to 1 to 3 %.
+const MOST_SKEW: f64 = 0.1;
+
+/// Factor from the estimate to which an added mass is believed [-]: the estimate is within 1.3 of panels that resolve the hull.
+const FARTHEST: f64 = 1.6;
 
 /// Most panels of a hull: a case then takes seconds.
 const PANELS: usize = 400;
@@ -49,6 +55,17 @@ pub enum PanelCodeError {
         /// How many there are.
         cases: usize,
         /// The last line that it wrote to its standard error.
+        reason: String,
+    },
+    /// It answers for panels that it cannot solve.
+    #[error(
+        "capytaine gives no added mass that water has at a water level of {level:.3} m (over the body origin): {reason}; \
+         the bundle keeps the table it has"
+    )]
+    Unsound {
+        /// Level of the case [m].
+        level: f64,
+        /// What is wrong.
         reason: String,
     },
     /// It says what no panel code says.
@@ -115,13 +132,21 @@ impl Capytaine {
             cases.push(Case {
                 level,
                 depth: bed.map(|bed| level - bed),
-                panels: wet_panels(&elements, level).iter().map(Panel::corners).collect(),
+                panels: without_gaps(wet_panels(&elements, level)).iter().map(Panel::corners).collect(),
             });
             Solved { mass: Matrix6::identity(), damping: vec![Matrix6::zeros(); frequencies(vehicle).len()] }
         });
         let count = cases.len();
         let task = Task { cases, frequencies: frequencies(vehicle).to_vec() };
-        let mut solved = self.solve(&task, count, progress)?.into_iter();
+        let solved = self.solve(&task, count, progress)?;
+        for (case, solved) in task.cases.iter().zip(&solved) {
+            let basin = Basin { level: case.level, bed: case.depth.map(|depth| case.level - depth) };
+            let estimate = impulse(&wet_panels(&elements, case.level), &basin).mass;
+            if let Some(reason) = unsound(&solved.mass, &estimate) {
+                return Err(PanelCodeError::Unsound { level: case.level, reason });
+            }
+        }
+        let mut solved = solved.into_iter();
         let source = format!("capytaine {}", self.version);
         Ok(Radiation::from_solved(vehicle, &source, |_, _| {
             solved.next().unwrap_or_else(|| unreachable!("as many answers as cases"))
@@ -164,6 +189,20 @@ impl Capytaine {
         }
         Ok(solved)
     }
+}
+
+/// Why a matrix is no added mass: that of water is symmetric, positive and of the size that the estimate has.
+fn unsound(mass: &Matrix6<f64>, estimate: &Matrix6<f64>) -> Option<String> {
+    let skew = (mass - mass.transpose()).norm() / mass.norm().max(f64::MIN_POSITIVE);
+    if skew > MOST_SKEW {
+        return Some(format!("it is not symmetric by {:.0} %", 100.0 * skew));
+    }
+    let modes = ["surge", "sway", "heave", "roll", "pitch", "yaw"];
+    (0..6).find_map(|mode| {
+        let times = mass[(mode, mode)] / estimate[(mode, mode)];
+        let is_sound = (1.0 / FARTHEST..FARTHEST).contains(&times);
+        (!is_sound).then(|| format!("in {} it has {times:.2} times the estimate", modes[mode]))
+    })
 }
 
 fn last_line(bytes: &[u8]) -> String {
