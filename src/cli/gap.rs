@@ -11,12 +11,14 @@ use wade_core::effects::{Body, EffectsFile};
 use wade_core::forces::Forces;
 use wade_core::model::kernel::Isa;
 use wade_core::model::{Model, Workspace};
-use wade_gap::{Config, GapError, NotApplicable, Predicted, Report, effects_file};
+use wade_core::physics::{Memory, Motion, Physics};
+use wade_gap::{Asked, Config, GapError, NotApplicable, Predicted, Report, effects_file};
 use wade_learn::files::write_whole;
 use wade_learn::trials::{SimIs, Trials};
 
 use super::gap_bench::GapBench;
 use super::running::Running;
+use super::state::Terms;
 use super::{Vehicles, check_report_folder, emit, usage_error};
 
 /// The form of `--config`, with what holds without one; besides `library`, which names all effects.
@@ -172,6 +174,9 @@ struct Source {
     /// Settings, TOML
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// How much of the bundle's physical base predicts; effects that were found against less are not applied
+    #[arg(long, value_enum, default_value_t = Terms::Full)]
+    physics: Terms,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -187,10 +192,16 @@ impl Gap {
             (Some(Step::Name(source)), _) => source.name(),
             (Some(Step::Fit(source)), _) => source.fit(),
             (Some(Step::Report { source, out }), _) => source.report(&out, None),
+            (Some(Step::Apply { source, .. }), _) if source.physics != Terms::Full => {
+                usage_error("gap apply takes effects that the whole base lacks: leave --physics out")
+            }
             (Some(Step::Apply { source, out, adding }), _) => source.report(&out, Some(&adding)),
             (Some(Step::Bench(bench)), _) => bench.run(),
             (None, Some(_)) if !self.apply && (self.adding.provisional || self.adding.replace) => {
                 usage_error("--provisional and --replace go with --apply")
+            }
+            (None, Some(_)) if self.apply && self.source.physics != Terms::Full => {
+                usage_error("--apply takes effects that the whole base lacks: leave --physics out")
             }
             (None, Some(out)) => self.source.report(&out, self.apply.then_some(&self.adding)),
             (None, None) => usage_error("give --vehicle, --trials and --out, or a step"),
@@ -221,7 +232,7 @@ impl Source {
         let report = if has_bundle {
             let model = library.model(vehicle, Isa::available()[0])?;
             let body = Body::of_vehicle(model.vehicle());
-            wade_gap::run(&trials, &body, &mut predictor(&model), &config)
+            wade_gap::run(&trials, &body, &mut predictor(&model, self.physics.into()), &config)
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
             let nothing = || format!("there is no vehicle `{vehicle}` ({})", library.origin());
@@ -380,11 +391,21 @@ fn check_loss(
     )
 }
 
-/// The model's answers with its uncertainty.
-fn predictor(model: &Model) -> impl FnMut(&wade_core::condition::Condition) -> Predicted {
+/// The model's answers with its uncertainty. What waves remember starts with each run.
+fn predictor(model: &Model, physics: Physics) -> impl FnMut(&Asked<'_>) -> Predicted {
     let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
-    move |condition| {
-        model.evaluate(condition, &mut workspace, &mut forces);
+    let mut memory = Memory::of_recording();
+    move |asked| {
+        if asked.time_step == 0.0 {
+            memory = Memory::of_recording();
+        }
+        let motion = Motion {
+            wheel_speeds: &model.wheel_speeds(asked.wheel_speeds.as_ref()),
+            time_step: asked.time_step,
+            implicit_added_mass: false,
+            physics,
+        };
+        model.evaluate_moving(asked.condition, (&motion, Some(&mut memory)), &mut workspace, &mut forces);
         let (force, moment) = (forces.uncertainty, forces.moment_uncertainty);
         Predicted {
             wrench: forces.wrench,

@@ -69,7 +69,7 @@ impl Predict {
         let mut writer = csv::Writer::from_writer(&mut staged);
         writer.write_record(headers.iter().map(str::to_owned).chain(self.names(vehicle.model())))?;
         let mut evaluator = Evaluator::default();
-        let mut session = headers.iter().any(|header| header == "t").then(Session::default);
+        let mut session = headers.iter().any(|header| header == "t").then(Session::of_recording);
         let mut before: Option<f64> = None;
         let mut far = Far::default();
         for (row, record) in reader.records().enumerate() {

@@ -66,8 +66,20 @@ pub use noise::{Floor, FloorSource};
 pub use report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 pub use run::{body_of, run};
 
+use wade_core::condition::Condition;
 use wade_core::effects::{Effect, Shape};
 use wade_core::wrench::Wrench;
+
+/// A sample of a trial, as a model is asked about it.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    /// State.
+    pub condition: &'a Condition,
+    /// Wheel speeds [rad/s], where all were recorded.
+    pub wheel_speeds: Option<[f64; 4]>,
+    /// Time since the sample before [s]; 0 where a run begins.
+    pub time_step: f64,
+}
 
 /// A model's answer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -17,8 +17,7 @@ use super::smoothing::Smoothing;
 use super::split::hold_out;
 use super::statistics::median;
 use super::verdict::{Found, floor_loss};
-use super::{Config, GapError, Predicted};
-use wade_core::condition::Condition;
+use super::{Asked, Config, GapError, Predicted};
 use wade_core::effects::{Block, Body, Effect, Shape};
 use wade_learn::trials::Trials;
 
@@ -38,11 +37,11 @@ pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
     Ok(Body::of_block(vehicle, block))
 }
 
-/// Runs the workflow. `predict` is asked where trials have no `sim_` columns; it answers about the body's center of mass.
+/// Runs the workflow. `predict` is asked along each trial that has no `sim_` columns; it answers about the body's center of mass.
 pub fn run(
     trials: &Trials,
     body: &Body,
-    predict: &mut dyn FnMut(&Condition) -> Predicted,
+    predict: &mut dyn FnMut(&Asked<'_>) -> Predicted,
     config: &Config,
 ) -> Result<Report, GapError> {
     config.check()?;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::measurement::{Measurement, Motion, is_computed, measurement, of_columns};
 use super::rates::{Coherence, mean_step, rates, smooth_rates, wetting_rate};
-use super::{Config, GapError, Predicted};
+use super::{Asked, Config, GapError, Predicted};
 use wade_core::condition::Condition;
 use wade_core::effects::{Body, Immersion, Input};
 use wade_core::frame::{GRAVITY, Vec3};
@@ -97,7 +97,7 @@ impl Series {
 pub(super) fn series(
     trials: &Trials,
     body: &Body,
-    predict: &mut dyn FnMut(&Condition) -> Predicted,
+    predict: &mut dyn FnMut(&Asked<'_>) -> Predicted,
     config: &Config,
 ) -> Result<(Vec<Series>, Vec<usize>), GapError> {
     let twins: Vec<&String> = trials.manifest.measured.dry_twins.values().collect();
@@ -166,7 +166,7 @@ fn of_trial(
     trials: &Trials,
     trial: &Trial,
     body: &Body,
-    predict: &mut dyn FnMut(&Condition) -> Predicted,
+    predict: &mut dyn FnMut(&Asked<'_>) -> Predicted,
     config: &Config,
 ) -> Result<(Series, [bool; 6]), GapError> {
     let Measurement { wrench: measured, motion, other } = measurement(trials, trial, body.mass)?;
@@ -176,37 +176,18 @@ fn of_trial(
         (0..6).for_each(|c| present[c] &= trial.simulated[c].is_some());
     }
     let count = trial.len();
-    let mut predicted = Vec::with_capacity(count);
-    let mut uncertainty = vec![[0.0; 6]; count];
-    let mut outside = vec![false; count];
-    let mut conditions = Vec::with_capacity(count);
-    let mut immersions = Vec::with_capacity(count);
-    for sample in 0..count {
-        let condition = trial.condition(sample, config.ground_contact);
-        let wrench = if simulated {
-            std::array::from_fn(|c| trial.simulated[c].as_ref().map_or(0.0, |column| column[sample]))
-        } else {
-            // on dry ground there is no water below the wheels
-            let wading = Condition { depth: condition.depth.max(0.0), ..condition };
-            let answer = predict(&wading);
-            uncertainty[sample] = answer.uncertainty;
-            outside[sample] = answer.outside;
-            if condition.depth > DEEPEST * body.height {
-                let (row, depth, height) = (trial.rows[sample], condition.depth, body.height);
-                return Err(GapError::Deep { trial: trial.name.clone(), row, depth, height });
-            }
-            let (f, m) = (answer.wrench.force, answer.wrench.moment);
-            [f.x, f.y, f.z, m.x, m.y, m.z]
-        };
-        if !wrench.iter().all(|value: &f64| value.is_finite()) {
-            return Err(GapError::NotFinite { trial: trial.name.clone(), row: trial.rows[sample] });
-        }
-        predicted.push(wrench);
-        let mut immersion = Immersion::default();
-        body.immerse(&condition, &mut immersion);
-        immersions.push(immersion);
-        conditions.push(condition);
+    let mut conditions: Vec<Condition> =
+        (0..count).map(|sample| trial.condition(sample, config.ground_contact)).collect();
+    if let Some(sample) = (0..count).find(|&i| !simulated && conditions[i].depth > DEEPEST * body.height) {
+        let (row, depth, height) = (trial.rows[sample], conditions[sample].depth, body.height);
+        return Err(GapError::Deep { trial: trial.name.clone(), row, depth, height });
     }
+    let immersion = |condition: &Condition| {
+        let mut immersion = Immersion::default();
+        body.immerse(condition, &mut immersion);
+        immersion
+    };
+    let immersions = conditions.iter().map(immersion).collect();
     let pieces = pieces(&trial.t);
     // the motion of a computed flow is prescribed: what changes within a sample is no noise
     let exact = is_computed(&trials.manifest);
@@ -224,6 +205,33 @@ fn of_trial(
     let recorded_rates = conditions.iter().map(rates).collect();
     if !exact {
         smooth_rates(&trial.t, &pieces, &mut conditions);
+    }
+    let wheels: Vec<[Option<f64>; 4]> = (0..count)
+        .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
+        .collect();
+    let mut predicted = Vec::with_capacity(count);
+    let mut uncertainty = vec![[0.0; 6]; count];
+    let mut outside = vec![false; count];
+    for sample in 0..count {
+        let wrench = if simulated {
+            std::array::from_fn(|c| trial.simulated[c].as_ref().map_or(0.0, |column| column[sample]))
+        } else {
+            let begins = pieces.iter().any(|piece| piece.start == sample);
+            let [fl, fr, rl, rr] = wheels[sample];
+            let answer = predict(&Asked {
+                condition: &conditions[sample],
+                wheel_speeds: fl.zip(fr).zip(rl.zip(rr)).map(|((fl, fr), (rl, rr))| [fl, fr, rl, rr]),
+                time_step: if begins { 0.0 } else { trial.t[sample] - trial.t[sample - 1] },
+            });
+            uncertainty[sample] = answer.uncertainty;
+            outside[sample] = answer.outside;
+            let (f, m) = (answer.wrench.force, answer.wrench.moment);
+            [f.x, f.y, f.z, m.x, m.y, m.z]
+        };
+        if !wrench.iter().all(|value: &f64| value.is_finite()) {
+            return Err(GapError::NotFinite { trial: trial.name.clone(), row: trial.rows[sample] });
+        }
+        predicted.push(wrench);
     }
     let wetting_rate = wetting_rate(&trial.t, &pieces, &trial.depth);
     coherence[6] = Coherence::of(&trial.t, &pieces, |i| wetting_rate[i]);
@@ -246,9 +254,7 @@ fn of_trial(
         inertia: motion.as_ref().map(|motion| inertia(&trial.t, &pieces, motion)),
         dry_rolling: motion.map_or_else(|| vec![0.0; count], |motion| motion.dry_rolling),
         coherence,
-        wheels: (0..count)
-            .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
-            .collect(),
+        wheels,
         yaw: trial.yaw.clone(),
         roll_pitch: trial.roll.iter().zip(&trial.pitch).map(|(r, p)| [*r, *p]).collect(),
         t: trial.t.clone(),

@@ -4,11 +4,10 @@
 //! Effects are planted by formulas of `common/planted.rs`, on a box with another simulator's prediction.
 
 use crate::planted::{self, Noise, State, gaussian, motions, planted as plant, pushes, rms, trials};
-use wade_core::condition::Condition;
 use wade_core::effects::Effect;
 use wade_core::frame::Vec3;
 use wade_core::wrench::Wrench;
-use wade_gap::{Config, GapError, Predicted, Report, Verdict};
+use wade_gap::{Asked, Config, GapError, Predicted, Report, Verdict};
 use wade_learn::random::Random;
 use wade_learn::trials::{Method, Trials};
 
@@ -325,7 +324,8 @@ fn run_with_doubts(trials: Trials) -> Report {
 fn run_outside(mut trials: Trials, deepest: f64) -> Report {
     trials.trials.iter_mut().for_each(|trial| trial.simulated = Default::default());
     let body = wade_gap::body_of(&trials).expect("a body");
-    let mut model = |condition: &Condition| {
+    let mut model = |asked: &Asked<'_>| {
+        let condition = asked.condition;
         let [fx, fy, fz, mx, my, mz] = planted::simulate_at(condition.velocity, condition.depth);
         let wrench = Wrench { force: Vec3::new(fx, fy, fz), moment: Vec3::new(mx, my, mz) };
         Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise), outside: condition.depth > deepest }
