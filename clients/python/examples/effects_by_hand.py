@@ -56,7 +56,8 @@ def add_effects(vehicle: Path, effects: dict[str, dict[str, float]]) -> None:
     """Puts effects into a bundle: name of the effect to the coefficients that are not those of `LIBRARY`."""
     lines = (vehicle / "SHA256SUMS").read_text().splitlines()
     sums = {name: digest for digest, name in (line.split() for line in lines)}
-    text = _file(vehicle.name, sums["network.safetensors"], effects)
+    base = 'base = "physics"\n' if "radiation.safetensors" in sums else ""
+    text = _file(vehicle.name, f'weights_sha256 = "{sums["network.safetensors"]}"\n{base}', effects)
     (vehicle / "effects.toml").write_text(text)
     sums["effects.toml"] = sha256(text.encode()).hexdigest()
     (vehicle / "SHA256SUMS").write_text("".join(f"{sums[name]}  {name}\n" for name in sorted(sums)))
@@ -71,12 +72,12 @@ def copy_with(effects: dict[str, dict[str, float]], out: Path, vehicles: Path = 
     return out
 
 
-def _file(vehicle: str, weights_sha256: str, effects: dict[str, dict[str, float]]) -> str:
+def _file(vehicle: str, stands_on: str, effects: dict[str, dict[str, float]]) -> str:
     parts = [
         f"format = 1\nvehicle = {json.dumps(vehicle)}\n",
         "[evidence]",
         'trials = []\ntrials_sha256 = ""\nsamples = 0\nmodel_sha256 = ""\ntool = "by hand"',
-        f'generated = "chosen, not measured"\nweights_sha256 = "{weights_sha256}"\n',
+        f'generated = "chosen, not measured"\n{stands_on}',
         "[validity]",
         "depth_m = [0.0, 1.0]\nspeed_mps = [0.0, 10.0]\nacceleration_mps2 = [0.0, 1000.0]",
         "angular_speed_radps = [0.0, 20.0]\ndensity_kgpm3 = [900.0, 2000.0]\n",

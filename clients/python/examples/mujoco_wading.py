@@ -1,14 +1,12 @@
 """A Warthog drives down a ramp into the water and out again in MuJoCo, the water's forces asked for at every step.
 
-    python clients/python/examples/effects_by_hand.py --out /tmp/vehicles added_mass linear_damping
-    wade serve --vehicles /tmp/vehicles
+    wade serve
     python clients/python/examples/mujoco_wading.py --plot wading.png --heave heave.png
 
 MuJoCo has no free surface. Here each step of 1 ms asks the server for the net wrench at the present depth, attitude
-and velocity, over shared memory, and puts it on the body that carries the wheels. Where the server has an added mass,
-its matrix goes into MuJoCo's own before the accelerations are solved for: as a force it would follow the acceleration
-of the step before, which diverges when the water that moves along weighs as much as the body (`--heave` draws both).
-A depth below zero cannot be asked for: the water begins when it reaches the ground under the body's origin.
+and velocity, over shared memory, and puts it on the body that carries the wheels. The matrix of added mass goes into
+MuJoCo's own before the accelerations are solved for. As a force (`explicit`) it follows the acceleration of the step
+before; in a session the server solves for what body and water share, so that this is stable too (`--heave` draws both).
 """
 
 from __future__ import annotations
@@ -133,13 +131,10 @@ class Water:
         up_z = data.xmat[self._body, 8]
         return float((WATER_LEVEL - data.xpos[self._body, 2]) / up_z - Z0)
 
-    def apply(self, data: mujoco.MjData) -> wade.Forces | None:
-        """Between `mj_step1` and `mj_step2`: wrench and added mass of this step; None where the vehicle is dry."""
+    def apply(self, data: mujoco.MjData) -> wade.Forces:
+        """Between `mj_step1` and `mj_step2`: wrench and added mass of this step."""
         body, depth = self._body, self.depth(data)
         wrench = data.xfrc_applied[body]
-        if depth <= 0.0:
-            wrench[:] = 0.0
-            return None
         world_from_body = data.xmat[body].reshape(3, 3)
         state = self._state(data, depth, world_from_body)
         start = time.thread_time()
@@ -248,8 +243,8 @@ def run(
         mujoco.mj_step1(model, data)
         stepped_s += time.thread_time() - start
         forces = water.apply(data)
-        force = (0.0, 0.0, 0.0) if forces is None else forces.force_n
-        rows.append((data.time, *data.xpos[body], -math.asin(data.xmat[body, 6]), water.depth(data), *force))
+        pitch = -math.asin(data.xmat[body, 6])
+        rows.append((data.time, *data.xpos[body], pitch, water.depth(data), *forces.force_n))
         if look is not None:
             look(data)
         start = time.thread_time()
@@ -326,7 +321,7 @@ def acceleration(track: Track) -> Any:
 
 
 def plot_heave(implicit: Track, explicit: Track, path: str) -> None:
-    """The same hull let go twice: with a force it swings from step to step, up to the edge of the effect's box."""
+    """The same hull let go twice: the added mass in the mass matrix, and as a force."""
     figure, axes = _figure(2)
     for track, label in ((explicit, "added mass as a force, of the step before"), (implicit, "in the mass matrix")):
         axes[0].plot(track.time, track.depth, label=label)

@@ -4,7 +4,8 @@ use wade_core::domain::Quantity;
 use wade_core::effects::{ActiveEffect, BoxQuantity, Effect};
 use wade_core::frame::Vec3;
 use wade_core::served::ServedVehicle;
-use wade_wire::{Evaluated, added_mass, single};
+use wade_core::wrench::Wrench;
+use wade_wire::{Evaluated, added_mass, by_rows, single};
 
 /// One column of a row.
 pub struct Column {
@@ -30,6 +31,8 @@ pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool) -> Vec<Column> {
     let surfaces = if with_surfaces { vehicle.model().vehicle().surfaces.len() } else { 0 };
     let effects = effects(vehicle);
     let (count, effect_surfaces) = (effects.len(), if effects.is_empty() { 0 } else { surfaces });
+    let has_base = vehicle.model().base().is_some();
+    let couples = if has_base { surfaces } else { 0 };
     let column = |name, kind, shape: &[usize]| Column { name, kind, shape: shape.to_vec() };
     let mut columns = vec![
         column("compute_ns", LONG, &[]),
@@ -37,9 +40,11 @@ pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool) -> Vec<Column> {
         column("force_n", FLOAT, &[3]),
         column("moment_nm", FLOAT, &[3]),
         column("uncertainty_n", FLOAT, &[3]),
+        column("moment_uncertainty_nm", FLOAT, &[3]),
         column("outside", FLOAT, &[Quantity::ALL.len()]),
         column("surface_force_n", FLOAT, &[surfaces, 3]),
         column("surface_point_m", FLOAT, &[surfaces, 3]),
+        column("surface_couple_nm", FLOAT, &[couples, 3]),
         column("wetted_fraction", FLOAT, &[surfaces]),
         column("effect_force_n", FLOAT, &[count, 3]),
         column("effect_moment_nm", FLOAT, &[count, 3]),
@@ -48,8 +53,12 @@ pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool) -> Vec<Column> {
         column("effects_outside", FLOAT, &[BoxQuantity::ALL.len()]),
     ];
     let moves_water = effects.iter().any(|effect| effect.effect() == Effect::AddedMass);
-    if moves_water || vehicle.model().base().is_some() {
+    if moves_water || has_base {
         columns.push(column("added_mass", FLOAT, &[6, 6]));
+    }
+    if has_base {
+        columns.push(column("damping", FLOAT, &[6, 6]));
+        columns.extend(["water_level_m", "bed_clearance_m", "bed"].map(|name| column(name, FLOAT, &[])));
     }
     columns
 }
@@ -60,7 +69,8 @@ pub fn push(rows: &mut Vec<u8>, evaluated: &Evaluated<'_>, begins: bool, with_su
     let surfaces = if with_surfaces { &forces.surfaces[..] } else { &[] };
     rows.extend(compute_ns.to_le_bytes());
     rows.extend(u32::from(begins).to_le_bytes());
-    for vector in [&forces.wrench.force, &forces.wrench.moment, &forces.uncertainty] {
+    let Wrench { force, moment } = &forces.wrench;
+    for vector in [force, moment, &forces.uncertainty, &forces.moment_uncertainty] {
         push_vector(rows, vector);
     }
     push_floats(rows, forces.outside.excess.map(|excess| excess as f32));
@@ -69,6 +79,11 @@ pub fn push(rows: &mut Vec<u8>, evaluated: &Evaluated<'_>, begins: bool, with_su
     }
     for load in surfaces {
         push_vector(rows, &load.point);
+    }
+    if forces.base.is_some() {
+        for load in surfaces {
+            push_vector(rows, &load.couple);
+        }
     }
     push_floats(rows, surfaces.iter().map(|load| load.wetted_fraction as f32));
     for load in &effects.loads {
@@ -87,6 +102,10 @@ pub fn push(rows: &mut Vec<u8>, evaluated: &Evaluated<'_>, begins: bool, with_su
     }
     push_floats(rows, effects.outside.map(|excess| excess as f32));
     push_floats(rows, added_mass(effects).into_iter().flatten());
+    if let Some(base) = &forces.base {
+        push_floats(rows, by_rows(&base.damping));
+        push_floats(rows, [base.water_level, base.bed_clearance, base.bed].map(|x| x as f32));
+    }
 }
 
 fn push_vector(rows: &mut Vec<u8>, vector: &Vec3) {

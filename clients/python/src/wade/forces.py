@@ -95,10 +95,14 @@ class Forces:
     about_m: Array
     #: One standard deviation of the net force [N], `[3]`.
     uncertainty_n: Array
+    #: One standard deviation of the net moment [N m], `[3]`.
+    moment_uncertainty_nm: Array
     #: Force of the model on each surface [N], `[K, 3]`; K is 0 where the surfaces were left out.
     surface_force_n: Array
     #: Point at which it acts [m], `[K, 3]`.
     surface_point_m: Array
+    #: Moment of its load about that point [N m], `[K, 3]`; K is 0 of a bundle without the physical base.
+    surface_couple_nm: Array
     #: Share of each surface under water, `[K]`.
     wetted_fraction: Array
     #: How far each `Quantity` lies outside the training domain, in its unit: negative below, positive above, 0 within.
@@ -118,8 +122,17 @@ class Forces:
     effects_outside: Array
     #: Added mass and inertia about `about_m` [kg, kg m, kg m2], `[6, 6]`, forces first. The wrench is `-M_A nu_dot`,
     #: with the rates of the body components of the velocity of the center of mass and of the angular velocity. None
-    #: where the model has no such effect.
+    #: of a bundle without the physical base or such an effect.
     added_mass: Array | None
+    #: Linear damping by waves about `about_m` [kg/s, kg m/s, kg m2/s], `[6, 6]`: the wrench is `-B nu`. Zero in a run of
+    #: states, whose memory has it. None of a bundle without the physical base, as what follows.
+    damping: Array | None
+    #: Height of the still water above the body's origin along up, as used [m].
+    water_level_m: Array | None
+    #: Distance from the ground-contact plane down to the bed, as used [m].
+    bed_clearance_m: Array | None
+    #: Share of the motion through the water that is motion over the bed, as used.
+    bed: Array | None
     #: True where a run of states begins with this one: effects remember nothing yet. In the middle of a run it says
     #: that the server has forgotten it.
     session_begins: NDArray[np.bool_] | np.bool_

@@ -129,6 +129,7 @@ class _Vehicle:
     row: np.dtype[Any]
     net_row: np.dtype[Any]
     has_added_mass: bool
+    has_base: bool
     effects: tuple[Effect | int, ...]
     about_m: Array
     version: int
@@ -144,6 +145,7 @@ class _Vehicle:
             row=row,
             net_row=np.dtype(native.columns(False)),
             has_added_mass="added_mass" in (row.names or ()),
+            has_base="damping" in (row.names or ()),
             effects=tuple(named_effect(code) for code in native.effects),
             about_m=about,
             version=native.version,
@@ -152,13 +154,19 @@ class _Vehicle:
 
     def forces(self, answer: Any, array: Callable[[Any], Any]) -> Forces:
         """A row, or N of them."""
+
+        def of_base(name: str) -> Any:
+            return array(answer[name]) if self.has_base else None
+
         return Forces(
             force_n=array(answer["force_n"]),
             moment_nm=array(answer["moment_nm"]),
             about_m=self.about_m,
             uncertainty_n=array(answer["uncertainty_n"]),
+            moment_uncertainty_nm=array(answer["moment_uncertainty_nm"]),
             surface_force_n=array(answer["surface_force_n"]),
             surface_point_m=array(answer["surface_point_m"]),
+            surface_couple_nm=array(answer["surface_couple_nm"]),
             wetted_fraction=array(answer["wetted_fraction"]),
             outside=array(answer["outside"]),
             effects=self.effects,
@@ -168,6 +176,10 @@ class _Vehicle:
             effect_surface_force_n=array(answer["effect_surface_force_n"]),
             effects_outside=array(answer["effects_outside"]),
             added_mass=array(answer["added_mass"]) if self.has_added_mass else None,
+            damping=of_base("damping"),
+            water_level_m=of_base("water_level_m"),
+            bed_clearance_m=of_base("bed_clearance_m"),
+            bed=of_base("bed"),
             session_begins=answer["session_begins"] != 0,
             bundle_version=self.version,
             provenance=self.provenance,

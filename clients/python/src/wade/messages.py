@@ -168,14 +168,18 @@ def reload_request(vehicle: str) -> Message:
 def forces(response: Any, session_begins: bool = False) -> Forces:
     """The answer to a single state."""
     wrench = response.wrench
-    net = _vectors((wrench.force_n, wrench.moment_nm, wrench.about_m, response.uncertainty_n))
+    deviations = (response.uncertainty_n, response.moment_uncertainty_nm)
+    net = _vectors((wrench.force_n, wrench.moment_nm, wrench.about_m, *deviations))
+    base = response.base if response.HasField("base") else None
     return Forces(
         force_n=net[0],
         moment_nm=net[1],
         about_m=net[2],
         uncertainty_n=net[3],
+        moment_uncertainty_nm=net[4],
         surface_force_n=_floats(response.surface_force_n, -1, 3),
         surface_point_m=_floats(response.surface_point_m, -1, 3),
+        surface_couple_nm=_floats(response.surface_couple_nm, -1, 3),
         wetted_fraction=_floats(response.wetted_fraction, -1),
         outside=_outside(response.outside, 1, len(Quantity))[0],
         effects=tuple(named_effect(load.effect) for load in response.effects),
@@ -185,6 +189,10 @@ def forces(response: Any, session_begins: bool = False) -> Forces:
         effect_surface_force_n=_floats(response.effect_surface_force_n, -1, 3),
         effects_outside=_outside(response.effects_outside, 1, len(BoxQuantity))[0],
         added_mass=_floats(response.added_mass, 6, 6) if response.added_mass else None,
+        damping=_floats(base.damping, 6, 6) if base else None,
+        water_level_m=np.array(base.water_level_m, np.float32) if base else None,
+        bed_clearance_m=np.array(base.bed_clearance_m, np.float32) if base else None,
+        bed=np.array(base.bed, np.float32) if base else None,
         session_begins=np.bool_(session_begins),
         bundle_version=response.bundle_version,
         provenance=response.provenance,
@@ -196,14 +204,22 @@ def batch_forces(response: Any, length: int) -> Forces:
     """The answer to a batch of this length."""
     wetted = _floats(response.wetted_fraction, length, len(response.wetted_fraction) // (4 * length))
     effects = len(response.effects)
+    couples = wetted.shape[1] if response.surface_couple_nm else 0
+    base = list(response.base)
+
+    def of_base(name: str) -> np.ndarray | None:
+        return np.array([getattr(one, name) for one in base], np.float32) if base else None
+
     moved = _floats(response.effect_surface_force_n, length, len(response.effect_surface_force_n) // (12 * length), 3)
     return Forces(
         force_n=_floats(response.force_n, length, 3),
         moment_nm=_floats(response.moment_nm, length, 3),
         about_m=_vector(response.about_m),
         uncertainty_n=_floats(response.uncertainty_n, length, 3),
+        moment_uncertainty_nm=_floats(response.moment_uncertainty_nm, length, 3),
         surface_force_n=_floats(response.surface_force_n, *wetted.shape, 3),
         surface_point_m=_floats(response.surface_point_m, *wetted.shape, 3),
+        surface_couple_nm=_floats(response.surface_couple_nm, length, couples, 3),
         wetted_fraction=wetted,
         outside=_outside(response.outside, length, len(Quantity)),
         # packed enumerations: a byte each
@@ -214,6 +230,10 @@ def batch_forces(response: Any, length: int) -> Forces:
         effect_surface_force_n=moved,
         effects_outside=_outside(response.effects_outside, length, len(BoxQuantity)),
         added_mass=_floats(response.added_mass, length, 6, 6) if response.added_mass else None,
+        damping=_floats(b"".join(one.damping for one in base), length, 6, 6) if base else None,
+        water_level_m=of_base("water_level_m"),
+        bed_clearance_m=of_base("bed_clearance_m"),
+        bed=of_base("bed"),
         session_begins=np.zeros(length, bool),
         bundle_version=response.bundle_version,
         provenance=response.provenance,

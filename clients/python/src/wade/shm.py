@@ -208,14 +208,17 @@ def _write_batch(
 
 def _forces(answer: np.void) -> Forces:
     surfaces, flags = answer["surfaces"][: _surface_count(answer)], int(answer["flags"])
+    has_base = flags & layout.HAS_DAMPING != 0
     effects, effect_force, effect_moment, left_out, effect_surface_force, effects_outside = _effects(answer, surfaces)
     return Forces(
         force_n=answer["force_n"],
         moment_nm=answer["moment_nm"],
         about_m=answer["about_m"],
         uncertainty_n=answer["force_deviation_n"],
+        moment_uncertainty_nm=answer["moment_deviation_nm"],
         surface_force_n=surfaces["force_n"],
         surface_point_m=surfaces["point_m"],
+        surface_couple_nm=surfaces["couple_nm"] if has_base else _NO_VECTORS,
         wetted_fraction=surfaces["wetted_fraction"],
         outside=answer["outside"][:_QUANTITIES],
         effects=effects,
@@ -225,6 +228,10 @@ def _forces(answer: np.void) -> Forces:
         effect_surface_force_n=effect_surface_force,
         effects_outside=effects_outside,
         added_mass=answer["added_mass"].reshape(6, 6) if flags & layout.HAS_ADDED_MASS else None,
+        damping=answer["damping"].reshape(6, 6) if has_base else None,
+        water_level_m=answer["water_level_m"] if has_base else None,
+        bed_clearance_m=answer["bed_clearance_m"] if has_base else None,
+        bed=answer["bed"] if has_base else None,
         session_begins=_YES if flags & layout.SESSION_BEGINS else _NO,
         bundle_version=int(answer["bundle_version"]),
         provenance=answer["provenance"].decode(errors="ignore"),
@@ -258,12 +265,21 @@ def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, 
         forces = _empty(answers[0], length, _surface_count(answers[0]) if with_surfaces else 0)
     forces.force_n[chunk], forces.moment_nm[chunk] = answers["force_n"], answers["moment_nm"]
     forces.uncertainty_n[chunk] = answers["force_deviation_n"]
+    forces.moment_uncertainty_nm[chunk] = answers["moment_deviation_nm"]
     forces.outside[chunk] = answers["outside"][:, :_QUANTITIES]
     count = forces.wetted_fraction.shape[1]
     if count:
         surfaces = answers["surfaces"][:, :count]
         forces.surface_force_n[chunk], forces.surface_point_m[chunk] = surfaces["force_n"], surfaces["point_m"]
         forces.wetted_fraction[chunk] = surfaces["wetted_fraction"]
+        if forces.surface_couple_nm.shape[1]:
+            forces.surface_couple_nm[chunk] = surfaces["couple_nm"]
+    for matrix, name in ((forces.added_mass, "added_mass"), (forces.damping, "damping")):
+        if matrix is not None:
+            matrix[chunk] = answers[name].reshape(-1, 6, 6)
+    for name in ("water_level_m", "bed_clearance_m", "bed"):
+        if (values := getattr(forces, name)) is not None:
+            values[chunk] = answers[name]
     _read_effects(answers, forces, chunk)
     np.asarray(forces.session_begins)[chunk] = answers["flags"] & layout.SESSION_BEGINS != 0
     forces.compute_ns += int(batch["compute_ns"])
@@ -280,22 +296,23 @@ def _read_effects(answers: Any, forces: Forces, chunk: slice) -> None:
     forces.effects_outside[chunk] = answers["effects_outside"][:, :_BOX_QUANTITIES]
     surfaces = forces.effect_surface_force_n.shape[1]
     forces.effect_surface_force_n[chunk] = answers["surfaces"]["effect_force_n"][:, :surfaces]
-    if forces.added_mass is not None:
-        forces.added_mass[chunk] = answers["added_mass"].reshape(-1, 6, 6)
 
 
 def _empty(answer: np.void, length: int, surfaces: int) -> Forces:
     def array(*shape: int) -> Array:
         return np.empty((length, *shape), np.float32)
 
-    effects = _named(answer["effects"][: _effect_count(answer)])
+    effects, flags = _named(answer["effects"][: _effect_count(answer)]), int(answer["flags"])
+    has_base = flags & layout.HAS_DAMPING != 0
     return Forces(
         force_n=array(3),
         moment_nm=array(3),
         about_m=answer["about_m"].copy(),
         uncertainty_n=array(3),
+        moment_uncertainty_nm=array(3),
         surface_force_n=array(surfaces, 3),
         surface_point_m=array(surfaces, 3),
+        surface_couple_nm=array(surfaces if has_base else 0, 3),
         wetted_fraction=array(surfaces),
         outside=array(_QUANTITIES),
         effects=effects,
@@ -304,7 +321,11 @@ def _empty(answer: np.void, length: int, surfaces: int) -> Forces:
         effect_left_out=np.empty((length, len(effects)), np.uint8),
         effect_surface_force_n=array(surfaces if effects else 0, 3),
         effects_outside=np.zeros((length, _BOX_QUANTITIES), np.float32),
-        added_mass=array(6, 6) if int(answer["flags"]) & layout.HAS_ADDED_MASS else None,
+        added_mass=array(6, 6) if flags & layout.HAS_ADDED_MASS else None,
+        damping=array(6, 6) if has_base else None,
+        water_level_m=array() if has_base else None,
+        bed_clearance_m=array() if has_base else None,
+        bed=array() if has_base else None,
         session_begins=np.empty(length, bool),
         bundle_version=int(answer["bundle_version"]),
         provenance=answer["provenance"].decode(errors="ignore"),
