@@ -17,14 +17,33 @@ fn states(count: usize) -> Vec<State> {
 fn every_transport_answers_the_same_bits() {
     let served = Served::start();
     for vehicle in VEHICLES {
-        let mut library = InProcess::new(Arc::new(served_vehicle(vehicle)));
+        let vehicle_served = Arc::new(served_vehicle(vehicle));
+        let mut alone = InProcess::new(Arc::clone(&vehicle_served));
+        let mut in_session = InProcess::new(vehicle_served).in_session();
         let mut clients = served.clients(vehicle);
         for state in states(100) {
-            let expected = comparable(library.evaluate(&state).expect("valid"));
+            let alone = comparable(alone.evaluate(&state).expect("valid"));
+            let in_session = comparable(in_session.evaluate(&state).expect("valid"));
             for (name, client) in &mut clients {
+                let expected = if name.ends_with("stream") { &in_session } else { &alone };
                 let reply = comparable(client.evaluate(&state).expect("answered"));
-                assert_eq!(reply, expected, "{vehicle} over {name}: {state:?}");
+                assert_eq!(&reply, expected, "{vehicle} over {name}: {state:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_session_in_which_no_time_passes_answers_as_states_alone() {
+    for vehicle in VEHICLES {
+        let vehicle = Arc::new(served_vehicle(vehicle));
+        let (mut alone, mut in_session) =
+            (InProcess::new(Arc::clone(&vehicle)), InProcess::new(vehicle).in_session());
+        for state in states(100) {
+            let state = State { time_step: 0.0, ..state };
+            let [alone, in_session] = [&mut alone, &mut in_session]
+                .map(|client| comparable(client.evaluate(&state).expect("valid")));
+            assert_eq!(alone, in_session, "{state:?}");
         }
     }
 }

@@ -51,6 +51,26 @@ pub fn measure(subjects: &mut [Subject]) {
     }
 }
 
+/// Commit, processor and time of a measurement.
+pub fn machine() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs();
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let cpu = cpuinfo.lines().find_map(|line| line.strip_prefix("model name\t: ")).unwrap_or("unknown");
+    let cores = cpuinfo.lines().filter(|line| line.starts_with("processor")).count();
+    format!("commit {}, {cpu}, {cores} cores, {seconds} s since 1970", env!("WADE_COMMIT"))
+}
+
+/// Writes a table into the folder after `--out`, if there is one.
+pub fn write(name: &str, csv: &str) {
+    let arguments: Vec<String> = std::env::args().collect();
+    let out = arguments.iter().position(|a| a == "--out").and_then(|i| arguments.get(i + 1));
+    let Some(folder) = out.map(PathBuf::from) else { return };
+    let path = folder.join(format!("{name}.csv"));
+    std::fs::create_dir_all(&folder).expect("the folder");
+    std::fs::write(&path, csv).expect("the table");
+    println!("{}", path.display());
+}
+
 /// What a bench prints and writes.
 pub struct Table {
     name: &'static str,
@@ -96,22 +116,11 @@ impl Table {
 
     /// Writes the table into the folder after `--out`, if there is one.
     pub fn write_where_asked(&self) {
-        let arguments: Vec<String> = std::env::args().collect();
-        let out = arguments.iter().position(|a| a == "--out").and_then(|i| arguments.get(i + 1));
-        let Some(folder) = out.map(PathBuf::from) else { return };
-        let path = folder.join(format!("{}.csv", self.name));
-        std::fs::create_dir_all(&folder).expect("the folder");
-        std::fs::write(&path, self.csv()).expect("the table");
-        println!("{}", path.display());
+        write(self.name, &self.csv());
     }
 
     fn csv(&self) -> String {
-        let seconds = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs();
-        let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-        let cpu = cpuinfo.lines().find_map(|line| line.strip_prefix("model name\t: ")).unwrap_or("unknown");
-        let cores = cpuinfo.lines().filter(|line| line.starts_with("processor")).count();
-        let commit = env!("WADE_COMMIT");
-        let mut csv = format!("# commit {commit}, {cpu}, {cores} cores, {seconds} s since 1970\n");
+        let mut csv = format!("# {}\n", machine());
         if let Some(peak) = self.peak {
             // writing to a String cannot fail
             let _ = writeln!(csv, "# peak of the core {:.1} GFLOP/s in single precision", 2e-9 * peak);

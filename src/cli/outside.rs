@@ -78,7 +78,7 @@ fn distance(excess: f64) -> String {
     let weight = 100.0 * Anchored::trust(times);
     format!(
         "nearest training state: {} times the usual spacing of the training states away; the trained part has a weight \
-         of {weight:.0} %, the rest is hydrostatics and a simple drag",
+         of {weight:.0} %, the rest is the base",
         short(times)
     )
 }

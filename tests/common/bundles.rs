@@ -13,11 +13,13 @@ use wade_core::effects::{
     ActiveEffect, Between, Circumstances, Effect, EffectsFile, Evidence, Kind, ParameterValue, Shape,
     Validity,
 };
+use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_roll_pitch};
-use wade_core::model::Model;
 use wade_core::model::kernel::Isa;
-use wade_core::physics::Physics;
+use wade_core::model::{Model, Workspace};
+use wade_core::physics::{Memory, Motion, Physics};
 use wade_core::served::ServedVehicle;
+use wade_core::wrench::Wrench;
 
 pub const VEHICLES: [&str; 2] = ["husky", "warthog"];
 
@@ -38,6 +40,36 @@ pub fn model(vehicle: &str) -> Model {
 pub fn served_vehicle(vehicle: &str) -> ServedVehicle {
     bundle::load_served(&vehicles().join(vehicle), Isa::available()[0])
         .expect("the shipped bundles are sound")
+}
+
+/// What a model answers along a recording.
+pub struct Recording<'a> {
+    model: &'a Model,
+    memory: Memory,
+    workspace: Workspace,
+    forces: Forces,
+}
+
+impl<'a> Recording<'a> {
+    pub fn of(model: &'a Model) -> Self {
+        let (workspace, forces) = (Workspace::new(), Forces::default());
+        Self { model, memory: Memory::of_recording(), workspace, forces }
+    }
+
+    /// Net wrench in the next state; `wheel_speeds` as the model has them.
+    pub fn wrench(
+        &mut self,
+        condition: &Condition,
+        wheel_speeds: Option<&[f64; 4]>,
+        time_step: f64,
+    ) -> Wrench {
+        let speeds = self.model.wheel_speeds(wheel_speeds);
+        let motion =
+            Motion { wheel_speeds: &speeds, time_step, implicit_added_mass: false, physics: Physics::Full };
+        let Self { model, memory, workspace, forces } = self;
+        model.evaluate_moving(condition, (&motion, Some(memory)), workspace, forces);
+        forces.wrench
+    }
 }
 
 /// An effect with made-up numbers, one for every coefficient.
@@ -109,6 +141,13 @@ pub fn copy_with_every_effect() -> TempDir {
         bundle::apply(&copy.path().join(vehicle), every_effect(vehicle)).expect("applied");
     }
     copy
+}
+
+/// The weights of a shipped vehicle without the base below them.
+pub fn without_base_on(vehicle: &str, isa: Isa) -> Model {
+    let model = model_on(vehicle, isa);
+    let weights = model.weights().expect("the shipped bundles are trained").clone();
+    Model::new(model.vehicle().clone(), model.version(), model.domain().clone(), weights, isa)
 }
 
 pub fn model_on(vehicle: &str, isa: Isa) -> Model {

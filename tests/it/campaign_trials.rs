@@ -294,8 +294,9 @@ fn what_is_not_there_or_would_be_mixed_is_refused() {
     refused(&["paper"], "holds files already");
 }
 
-/// What the workflow says of the committed ramps of a vehicle, with the seed that says what is kept back.
-fn of_ramps(vehicle: &str, seed: u64) -> Value {
+/// What the workflow says of the committed ramps of a vehicle against a part of the base, with the seed that says what is kept
+/// back.
+fn of_ramps(vehicle: &str, physics: &str, seed: u64) -> Value {
     let folder = TempDir::new().expect("a folder");
     let (trials, out) = (folder.path().join("trials"), folder.path().join("gap"));
     let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("campaigns").join(vehicle);
@@ -304,7 +305,7 @@ fn of_ramps(vehicle: &str, seed: u64) -> Value {
     let config = folder.path().join("gap.toml");
     std::fs::write(&config, format!("seed = {seed}\n")).expect("written");
     let output = Command::new(env!("CARGO_BIN_EXE_wade"))
-        .args(["gap", "--vehicle", vehicle, "--json", "--trials"])
+        .args(["gap", "--vehicle", vehicle, "--physics", physics, "--json", "--trials"])
         .args([trials.as_path(), Path::new("--out"), &out, Path::new("--config"), &config])
         .env("WADE_VEHICLES", crate::common::vehicles())
         .output()
@@ -336,7 +337,7 @@ fn left(report: &Value, component: &str) -> f64 {
 
 #[test]
 fn the_water_that_the_husky_moves_and_its_waves_are_named_from_computed_ramps() {
-    let report = of_ramps("husky", 1);
+    let report = of_ramps("husky", "quasi_steady", 1);
     within(&report["effects"][0], "added_mass", &[("surge", [0.1, 0.35]), ("sway", [0.2, 0.9])]);
     let memory = [("surge", [0.15, 0.6]), ("sway", [0.8, 2.0]), ("time_constant", [0.3, 0.9])];
     within(&report["effects"][1], "wave_memory", &memory);
@@ -346,7 +347,7 @@ fn the_water_that_the_husky_moves_and_its_waves_are_named_from_computed_ramps() 
 
 #[test]
 fn what_outlasts_the_ramps_of_the_warthog_is_named_and_brings_the_model_nearer() {
-    let report = of_ramps("warthog", 3);
+    let report = of_ramps("warthog", "quasi_steady", 3);
     let memory = [("surge", [0.2, 0.6]), ("sway", [0.8, 2.0]), ("time_constant", [0.3, 0.9])];
     within(&report["effects"][0], "wave_memory", &memory);
     assert_eq!(report["effects"].as_array().map(Vec::len), Some(1));

@@ -214,7 +214,7 @@ fn a_vehicle_is_built_from_an_stl_and_a_vehicle_file() {
 fn a_table_of_states_gets_its_forces() {
     let folder = TempDir::new().expect("a folder");
     let (states, out) = (folder.path().join("in.csv"), folder.path().join("out.csv"));
-    std::fs::write(&states, "t,vx,vy,vz,depth,note\n0,0.5,0,0,0.1,a\n1,0.8,0,0,0.18,b\n").expect("written");
+    std::fs::write(&states, "vx,vy,vz,depth,note\n0.5,0,0,0.1,a\n0.8,0,0,0.18,b\n").expect("written");
     let arguments = [
         "predict",
         "--vehicle",

@@ -7,10 +7,8 @@ use std::process::{Command, Output};
 use serde_json::Value;
 use tempfile::TempDir;
 use wade_core::condition::Condition;
-use wade_core::forces::Forces;
 use wade_core::frame::Vec3;
 use wade_core::geometry::hydrostatics::hydrostatics;
-use wade_core::model::Workspace;
 use wade_learn::random::Random;
 
 /// Runs the program on copies of the shipped bundles: what is applied is written into them.
@@ -26,7 +24,6 @@ fn gaussian(random: &mut Random) -> f64 {
 /// Runs of a Warthog whose measured wrench is the bundle's own and an added mass of 0.8 of the displaced water along x.
 fn trials(folder: &Path, count: usize) {
     let model = crate::common::model("warthog");
-    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
     let mut random = Random::new(5);
     let manifest =
         "vehicle = \"warthog\"\ngenerated = \"planted, for tests\"\n[measured]\nmethod = \"load_cell\"\n";
@@ -40,13 +37,16 @@ fn trials(folder: &Path, count: usize) {
         let plane = Condition::level(Vec3::zeros(), depth).water_plane(model.vehicle().z0);
         let mesh = &model.vehicle().hull.mesh;
         let displaced = hydrostatics(mesh, &plane, 1000.0, &Vec3::zeros()).displaced_volume;
+        let mut recording = crate::common::Recording::of(&model);
         let mut text = "t,vx,vy,vz,wx,wy,wz,depth,ax,ay,az,fx,fz\n".to_owned();
         for i in 0..700 {
             let t = f64::from(i) * 0.01;
             let (v, a) = (speed(t), (speed(t + 1e-4) - speed(t - 1e-4)) / 2e-4);
-            let condition = Condition::level(Vec3::new(v, 0.0, 0.0), depth);
-            model.evaluate(&condition, &mut workspace, &mut forces);
-            let wrench = forces.wrench;
+            let condition = Condition {
+                acceleration: Vec3::new(a, 0.0, 0.0),
+                ..Condition::level(Vec3::new(v, 0.0, 0.0), depth)
+            };
+            let wrench = recording.wrench(&condition, None, if i == 0 { 0.0 } else { 0.01 });
             let fx = wrench.force.x - 0.8 * 1000.0 * displaced * a + 8.0 * gaussian(&mut random);
             let fz = wrench.force.z + 12.0 * gaussian(&mut random);
             let (v, a) = (v + 0.005 * gaussian(&mut random), a + 0.1 * gaussian(&mut random));
@@ -114,6 +114,21 @@ fn a_hidden_added_mass_is_named_and_written() {
         serde_json::from_slice::<Value>(&output.stdout).expect("JSON")
     };
     assert_eq!(step("name")["effects"][0], "added_mass");
+    // beside a base without inertia, the trials show its share too
+    let output = wade(&[
+        "gap",
+        "fit",
+        "--vehicle",
+        "warthog",
+        "--trials",
+        data,
+        "--json",
+        "--physics",
+        "quasi_steady",
+    ]);
+    let fitted: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let whole = fitted["effects"][0]["parameters"]["surge"]["value"].as_f64().expect("a number");
+    assert!(fitted["effects"][0]["name"] == "added_mass" && whole > surge + 0.05, "{fitted}");
     assert_eq!(step("locate")["regions"], report["regions"]);
     assert_eq!(step("fit")["effects"][0]["parameters"], effect["parameters"]);
 }

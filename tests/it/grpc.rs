@@ -433,12 +433,15 @@ fn a_file_in_the_place_of_the_socket_is_not_removed() {
 }
 
 #[test]
-fn a_vehicle_without_weights_is_left_out_and_the_others_are_served() {
+fn a_vehicle_without_weights_and_base_is_left_out_and_the_others_are_served() {
     let folder = crate::common::copy_of_vehicles();
     let path = folder.path().join("warthog");
     let untrained = wade_core::bundle::read(&path).expect("sound");
-    wade_core::bundle::write(&path, &wade_core::bundle::Bundle { trained: None, ..untrained })
-        .expect("written");
+    wade_core::bundle::write(
+        &path,
+        &wade_core::bundle::Bundle { trained: None, radiation: None, ..untrained },
+    )
+    .expect("written");
     let served = Served::with(|config| config.vehicles = folder.path().to_owned());
     runtime().block_on(async {
         let mut client = client(&served).await;

@@ -95,7 +95,7 @@ fn the_program_alone_answers_from_any_folder_and_leaves_nothing_behind() {
     // the working directory's vehicles are nobody's business
     std::fs::create_dir_all(installed.path("elsewhere/vehicles/husky")).unwrap();
     let answer = installed.answers(&QUERY);
-    assert!(answer.contains("husky") && answer.contains("version 10"), "{answer}");
+    assert!(answer.contains("husky") && answer.contains("version 11"), "{answer}");
     let carried = |name: &str| (name.to_owned(), CARRIED.to_owned());
     assert_eq!(installed.origins(), [carried("husky"), carried("warthog")]);
     assert_eq!(std::fs::read_dir(installed.path("home")).unwrap().count(), 0);
@@ -177,28 +177,28 @@ fn a_change_of_a_carried_vehicle_goes_to_a_new_folder_and_is_taken_back_for_good
     let library = || Library::open(Some(&data)).unwrap();
     let (place, version) =
         Library::open_to_write(Some(&data)).unwrap().apply("husky", every_effect("husky")).unwrap();
-    assert_eq!((place, version), (data.join("husky"), 11));
+    assert_eq!((place, version), (data.join("husky"), 12));
     let shown = installed.answers(&["vehicle", "versions", "husky"]);
     assert!(shown.contains(CARRIED) && shown.contains("in place"), "{shown}");
     let back = ["vehicle", "rollback", "husky", "--server", "unix:/no/such/socket"];
     let said = installed.answers(&back);
     assert!(
-        said.contains("version 10") && said.contains(CARRIED) && said.contains("taken back: added_mass"),
+        said.contains("version 11") && said.contains(CARRIED) && said.contains("taken back: added_mass"),
         "{said}"
     );
     assert!(!data.join("husky").exists());
     // what was taken back stays away, however often
-    for next in [12, 13] {
+    for next in [13, 14] {
         assert_eq!(library().apply("husky", every_effect("husky")).unwrap().1, next);
         let said = installed.answers(&back);
-        assert!(said.contains("version 10"), "{said}");
+        assert!(said.contains("version 11"), "{said}");
     }
     let said = installed.refuses(&back);
     assert!(said.contains("no version before this one"), "{said}");
     // but can be had by its number
-    let said = installed.answers(&[&back[..], &["--to", "11"]].concat());
-    assert!(said.contains("version 11"), "{said}");
-    assert_eq!(library().versions("husky").unwrap().0.version, 11);
+    let said = installed.answers(&[&back[..], &["--to", "12"]].concat());
+    assert!(said.contains("version 12"), "{said}");
+    assert_eq!(library().versions("husky").unwrap().0.version, 12);
 }
 
 #[test]
@@ -207,15 +207,15 @@ fn going_back_to_another_network_needs_a_yes() {
     let husky = copy.path().join("husky");
     let trained = bundle::read(&husky).unwrap();
     crate::common::paper::put_into(&husky);
-    assert_eq!(bundle::succeed(&husky, trained).unwrap(), 11);
+    assert_eq!(bundle::succeed(&husky, trained).unwrap(), 12);
     let installed = Installed::new();
     let folder = copy.path().to_str().unwrap();
     let back = ["vehicle", "rollback", "husky", "--vehicles", folder, "--server", "unix:/no/such/socket"];
     let said = installed.refuses(&back);
     assert!(said.contains("another network (paper") && said.contains("--yes"), "{said}");
-    assert_eq!(Library::open(Some(copy.path())).unwrap().versions("husky").unwrap().0.version, 11);
+    assert_eq!(Library::open(Some(copy.path())).unwrap().versions("husky").unwrap().0.version, 12);
     let said = installed.answers(&[&back[..], &["--yes"]].concat());
-    assert!(said.contains("version 10") && said.contains("weights: paper"), "{said}");
+    assert!(said.contains("version 11") && said.contains("weights: paper"), "{said}");
 }
 
 #[test]

@@ -206,7 +206,13 @@ fn what_is_set_and_cannot_be_used_is_refused_by_name() {
 
 #[test]
 fn what_no_model_answers_yet_is_unset_and_never_zero() {
-    let served = Served::with(|config| config.shm.wait = Wait::Spin);
+    // the paper's network has no base below it
+    let folder = crate::common::copy_of_vehicles();
+    crate::common::paper::put_into(&folder.path().join("husky"));
+    let served = Served::with(|config| {
+        config.shm.wait = Wait::Spin;
+        config.vehicles = folder.path().to_owned();
+    });
     let answer = asked(&Raw::new(&served), Query::from(&state()));
     assert_eq!((answer.status, answer.flags), (Status::Ok as u32, SERVER_POLLS));
     let surfaces = answer.surfaces();

@@ -33,6 +33,18 @@ pub fn physics() -> String {
     table(&header, |kind| kind == Kind::Physics)
 }
 
+/// What each effect of the water corrects from the physical base on.
+pub fn totals() -> String {
+    let row = |spec: &EffectSpec| {
+        [format!("`{}`", spec.name), spec.corrects.to_owned(), spec.total.to_owned()].to_vec()
+    };
+    let specs = Effect::ALL.into_iter().map(Effect::spec).filter(|spec| spec.kind == Kind::Physics);
+    markdown(
+        &["effect", "term of the base that it corrects", "base and effect together"],
+        specs.map(row).collect(),
+    )
+}
+
 pub fn faults() -> String {
     let header = ["sensor and drive faults: named, never added to a bundle", "what is wrong", "parameters"];
     table(&header, |kind| kind != Kind::Physics)

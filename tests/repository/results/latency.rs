@@ -130,6 +130,24 @@ pub fn query() -> String {
     bench("query.csv", ["subject", "p50_us", "p99_us", "p99_9_us", "max_us"])
 }
 
+/// Error of the base's drag against the time of an evaluation, by the number of elements.
+pub fn elements() -> String {
+    let (comments, rows) = csv(newest("elements.csv"));
+    let columns = ["vehicle", "elements", "evaluated", "us", "force", "force_p90", "moment", "moment_p90"];
+    let rows = rows.iter().map(|row| columns.map(|name| row[name].clone()).to_vec());
+    let header = [
+        "vehicle",
+        "elements",
+        "with padding",
+        "time [us]",
+        "force error, median",
+        "90 %",
+        "moment error, median",
+        "90 %",
+    ];
+    format!("Condition: {}.\n\n{}", condition(&comments), markdown(&header, rows.collect()))
+}
+
 pub fn round_trips() -> String {
     bench("latency.csv", ["subject", "p50_us", "p99_us", "p99_9_us", "max_us"])
 }
