@@ -80,7 +80,8 @@ impl Divided {
 }
 
 fn main() {
-    let mut csv = format!("# {}\nvehicle,elements,evaluated,us,force,force_p90,moment,moment_p90\n", common::machine());
+    let mut csv =
+        format!("# {}\nvehicle,elements,evaluated,us,force,force_p90,moment,moment_p90\n", common::machine());
     for name in VEHICLES {
         let model = model(name);
         let vehicle = model.vehicle();
