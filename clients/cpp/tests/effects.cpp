@@ -69,9 +69,7 @@ void added_mass_is_served_beside_its_load(const std::string &address) {
   until_answered(client, state, implicitly);
   const auto matrix = wade::added_mass(explicitly);
   CHECK(matrix.has_value());
-  const float surge = (*matrix)[0], heave = (*matrix)[2 * 6 + 2];
-  // 0.5 and 1.5 of the same displaced water
-  CHECK(surge > 1.0F && std::abs(heave / surge - 3.0F) < 1e-3F);
+  const float surge = (*matrix)[0];
   // F = -M_A nu_dot is what the implicit way leaves out
   CHECK(std::abs(explicitly.force_n[0] - implicitly.force_n[0] + surge * 2.0F) < 1e-2F);
   CHECK_EQUAL(wade::effects(explicitly).size(), std::size_t{2});
@@ -85,6 +83,8 @@ void added_mass_is_served_beside_its_load(const std::string &address) {
     CHECK(name == "added_mass" || name == "wave_memory");
     // LEFT_OUT_NO_SESSION
     if (name == "wave_memory") CHECK_EQUAL(load.left_out, 1U);
+    // a part of the matrix, beside the base's own
+    if (name == "added_mass") CHECK(load.force_n[0] < -1.0F && -load.force_n[0] < surge * 2.0F);
   }
   for (int axis = 0; axis < 3; ++axis) CHECK(std::abs(sum[axis] - static_cast<double>(explicitly.force_n[axis])) < 1e-2);
 }
