@@ -329,7 +329,6 @@ def plot_heave(implicit: Track, explicit: Track, path: str) -> None:
     middle = implicit.depth.mean()
     axes[0].set_ylim(middle - 0.06, middle + 0.06)
     axes[0].set_ylabel("water depth [m]")
-    axes[1].set_yscale("symlog")
     axes[1].set_ylabel("its acceleration [m/s2]")
     axes[1].set_xlabel("time [s]")
     axes[0].legend()

@@ -96,6 +96,7 @@ def test_surfaces_and_effects_sum_to_the_wrench(client: Any) -> None:
     total = forces.surface_force_n.sum(axis=0) + forces.effect_force_n.sum(axis=0)
     np.testing.assert_allclose(forces.force_n, total, rtol=1e-5, atol=1e-2)
     moments = np.cross(forces.surface_point_m - forces.about_m, forces.surface_force_n).sum(axis=0)
+    moments += forces.surface_couple_nm.sum(axis=0)
     np.testing.assert_allclose(forces.moment_nm, moments + forces.effect_moment_nm.sum(axis=0), rtol=1e-4, atol=1e-2)
 
 
@@ -122,10 +123,12 @@ def test_added_mass_is_a_force_or_a_matrix(client: Any) -> None:
     np.testing.assert_allclose(matrix.added_mass, matrix.added_mass.T, atol=1e-6)
     # the center of mass moves as the origin does: nothing turns
     load = -force.added_mass.astype(float) @ [*rates, 0, 0, 0]
-    np.testing.assert_allclose(force.effect_force_n[index], load[:3], rtol=1e-5, atol=1e-5)
-    np.testing.assert_allclose(force.effect_moment_nm[index], load[3:], rtol=1e-5, atol=1e-5)
+    # the effect has a part of it, the base the rest
+    share = force.effect_force_n[index] / load[:3]
+    assert (share > 0).all() and (share < 1).all()
     assert not matrix.effect_force_n[index].any() and not matrix.effect_left_out[index]
-    np.testing.assert_allclose(force.force_n - matrix.force_n, load[:3], rtol=1e-4, atol=1e-3)
+    # the error of the density scales the base's part
+    np.testing.assert_allclose(force.force_n - matrix.force_n, load[:3], rtol=0.02, atol=1e-3)
 
 
 def test_a_batch_has_the_effects_of_its_states_alone(client: Any, server: Server) -> None:
@@ -252,12 +255,13 @@ def test_effects_come_with_a_reload(
         wade.GrpcClient(f"unix:{mortal_server.socket}", timeout_s=20.0) as admin,
     ):
         bare = client.evaluate("husky", STATE)
-        assert bare.effects == () and bare.added_mass is None and bare.effect_force_n.shape == (0, 3)
+        assert bare.effects == () and bare.added_mass is not None and bare.effect_force_n.shape == (0, 3)
         assert bare.effect_surface_force_n.shape == (0, 3) and not bare.effects_outside.any()
         add_effects(vehicles / "husky", {"added_mass": {"surge": 0.5}})
         assert [found.refusal for found in admin.reload("husky")] == [""]
         forces = client.evaluate("husky", STATE)
         assert forces.effects == (wade.Effect.ADDED_MASS,)
+        assert forces.added_mass is not None and forces.added_mass[0, 0] > bare.added_mass[0, 0] + 1
         assert forces.force_n[0] < bare.force_n[0] - 50
         (vehicles / "husky" / "effects.toml").write_text("")
         (found,) = admin.reload("husky")

@@ -124,8 +124,8 @@ class Forces:
     #: with the rates of the body components of the velocity of the center of mass and of the angular velocity. None
     #: of a bundle without the physical base or such an effect.
     added_mass: Array | None
-    #: Linear damping by waves about `about_m` [kg/s, kg m/s, kg m2/s], `[6, 6]`: the wrench is `-B nu`. Zero in a run of
-    #: states, whose memory has it. None of a bundle without the physical base, as what follows.
+    #: Linear damping by waves about `about_m` [kg/s, kg m/s, kg m2/s], `[6, 6]`: the wrench is `-B nu`. Zero in a run
+    #: of states, whose memory has it. None of a bundle without the physical base, as what follows.
     damping: Array | None
     #: Height of the still water above the body's origin along up, as used [m].
     water_level_m: Array | None
