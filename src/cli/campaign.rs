@@ -57,6 +57,10 @@ const SETTINGS: &str = "  courant = 8.0                # largest Courant number
   hull_level = 2               # halvings at the hull
   wheel_level = 3              # and at the wheels
   # channel_m = [6.0, 5.0, 1.5]  # length, width, height; default: the paper's
+  # [flow_time]                  # in lengths / speed, in place of the times above;
+  # lengths = [7.0, 9.0, 12.0, 8.0]  # at Fr < 0.4, < 0.6, < 1.3, above
+  # window = 4.0                 # depth and speed are measured ahead, means kept
+  # shift = 2.0                  # settled: as the window so much earlier
 ";
 
 // What stood above a variant would replace all that its command says of itself.
@@ -91,6 +95,7 @@ enum SetName {
     Check,
     Mesh,
     Ahead,
+    Drive,
 }
 
 impl From<SetName> for Set {
@@ -103,6 +108,7 @@ impl From<SetName> for Set {
             SetName::Check => Self::Check,
             SetName::Mesh => Self::Mesh,
             SetName::Ahead => Self::Ahead,
+            SetName::Drive => Self::Drive,
         }
     }
 }
@@ -116,6 +122,7 @@ Examples:
   wade campaign plan --vehicle husky --set paper --out campaigns/husky
   wade campaign plan --vehicle husky --set driving --cases 24 --out husky
   wade campaign plan --vehicle rover --set paper --table ranges.toml --out rover
+  wade campaign plan --vehicle husky --set drive --cases 10 --out campaigns/drive/husky
 
 A file of ranges (--table), here the source paper's of the Warthog:
 {TABLE}
@@ -128,7 +135,8 @@ struct PlanCommand {
     #[command(flatten)]
     vehicles: Vehicles,
     /// What to add: `paper` and `wide` are Latin hypercubes, `driving` the straightest steady cases with a moving bed,
-    /// `unsteady`, `check`, `mesh` and `ahead` fixed lists, which take no `--cases`
+    /// `unsteady`, `check`, `mesh` and `ahead` fixed lists, which take no `--cases`, `drive` a round of any course, attitude,
+    /// water level and bed
     #[arg(long, value_enum)]
     set: SetName,
     /// Cases to add
@@ -144,6 +152,9 @@ struct PlanCommand {
     /// Settings of every case, TOML; only when the plan is begun
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// Campaign of the same vehicle; a round of `drive` repeats one of its unsettled cases of `paper` for every five new ones
+    #[arg(long, value_name = "DIR")]
+    repeat: Option<PathBuf>,
     /// Also write what another engine needs to run the plan: `slurm`, a job array
     #[arg(long, value_enum)]
     target: Option<Target>,
@@ -164,7 +175,7 @@ impl PlanCommand {
             table: self.table.as_ref().map(read_toml).transpose()?,
             settings: self.settings.as_ref().map(read_toml).transpose()?,
         };
-        let add = Addition { set: self.set.into(), cases: self.cases, seed: self.seed };
+        let add = Addition { set: self.set.into(), cases: self.cases, seed: self.seed, repeat: self.repeat };
         let (plan, before) = Folder { path: &self.out, vehicle: &vehicle }.extend(beginning, add)?;
         println!(
             "{}: {} cases, {} of them new",
@@ -270,7 +281,7 @@ fn work_folder(campaign: &Path, stated: Option<&PathBuf>) -> PathBuf {
 /// Add the cases that are done to the campaign's data set
 ///
 /// Writes `sections.parquet`, averages of 0.1 s for every surface in the form of `wade dataset`, and `cases.csv`, a row
-/// a case. What is collected is done: `run` leaves it alone even when the work folder is gone.
+/// a case. Where the settings have a `flow_time`, means are kept in place of sections: `surfaces.csv`. What is collected is done: `run` leaves it alone even when the work folder is gone.
 #[derive(Debug, Args)]
 struct Collect {
     /// Folder of the campaign

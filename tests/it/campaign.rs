@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 use wade_core::bundle;
+use wade_learn::cfd::collect::Collected;
+use wade_learn::cfd::means::Means;
 use wade_learn::cfd::openfoam::{MeshKind, OpenFoam};
-use wade_learn::cfd::plan::Plan;
-use wade_learn::cfd::solve::{Load, Outcome, Section, method};
+use wade_learn::cfd::plan::{Bed, Case, Ground, Plan};
+use wade_learn::cfd::solve::{Load, Measured, Outcome, Section, method};
 use wade_learn::dataset;
 
 /// Coarse, and too short to settle: seconds a case.
@@ -197,6 +199,7 @@ fn put_outcome(campaign: &str, number: usize, force: f64) -> PathBuf {
         mass_imbalance: 0.0,
         rest: vec![Load::default(); surfaces.len()],
         surfaces,
+        measured: None,
         sections: vec![section],
         case,
     };
@@ -368,6 +371,108 @@ fn a_ramp_pulls_back_as_added_mass_does_a_bed_may_move_and_an_unsettled_case_get
     let log = std::fs::read_to_string(Path::new(&campaign).join("work/ramp/log.interFoam")).expect("a log");
     for time in ["Time = 0.6\n", "Time = 1.1\n"] {
         assert!(log.contains(time), "no step ends at {time}");
+    }
+}
+
+/// Coarse, and with flow times that are too short to settle.
+const MEANS: &str = "limit_s = 600.0\n[flow_time]\nlengths = [2.0, 2.0, 2.0, 2.0]\nwindow = 1.0\nshift = 0.5\n\
+                     [mesh]\ncells_per_length = 4.0\nchannel_m = [6.0, 5.0, 1.5]\n";
+
+/// A campaign of one round of the set `drive`.
+fn planned_round(settings: &str) -> (TempDir, String) {
+    let folder = TempDir::new().expect("a temporary folder");
+    let settings_file = folder.path().join("settings.toml");
+    std::fs::write(&settings_file, settings).expect("written");
+    let campaign = folder.path().join("campaign").display().to_string();
+    let plan = ["campaign", "plan", "--vehicle", "husky", "--set", "drive", "--cases", "10", "--repeat"];
+    let repeat = Path::new(env!("CARGO_MANIFEST_DIR")).join("campaigns/husky").display().to_string();
+    let settings_file = settings_file.display().to_string();
+    let output = wade(&[&plan[..], &[&repeat, "--settings", &settings_file, "--out", &campaign]].concat());
+    assert!(stdout(&output).contains("12 cases, 12 of them new"), "{}", stderr(&output));
+    (folder, campaign)
+}
+
+#[test]
+fn means_of_a_round_take_two_kilobytes_a_case_and_read_back_as_a_data_set() {
+    let (_folder, campaign) = planned_round(MEANS);
+    let path = Path::new(&campaign);
+    let outcome = put_outcome(&campaign, 0, -12.345_678);
+    let text = std::fs::read_to_string(&outcome).expect("an outcome");
+    let mut outcomes: Vec<Outcome> = vec![serde_json::from_str(&text).expect("an outcome")];
+    let surfaces = outcomes[0].surfaces.len();
+    // no two numbers are alike, as of a computed case
+    let odd = |i: usize| 123.456_78 + 7.654_321 * i as f64;
+    for (i, load) in outcomes[0].sections[0].loads.iter_mut().enumerate() {
+        (load.force, load.moment) = ([odd(i), -odd(i + 1), odd(i + 2)], [odd(i + 3), odd(i + 4), odd(i + 5)]);
+    }
+    let measured = Measured {
+        depth_m: 0.123_456,
+        speed_mps: 0.456_789,
+        bed_clearance_m: 0.012_345,
+        drift: (0..surfaces).map(|i| [odd(i); 3]).collect(),
+    };
+    outcomes[0].measured = Some(measured);
+    std::fs::write(&outcome, serde_json::to_string(&outcomes[0]).expect("JSON")).expect("written");
+    let collected = wade(&["campaign", "collect", &campaign]);
+    assert!(stdout(&collected).contains("1 of 12 cases, 1 of them new"), "{}", stderr(&collected));
+    let again = wade(&["campaign", "collect", &campaign]);
+    assert!(stdout(&again).contains("1 of 12 cases, 0 of them new"), "{}", stderr(&again));
+    let rows = |name: &str| {
+        let text = std::fs::read_to_string(path.join(name)).expect("collected");
+        let rows = text.lines().filter(|line| line.starts_with("husky-drive-0000"));
+        rows.map(|row| row.len() + 1).sum::<usize>()
+    };
+    let bytes = rows("surfaces.csv") + rows("cases.csv");
+    assert!(rows("surfaces.csv") > 1000 && bytes <= 2048, "{bytes} bytes");
+
+    let plan = Plan::read(path).expect("a plan");
+    let summaries = Collected::read(path, &plan).expect("summaries");
+    let means = Means::read(path).expect("means").expect("some");
+    let data = means.dataset(path, &plan, &summaries.cases).expect("a data set");
+    assert_eq!((data.samples.len(), data.samples[0].surfaces.len()), (1, surfaces));
+    let sample = &data.samples[0];
+    assert!((sample.surfaces[1].force.x - odd(1)).abs() < 0.1);
+    assert!((sample.condition.velocity.norm() - 0.4568).abs() < 1e-9);
+    assert!((sample.condition.depth - 0.1235).abs() < 1e-9);
+    let planned = plan.cases[0].share_of_bed() * plan.cases[0].speed_mps;
+    assert!((sample.condition.ground_velocity.norm() - planned).abs() < 1e-9);
+
+    // a summary without its surfaces
+    std::fs::remove_file(path.join("surfaces.csv")).expect("removed");
+    std::fs::remove_file(&outcome).expect("removed");
+    let refused = wade(&["campaign", "collect", &campaign]);
+    assert!(stderr(&refused).contains("surfaces.csv has no row of case"), "{}", stderr(&refused));
+}
+
+#[test]
+fn a_ramp_a_deep_bed_and_a_tilted_hull_are_computed_and_labelled_with_the_measured_flow() {
+    if openfoam().is_none() {
+        return;
+    }
+    let (_folder, campaign) = planned_round(MEANS);
+    let path = Path::new(&campaign);
+    let mut plan = Plan::read(path).expect("a plan");
+    let level = Case { depth_m: 0.17, speed_mps: 0.8, end_speed_mps: 0.8, ..plan.cases[0].clone() };
+    let level = Case { heading_deg: 30.0, density_kgpm3: 1000.0, ..level };
+    let state = |name: &str, roll_deg: f64, pitch_deg: f64| {
+        let id = format!("husky-drive-{name}");
+        let (bed, bed_share, ground, clearance_m) = (Bed::Driving, Some(1.0), Ground::Flat, 0.0);
+        Case { id, roll_deg, pitch_deg, bed, bed_share, ground, clearance_m, ..level.clone() }
+    };
+    plan.cases = vec![
+        Case { ground: Ground::Ramp, ..state("ramp", -8.0, 10.0) },
+        Case { clearance_m: 0.8, ..state("deep", 5.0, -12.0) },
+        state("tilted", 5.0, -12.0),
+    ];
+    plan.write(path).expect("written");
+    let output = wade(&["campaign", "run", &campaign, "--jobs", "2"]);
+    assert!(output.status.success(), "{}{}", stdout(&output), stderr(&output));
+    assert!(wade(&["campaign", "collect", &campaign]).status.success());
+    let summaries = Collected::read(path, &plan).expect("summaries");
+    for case in summaries.cases.values() {
+        let speed = case.measured_speed_mps.expect("measured");
+        assert!((speed / case.speed_mps - 1.0).abs() < 0.1, "{case:?}");
+        assert!(case.fx_n < 0.0 && (case.fz_n / case.rest_fz_n - 1.0).abs() < 0.5, "{case:?}");
     }
 }
 

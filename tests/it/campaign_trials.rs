@@ -135,6 +135,7 @@ fn summaries(folder: &Path, model: &Model, parked_settled: bool) {
             mass_imbalance: 0.0,
             rest: Vec::new(),
             surfaces: Vec::new(),
+            measured: None,
             sections: Vec::new(),
         };
         writer.serialize(CaseSummary::of(&outcome)).expect("written");

@@ -28,6 +28,15 @@ const UNSTEADY_STEP_S: f64 = 0.01;
 /// `C_mu` of the k-omega model.
 const C_MU: f64 = 0.09;
 
+/// Distance of the gauges from the front of the vehicle, in its lengths, and their places across the channel over its width.
+const GAUGES_AHEAD: f64 = 1.2;
+const GAUGES_ACROSS: [f64; 5] = [-0.44, -0.22, 0.0, 0.22, 0.44];
+/// Places across the channel at which its depth is taken.
+const CROSSINGS: usize = 50;
+/// The ramp in the dictionary of the mesh: its patch is called `ground_ramp`.
+const RAMP_GEOMETRY: &str = "ramp.stl { type triSurfaceMesh; name ground_ramp; }";
+const RAMP_LEVEL: &str = "ground_ramp { level (0 0); patchInfo { type wall; } }";
+
 /// How a case is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -50,9 +59,31 @@ pub struct Settings {
     pub sample_s: f64,
     /// Processor time after which a program of a case is given up [s]; longer on finer meshes, see [`Settings::limit`].
     pub limit_s: f64,
+    /// Flow time and window in lengths of the vehicle, in place of `settle_lengths`, `settle_s`, `window_s` and `windows`; such a
+    /// case is labelled with the depth and the speed that gauges measure ahead of the vehicle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flow_time: Option<FlowTime>,
     /// The mesh.
     pub mesh: MeshSettings,
 }
+
+/// Flow time and window of a case in lengths of the vehicle over the speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlowTime {
+    /// Flow time at Froude numbers below each of [`FROUDE_NUMBERS`], and above all of them.
+    pub lengths: [f64; 4],
+    /// The window that is averaged, at the end of the flow time.
+    pub window: f64,
+    /// How much earlier the window is with which it is compared.
+    pub shift: f64,
+}
+
+/// Froude numbers of the depth at which the flow time changes.
+pub const FROUDE_NUMBERS: [f64; 3] = [0.4, 0.6, 1.3];
+
+/// Speed for which a vehicle at rest has its flow time [m/s].
+const REST_SPEED: f64 = 0.5;
 
 impl Default for Settings {
     fn default() -> Self {
@@ -66,6 +97,7 @@ impl Default for Settings {
             windows: 3,
             sample_s: 0.05,
             limit_s: 3600.0,
+            flow_time: None,
             mesh: MeshSettings::default(),
         }
     }
@@ -142,6 +174,17 @@ impl Settings {
                 "three lengths from 0.1 to 1000 m",
             ),
         ];
+        let flow = |time: FlowTime| {
+            let least = time.window + time.shift;
+            let is_long = time.lengths.iter().all(|&lengths| within(lengths, least, 1000.0));
+            time.window > 0.0 && time.shift > 0.0 && is_long
+        };
+        let fields = fields.into_iter().chain([(
+            "flow_time",
+            self.flow_time.is_none_or(flow),
+            format!("{:?}", self.flow_time),
+            "lengths that hold window and shift, both above 0",
+        )]);
         let wrong = fields.into_iter().find(|(_, is_right, ..)| !is_right);
         wrong.map(|(field, _, value, expected)| (field, value, expected))
     }
@@ -165,27 +208,76 @@ pub struct Inputs<'a> {
     pub solver: &'a OpenFoam,
 }
 
+/// The flow that gauges measured, at the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlowAtVehicle {
+    /// Depth at the body origin [m].
+    pub depth_m: f64,
+    /// Speed relative to the vehicle [m/s].
+    pub speed_mps: f64,
+    /// Depth of the channel times the speed squared, which the dynamic force is nearly proportional to [m3/s2].
+    pub pressure: f64,
+}
+
 impl Inputs<'_> {
+    /// Time in which the vehicle moves by its length [s].
+    pub fn length_s(&self) -> f64 {
+        let speed = self.case.speed_mps;
+        self.vehicle.dimensions.length / if speed > 0.0 { speed } else { REST_SPEED }
+    }
+
+    /// Flow time of a case by its Froude number [s], in whole samples.
+    fn flow_s(&self, time: &FlowTime, placement: &Placement) -> f64 {
+        let depth = placement.water_level - placement.bed(0.0, 0.0);
+        let froude = self.case.speed_mps / (GRAVITY * depth).sqrt();
+        let class = FROUDE_NUMBERS.iter().filter(|&&limit| froude >= limit).count();
+        let sample = self.settings.sample_s;
+        (time.lengths[class] * self.length_s() / sample).ceil() * sample
+    }
+
     /// End of the first window [s]; of an unsteady case, the end of all.
-    pub fn first_end(&self) -> f64 {
+    pub fn first_end(&self, placement: &Placement) -> f64 {
         let Self { case, settings, vehicle, .. } = self;
+        if let Some(time) = &settings.flow_time {
+            return self.flow_s(time, placement);
+        }
         let settle = settings.settle(vehicle.dimensions.length, case.speed_mps);
         if case.is_unsteady() { settle + case.ramp_s + settings.window_s } else { settle + settings.window_s }
     }
 
+    /// Start of the window that ends at `end`, of an unsteady case that of what is kept [s].
+    pub fn window_start(&self, end: f64) -> f64 {
+        if self.case.is_unsteady() { self.settle() - SECTIONS_BEFORE_S } else { end - self.settings.window_s }
+    }
+
+    /// The flow at the vehicle, from the rise of the level [m] and the speed [m/s] at the gauges.
+    pub fn flow_at_vehicle(&self, placement: &Placement, rise: f64, speed: f64) -> FlowAtVehicle {
+        let up = self.case.up().z;
+        let depths = [0.0, self.gauges_x(placement)].map(|x| self.mean_depth(placement, x) + rise);
+        let current = speed - self.bed_speed();
+        let speed_mps = self.bed_speed() + current * depths[1] / depths[0];
+        FlowAtVehicle {
+            depth_m: self.case.depth_m + rise / up,
+            speed_mps,
+            pressure: depths[0] * speed_mps * speed_mps,
+        }
+    }
+
     /// Every file of the case but the field `U` of the viscous flow, by its path in the folder.
     pub fn files(&self, placement: &Placement) -> BTreeMap<String, String> {
-        let Self { vehicle, case, settings, solver } = self;
+        let Self { case, solver, .. } = self;
         let speed = case.speed_mps.max(case.end_speed_mps);
-        let length = vehicle.dimensions.length;
-        let channel =
-            Channel::new(&settings.mesh, placement, length, speed, [case.cell_scale, case.channel_scale]);
+        let channel = self.channel(placement);
         let level = placement.water_level;
         let mut files = BTreeMap::new();
         let mut add = |path: &str, text: String| {
             files.insert(path.to_owned(), text);
         };
         add("constant/triSurface/hull.stl", self.hull_stl(placement));
+        if let Some(ramp) = placement.ramp {
+            let mesh = ramp.surface(channel.size.norm());
+            add("constant/triSurface/ramp.stl", solid("ramp", &mesh));
+        }
         add("constant/g", fill(include_str!("templates/g"), &[("gravity", &number(GRAVITY))]));
         add("constant/hRef", fill(include_str!("templates/hRef"), &[("water_level", &number(level))]));
         let densities = [
@@ -197,16 +289,16 @@ impl Inputs<'_> {
         add("constant/turbulenceProperties", include_str!("templates/turbulenceProperties").to_owned());
         if case.is_unsteady() {
             add("constant/fvOptions", include_str!("templates/acceleration").to_owned());
-            add("constant/acceleration.dat", self.acceleration_table());
+            add("constant/acceleration.dat", self.acceleration_table(placement));
         }
         add("system/blockMeshDict", block_mesh(&channel, level));
-        add("system/snappyHexMeshDict", self.snappy(&channel));
-        add("system/controlDict", self.control(placement, 0.0, self.first_end()));
+        add("system/snappyHexMeshDict", self.snappy(&channel, placement.ramp.is_some()));
+        add("system/controlDict", self.control(placement, 0.0, self.first_end(placement)));
         add("system/fvSchemes", schemes(solver.mesh_kind));
         add("system/fvSolution", fill(include_str!("templates/fvSolution"), &[("local_time_stepping", "")]));
         let set_fields = fill(include_str!("templates/setFieldsDict"), &[("water_level", &number(level))]);
         add("system/setFieldsDict", set_fields);
-        let flow = number(-case.speed_mps);
+        let flow = number(-self.speed_at(placement, 0.5 * channel.size.x));
         let start = fill(include_str!("templates/U"), &[("flow", &flow)]);
         add("0/U", start + &fill(include_str!("templates/U.potential"), &[("flow", &flow)]));
         add("0/p", include_str!("templates/p").to_owned());
@@ -222,7 +314,8 @@ impl Inputs<'_> {
     /// Boundary conditions of `U` for the viscous flow, which replace those of the potential flow.
     pub fn viscous_boundary(&self, placement: &Placement) -> String {
         let Self { vehicle, case, .. } = self;
-        let flow = number(-case.speed_mps);
+        let half_length = 0.5 * self.channel(placement).size.x;
+        let flow = number(-self.speed_at(placement, half_length));
         let uniform = format!("type fixedValue; value uniform ({flow} 0 0);");
         let surge = || {
             let settle = self.settle();
@@ -238,7 +331,8 @@ impl Inputs<'_> {
             // the mean velocity of the other condition is a constant
             inlet.clone()
         } else if case.speed_mps > 0.0 {
-            let speed = number(case.speed_mps);
+            let speed = number(self.speed_at(placement, -half_length));
+            let flow = format!("-{speed}");
             format!(
                 "type outletPhaseMeanVelocity; alpha alpha.water; Umean {speed}; value uniform ({flow} 0 0);"
             )
@@ -246,9 +340,11 @@ impl Inputs<'_> {
             // the condition divides by the velocity
             "type noSlip;".to_owned()
         };
+        // a ramp has faces across the motion too: through them passes what the bed displaces as it moves
+        let ground = || format!("type fixedValue; value uniform ({} 0 0);", number(-self.bed_speed()));
         let (ground, wheels) = match case.bed {
             Bed::Parked => ("type noSlip;".to_owned(), String::new()),
-            Bed::Driving => (inlet.clone(), self.turning_wheels(placement, vehicle)),
+            Bed::Driving => (ground(), self.turning_wheels(placement, vehicle)),
         };
         let values = [
             ("flow", flow.as_str()),
@@ -258,6 +354,42 @@ impl Inputs<'_> {
             ("wheels", &wheels),
         ];
         fill(include_str!("templates/U.viscous"), &values)
+    }
+
+    /// Velocity over ground [m/s].
+    fn bed_speed(&self) -> f64 {
+        self.case.share_of_bed() * self.case.speed_mps
+    }
+
+    /// Speed of the undisturbed water relative to the vehicle [m/s], mean over the cross-section at `x`: what the bed does not
+    /// take with it passes every section of a channel of changing depth.
+    fn speed_at(&self, placement: &Placement, x: f64) -> f64 {
+        let Self { case, .. } = self;
+        let current = case.speed_mps - self.bed_speed();
+        let depth = |x: f64| self.mean_depth(placement, x);
+        self.bed_speed() + current * depth(0.0) / depth(x)
+    }
+
+    /// Mean depth of the undisturbed channel at `x` [m].
+    fn mean_depth(&self, placement: &Placement, x: f64) -> f64 {
+        if placement.ramp.is_none() {
+            return placement.water_level;
+        }
+        let width = self.channel(placement).size.y;
+        let places = (0..CROSSINGS).map(|i| ((i as f64 + 0.5) / CROSSINGS as f64 - 0.5) * width);
+        let depths = places.map(|y| (placement.water_level - placement.bed(x, y)).max(0.0));
+        depths.sum::<f64>() / CROSSINGS as f64
+    }
+
+    fn gauges_x(&self, placement: &Placement) -> f64 {
+        placement.bounds.max.x + GAUGES_AHEAD * self.vehicle.dimensions.length
+    }
+
+    fn channel(&self, placement: &Placement) -> Channel {
+        let Self { vehicle, case, settings, .. } = self;
+        let speed = case.speed_mps.max(case.end_speed_mps);
+        let scales = [case.cell_scale, case.channel_scale];
+        Channel::new(&settings.mesh, placement, vehicle.dimensions.length, speed, scales)
     }
 
     fn largest_step(&self) -> f64 {
@@ -270,7 +402,7 @@ impl Inputs<'_> {
     }
 
     fn turning_wheels(&self, placement: &Placement, vehicle: &Vehicle) -> String {
-        let forward = self.case.condition(self.case.speed_mps, 0.0).velocity.x;
+        let forward = self.case.condition(self.case.speed_mps, 0.0).ground_velocity.x;
         let wheel = |wheel: super::placement::Wheel| {
             format!(
                 "    hull_{} {{ type rotatingWallVelocity; origin ({}); axis ({}); omega {}; \
@@ -309,6 +441,7 @@ impl Inputs<'_> {
             .iter()
             .map(force)
             .chain(["inlet_water", "inlet_air", "outlet", "top"].map(flow))
+            .chain(settings.flow_time.map(|_| self.gauges(placement)))
             .collect();
         let values = [
             ("end_time_s", number(end)),
@@ -322,7 +455,22 @@ impl Inputs<'_> {
         fill(include_str!("templates/controlDict"), &values)
     }
 
-    fn snappy(&self, channel: &Channel) -> String {
+    /// Gauges of level and speed across the channel, ahead of the vehicle, at 0.6 of the depth below the surface, where the
+    /// speed of a stream is near its mean over the depth (ISO 748).
+    fn gauges(&self, placement: &Placement) -> String {
+        let width = self.channel(placement).size.y;
+        let x = self.gauges_x(placement);
+        let place = |share: f64| {
+            let (y, level) = (share * width, placement.water_level);
+            let bed = placement.bed(x, y);
+            format!("({})", triple(&Vec3::new(x, y, bed + 0.4 * (level - bed))))
+        };
+        let places = GAUGES_ACROSS.map(place).join(" ");
+        let every = number(self.settings.sample_s);
+        fill(include_str!("templates/gauges"), &[("places", &places), ("every", &every)])
+    }
+
+    fn snappy(&self, channel: &Channel, has_ramp: bool) -> String {
         let Self { vehicle, settings, solver, .. } = self;
         let MeshSettings { hull_level, wheel_level, .. } = settings.mesh;
         let wheels = vehicle.surfaces.iter().filter(|s| s.kind == SurfaceKind::Wheel);
@@ -343,6 +491,8 @@ impl Inputs<'_> {
             ("hull_level", hull_level.to_string()),
             ("wheel_levels", levels),
             ("point_in_air", triple(&point)),
+            ("ramp", if has_ramp { RAMP_GEOMETRY } else { "" }.to_owned()),
+            ("ramp_level", if has_ramp { RAMP_LEVEL } else { "" }.to_owned()),
         ];
         fill(include_str!("templates/snappyHexMeshDict"), &values)
     }
@@ -357,12 +507,12 @@ impl Inputs<'_> {
     /// interpolated. It is half a largest step late: an implicit step takes the acceleration of its end, while the inflow
     /// changes by its mean over the step. Where the two differ, the water as a whole pushes the hull, for that one step with
     /// the whole inertia of what it displaces: steps longer or shorter than the largest would do so.
-    fn acceleration_table(&self) -> String {
+    fn acceleration_table(&self, placement: &Placement) -> String {
         let (case, settle) = (self.case, self.settle());
         let acceleration = (case.end_speed_mps - case.speed_mps) / case.ramp_s;
         let step = 0.5 * UNSTEADY_STEP_S;
         let start = settle + 0.5 * self.largest_step();
-        let rows = (self.first_end() / step).ceil() as usize + 2;
+        let rows = (self.first_end(placement) / step).ceil() as usize + 2;
         let row = |i: usize| {
             let time = i as f64 * step;
             let inside = time >= start && time < start + case.ramp_s;
@@ -384,19 +534,43 @@ pub fn write(folder: &Path, files: &BTreeMap<String, String>) -> std::io::Result
 }
 
 fn block_mesh(channel: &Channel, level: f64) -> String {
-    let Channel { size, cells, layers, air_grading, .. } = channel;
+    let Channel { size, cells, layers, deep, air_grading, .. } = channel;
+    let [nx, ny] = cells;
+    let (x, y) = (number(size.x / 2.0), number(size.y / 2.0));
+    // the blocks of the water: one, or a coarser one under it
+    let water = |low: &str, grading: f64, layers: usize, high: &str| {
+        let grading = number(grading);
+        format!("    hex ({low} {high}) ({nx} {ny} {layers}) simpleGrading (1 1 {grading})\n")
+    };
+    let (bottom, middle, top) = ("0 1 2 3", "12 13 14 15", "4 5 6 7");
+    let (corners, blocks) = match deep {
+        None => (String::new(), water(bottom, 1.0, layers[0], top)),
+        Some(deep) => {
+            let z = number(deep.height);
+            let corners = format!("    (-{x} -{y} {z}) ({x} -{y} {z}) ({x} {y} {z}) (-{x} {y} {z})\n");
+            let blocks =
+                water(bottom, deep.grading, deep.layers, middle) + &water(middle, 1.0, layers[0], top);
+            (corners, blocks)
+        }
+    };
+    let has_deep = deep.is_some();
+    let faces = |one: &str, two: &str| if has_deep { two.to_owned() } else { one.to_owned() };
     let values = [
         ("x0", number(-size.x / 2.0)),
-        ("x1", number(size.x / 2.0)),
+        ("x1", x.clone()),
         ("y0", number(-size.y / 2.0)),
-        ("y1", number(size.y / 2.0)),
+        ("y1", y.clone()),
         ("zw", number(level)),
         ("z1", number(size.z)),
-        ("nx", cells[0].to_string()),
-        ("ny", cells[1].to_string()),
-        ("nz_water", layers[0].to_string()),
+        ("nx", nx.to_string()),
+        ("ny", ny.to_string()),
+        ("deep_corners", corners),
+        ("water_blocks", blocks),
         ("nz_air", layers[1].to_string()),
         ("air_grading", number(*air_grading)),
+        ("inlet_water", faces("(1 2 6 5)", "(1 2 14 13) (13 14 6 5)")),
+        ("outlet_water", faces("(0 4 7 3)", "(0 12 15 3) (12 4 7 15)")),
+        ("sides_water", faces("(0 1 5 4) (3 7 6 2)", "(0 1 13 12) (12 13 5 4) (3 15 14 2) (15 7 6 14)")),
     ];
     fill(include_str!("templates/blockMeshDict"), &values)
 }

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::{Bed, CAMPAIGN_FILE, Case, Plan, Set, as_set};
+use super::means::{Means, SURFACES_FILE, short_number};
+use super::plan::{Bed, CAMPAIGN_FILE, Case, Ground, Plan, Set, as_set};
 use super::run::{RunError, Work};
-use super::solve::{Load, Outcome, method};
+use super::solve::{Load, Measured, Outcome, method};
 use crate::dataset::{self, Dataset, DatasetError, Image, Meta, Rest, Sample, SurfaceLoad};
 use crate::files::write_whole;
 use wade_core::condition::GroundContact;
@@ -92,6 +93,27 @@ pub struct CaseSummary {
     /// Size of the channel relative to the settings.
     #[serde(default = "super::plan::as_set")]
     pub channel_scale: f64,
+    /// Form of the bed; this and what follows only where the flow was measured.
+    #[serde(default)]
+    pub ground: Option<Ground>,
+    /// Velocity of the bed over that of the water far away, both relative to the vehicle.
+    #[serde(default)]
+    pub bed_share: Option<f64>,
+    /// Roll [degrees].
+    #[serde(default)]
+    pub roll_deg: Option<f64>,
+    /// Pitch [degrees].
+    #[serde(default)]
+    pub pitch_deg: Option<f64>,
+    /// Distance of the ground-contact plane from the bed under the body origin [m].
+    #[serde(default)]
+    pub bed_clearance_m: Option<f64>,
+    /// Depth at the body origin that the gauges measured [m].
+    #[serde(default)]
+    pub measured_depth_m: Option<f64>,
+    /// Speed of the water relative to the vehicle that the gauges measured [m/s].
+    #[serde(default)]
+    pub measured_speed_mps: Option<f64>,
 }
 
 impl CaseSummary {
@@ -108,7 +130,7 @@ impl CaseSummary {
         let variance = nets.iter().map(|f| (f - mean).component_mul(&(f - mean))).sum::<Vec3>() / count;
         let scatter = variance.map(f64::sqrt);
         let case = &outcome.case;
-        Self {
+        let summary = Self {
             id: case.id.clone(),
             set: case.set,
             state: state_hash(case),
@@ -139,16 +161,58 @@ impl CaseSummary {
             drift_fz_n: outcome.drift[2],
             mass_imbalance: outcome.mass_imbalance,
             channel_scale: case.channel_scale,
+            ground: None,
+            bed_share: None,
+            roll_deg: None,
+            pitch_deg: None,
+            bed_clearance_m: None,
+            measured_depth_m: None,
+            measured_speed_mps: None,
+        };
+        match &outcome.measured {
+            Some(flow) => summary.with_flow(case, flow),
+            None => summary,
         }
     }
+
+    /// The same with the flow that was measured, and numbers as short as they are uncertain.
+    fn with_flow(self, case: &Case, flow: &Measured) -> Self {
+        Self {
+            fx_n: short_number(self.fx_n),
+            fy_n: short_number(self.fy_n),
+            fz_n: short_number(self.fz_n),
+            rest_fz_n: short_number(self.rest_fz_n),
+            scatter_fx_n: short_number(self.scatter_fx_n),
+            scatter_fy_n: short_number(self.scatter_fy_n),
+            scatter_fz_n: short_number(self.scatter_fz_n),
+            drift_fx_n: short_number(self.drift_fx_n),
+            drift_fy_n: short_number(self.drift_fy_n),
+            drift_fz_n: short_number(self.drift_fz_n),
+            mass_imbalance: to_four_places(self.mass_imbalance),
+            end_s: to_four_places(self.end_s),
+            ground: Some(case.ground),
+            bed_share: Some(case.share_of_bed()),
+            roll_deg: Some(case.roll_deg),
+            pitch_deg: Some(case.pitch_deg),
+            bed_clearance_m: Some(to_four_places(flow.bed_clearance_m)),
+            measured_depth_m: Some(to_four_places(flow.depth_m)),
+            measured_speed_mps: Some(to_four_places(flow.speed_mps)),
+            ..self
+        }
+    }
+}
+
+/// To a tenth of a millimeter.
+fn to_four_places(value: f64) -> f64 {
+    (1e4 * value).round() / 1e4
 }
 
 fn net(loads: &[Load]) -> Vec3 {
     loads.iter().map(|load| Vec3::from(load.force)).sum()
 }
 
-/// First half of the SHA-256 of a case's row in the plan as JSON. The channel is a part of it where it is another than that of
-/// the settings: the first data sets were computed before a case had one.
+/// First half of the SHA-256 of a case's row in the plan as JSON. What differs from
+/// the default is a part of it from `channel_scale` on: the first data sets were computed before a case had these.
 pub fn state_hash(case: &Case) -> String {
     #[derive(Serialize)]
     struct Hashed<'a> {
@@ -166,6 +230,12 @@ pub fn state_hash(case: &Case) -> String {
         ramp_s: f64,
         #[serde(skip_serializing_if = "Option::is_none")]
         channel_scale: Option<f64>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        bed_share: Option<f64>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        clearance_m: Option<f64>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        ground: Option<Ground>,
     }
     let hashed = Hashed {
         id: &case.id,
@@ -181,6 +251,9 @@ pub fn state_hash(case: &Case) -> String {
         end_speed_mps: case.end_speed_mps,
         ramp_s: case.ramp_s,
         channel_scale: Some(case.channel_scale).filter(|scale| *scale != as_set()),
+        bed_share: case.bed_share,
+        clearance_m: Some(case.clearance_m).filter(|clearance| *clearance != 0.0),
+        ground: Some(case.ground).filter(|ground| *ground != Ground::default()),
     };
     let text = serde_json::to_string(&hashed).expect("numbers and names are JSON");
     sha256(text.as_bytes())[..32].to_owned()
@@ -323,6 +396,9 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
         let before = collected.cases.get(&case.id).map_or(0, |summary| summary.method);
         fresh.extend(work.outcome(&plan.campaign, case)?.filter(|outcome| outcome.method > before));
     }
+    if plan.campaign.settings.flow_time.is_some() {
+        return collect_means(folder, plan, vehicle, &fresh, collected);
+    }
     let so_far = data_so_far(folder, &collected, &fresh)?;
     if fresh.is_empty() {
         return if collected.cases.is_empty() {
@@ -343,6 +419,44 @@ pub fn collect(folder: &Path, plan: &Plan, vehicle: &Vehicle, work: &Work) -> Re
     dataset.samples.sort_by(|a, b| a.case.cmp(&b.case).then(a.section.cmp(&b.section)));
     // the data set first: a summary without its sections would never be computed again
     dataset::write_compact(&path, &dataset)?;
+    collected.write(folder)?;
+    Ok(fresh.len())
+}
+
+/// As [`collect`], for a campaign of which means are kept.
+fn collect_means(
+    folder: &Path,
+    plan: &Plan,
+    vehicle: &Vehicle,
+    fresh: &[Outcome],
+    mut collected: Collected,
+) -> Result<usize, CollectError> {
+    let (path, cases) = (folder.join(SURFACES_FILE), folder.join(CASES_FILE));
+    let so_far = Means::read(folder)?;
+    let there = so_far.as_ref().map(Means::cases).unwrap_or_default();
+    let unknown = there.iter().find(|id| !collected.cases.contains_key(**id) && !is_fresh(fresh, id));
+    let what = match (lacking(&there, &collected, fresh), unknown) {
+        (Some(id), _) => Some(format!("{SURFACES_FILE} has no row of case `{id}`")),
+        (None, Some(id)) => Some(format!("{CASES_FILE} has no row for case `{id}`")),
+        (None, None) => None,
+    };
+    if let Some(what) = what {
+        return Err(CollectError::Apart { sections: path, cases, what });
+    }
+    let Some(first) = fresh.first() else {
+        return match collected.cases.is_empty() {
+            true => Err(CollectError::Nothing { path: folder.to_owned() }),
+            false => Ok(0),
+        };
+    };
+    let meta = so_far.as_ref().map_or_else(|| empty(plan, vehicle, first).meta, |means| means.meta.clone());
+    let dataset = Dataset { meta, samples: Vec::new() };
+    check_alike(&path, plan, &dataset, fresh)?;
+    let mut means = Means { meta: dataset.meta, rows: so_far.map_or_else(Vec::new, |means| means.rows) };
+    means.add(fresh);
+    collected.cases.extend(fresh.iter().map(|outcome| (outcome.case.id.clone(), CaseSummary::of(outcome))));
+    // the means first: a summary without its surfaces would never be computed again
+    means.write(folder)?;
     collected.write(folder)?;
     Ok(fresh.len())
 }

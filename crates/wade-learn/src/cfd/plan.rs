@@ -41,6 +41,8 @@ pub enum Set {
     /// Straight ahead over the depths and speeds of the table: how a vehicle is driven most, and an edge of the
     /// hypercube that holds next to no case.
     Ahead,
+    /// Rounds of any course, attitude, water level, bed share, clearance and ramp, see [`super::drive`].
+    Drive,
 }
 
 impl Set {
@@ -58,6 +60,7 @@ impl fmt::Display for Set {
             Self::Check => "check",
             Self::Mesh => "mesh",
             Self::Ahead => "ahead",
+            Self::Drive => "drive",
         })
     }
 }
@@ -71,6 +74,17 @@ pub enum Bed {
     Parked,
     /// The bed moves with the water and the wheels roll on it: a vehicle that drives through still water.
     Driving,
+}
+
+/// Form of the bed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Ground {
+    /// A horizontal plane.
+    #[default]
+    Flat,
+    /// Parallel to the wheels under the vehicle, in a channel that is deeper below it and shallower above it.
+    Ramp,
 }
 
 /// One case.
@@ -104,6 +118,18 @@ pub struct Case {
     /// Length, width and height of the channel relative to the settings.
     #[serde(default = "as_set")]
     pub channel_scale: f64,
+    /// Velocity of the bed over that of the water far away, both relative to the vehicle; by default that of `bed`.
+    #[serde(default)]
+    pub bed_share: Option<f64>,
+    /// Distance of the lowest point of the hull from a flat bed [m].
+    #[serde(default)]
+    pub clearance_m: f64,
+    /// Form of the bed.
+    #[serde(default)]
+    pub ground: Ground,
+    /// Round of the set `drive`, from 1; 0 for other sets.
+    #[serde(default)]
+    pub round: u32,
 }
 
 /// The channel of the settings, where a plan or an outcome of before says nothing of it.
@@ -128,6 +154,10 @@ impl Case {
             end_speed_mps: speed_mps,
             ramp_s: 0.0,
             channel_scale: as_set(),
+            bed_share: None,
+            clearance_m: 0.0,
+            ground: Ground::Flat,
+            round: 0,
         }
     }
 
@@ -138,13 +168,26 @@ impl Case {
 
     /// True where both are the same flow on the same mesh.
     pub(super) fn is_same_state(&self, other: &Self) -> bool {
-        let other = Self { id: self.id.clone(), set: self.set, ..other.clone() };
+        let other = Self { id: self.id.clone(), set: self.set, round: self.round, ..other.clone() };
         *self == other
     }
 
-    /// True when wheels stand on the bed as on level ground.
+    /// True without roll and pitch.
     pub fn is_level(&self) -> bool {
         self.roll_deg == 0.0 && self.pitch_deg == 0.0
+    }
+
+    /// True when all wheels stand on the bed.
+    pub fn stands(&self) -> bool {
+        self.clearance_m == 0.0 && (self.is_level() || self.ground == Ground::Ramp)
+    }
+
+    /// Velocity of the bed over that of the water far away, both relative to the vehicle.
+    pub fn share_of_bed(&self) -> f64 {
+        self.bed_share.unwrap_or(match self.bed {
+            Bed::Parked => 0.0,
+            Bed::Driving => 1.0,
+        })
     }
 
     /// World up in the body frame.
@@ -162,13 +205,9 @@ impl Case {
     pub fn condition(&self, speed: f64, acceleration: f64) -> Condition {
         let forward = self.cfd_from_body().inverse() * Vec3::x();
         let velocity = forward * speed;
-        let ground_velocity = match self.bed {
-            Bed::Parked => Vec3::zeros(),
-            Bed::Driving => velocity,
-        };
         Condition {
             velocity,
-            ground_velocity,
+            ground_velocity: velocity * self.share_of_bed(),
             acceleration: forward * acceleration,
             density: self.density_kgpm3,
             up: self.up(),
@@ -277,7 +316,7 @@ pub enum PlanError {
         /// The file.
         path: PathBuf,
     },
-    /// A speed that changes where it cannot.
+    /// Columns that contradict one another.
     #[error("{path}: case `{id}`: {fault}")]
     Ramp {
         /// The file.
@@ -431,17 +470,21 @@ fn check(path: &Path, case: &Case) -> Result<(), PlanError> {
     if !is_name || ["outcomes", "failed", "locks"].contains(&case.id.as_str()) {
         return Err(PlanError::Name { path: path.to_owned(), id: case.id.clone() });
     }
+    // tilted, a hull gets wet below the height of its origin
+    let least_depth = if case.set == Set::Drive { -50.0 } else { 0.005 };
     let fields = [
         ("speed_mps", case.speed_mps, 0.0, 30.0, "a speed from 0 to 30 m/s"),
         ("end_speed_mps", case.end_speed_mps, 0.0, 30.0, "a speed from 0 to 30 m/s"),
         ("heading_deg", case.heading_deg, -180.0, 180.0, "an angle from -180 to 180 degrees"),
-        ("depth_m", case.depth_m, 0.005, 50.0, "a depth from 0.005 to 50 m"),
+        ("depth_m", case.depth_m, least_depth, 50.0, "a depth from 0.005 to 50 m"),
         ("density_kgpm3", case.density_kgpm3, 100.0, 20_000.0, "a density from 100 to 20000 kg/m3"),
         ("roll_deg", case.roll_deg, -45.0, 45.0, "an angle from -45 to 45 degrees"),
         ("pitch_deg", case.pitch_deg, -45.0, 45.0, "an angle from -45 to 45 degrees"),
         ("cell_scale", case.cell_scale, 0.3, 5.0, "a factor from 0.3 to 5"),
         ("ramp_s", case.ramp_s, 0.0, 60.0, "a time from 0 to 60 s"),
         ("channel_scale", case.channel_scale, 0.5, 3.0, "a factor from 0.5 to 3"),
+        ("bed_share", case.share_of_bed(), 0.0, 1.0, "a share from 0 to 1"),
+        ("clearance_m", case.clearance_m, 0.0, 20.0, "a distance from 0 to 20 m"),
     ];
     let wrong = fields.into_iter().find(|(_, value, min, max, _)| !(min..=max).contains(&value));
     match wrong {
@@ -454,6 +497,13 @@ fn check(path: &Path, case: &Case) -> Result<(), PlanError> {
 
 fn check_ramp(path: &Path, case: &Case, settings: &Settings) -> Result<(), PlanError> {
     let fault = match case.is_unsteady() {
+        _ if (case.bed == Bed::Parked) != (case.share_of_bed() == 0.0) => {
+            "bed is parked where bed_share is 0, and driving elsewhere"
+        }
+        _ if case.ground == Ground::Ramp && case.clearance_m > 0.0 => "on a ramp there is no clearance",
+        true if case.ground == Ground::Ramp || case.set == Set::Drive => {
+            "on a ramp and in rounds the speed is steady"
+        }
         true if case.bed == Bed::Driving => "wheels that turn keep their speed: a ramp needs a parked bed",
         true if settings.settle_s[0] < SECTIONS_BEFORE_S => {
             "half a second before the ramp is kept: settle_s is shorter"

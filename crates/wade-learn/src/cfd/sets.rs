@@ -24,6 +24,8 @@ impl Plan {
             Set::Check => self.checks(),
             Set::Mesh => self.finest(),
             Set::Ahead => self.ahead(),
+            // its rounds need the hull
+            Set::Drive => Vec::new(),
         };
         for case in fresh {
             // a table of one depth asks for each state of a list several times

@@ -9,8 +9,9 @@ use nix::time::{clock_getcpuclockid, clock_gettime};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 
-use super::case::{Inputs, SECTIONS_BEFORE_S, Settings};
+use super::case::{FlowTime, Inputs, Settings};
 use super::claim::Claim;
+use super::gauges::{self, GaugeError};
 use super::openfoam::{MeshKind, internal_vectors};
 use super::placement::Placement;
 use super::plan::{Campaign, Case};
@@ -18,7 +19,9 @@ use super::poly_mesh::{MeshHull, PolyMeshError};
 use crate::dataset::CutOff;
 use crate::dataset::history::{History, HistoryError};
 use crate::dataset::openfoam;
-use wade_core::frame::Vec3;
+use wade_core::condition::Condition;
+use wade_core::frame::{GRAVITY, Vec3};
+use wade_core::wrench::Wrench;
 
 /// Duration of a section [s], as the source paper averages.
 pub const SECTION_S: f64 = 0.1;
@@ -94,8 +97,26 @@ pub struct Outcome {
     pub rest: Vec<Load>,
     /// Names of the surfaces.
     pub surfaces: Vec<String>,
+    /// The flow ahead of the vehicle, where it was measured; `rest` and `drift` are then those of the measured water level.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<Measured>,
     /// The sections of the last window; of an unsteady case, from half a second before the ramp to the end.
     pub sections: Vec<Section>,
+}
+
+/// The flow that gauges ahead of the vehicle measured, means over the window.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measured {
+    /// Depth at the body origin [m].
+    pub depth_m: f64,
+    /// Speed of the water relative to the vehicle [m/s].
+    pub speed_mps: f64,
+    /// Distance of the ground-contact plane from the bed under the body origin [m].
+    pub bed_clearance_m: f64,
+    /// Change of the dynamic force on each surface from the earlier window to the last one, at equal depth times speed squared
+    /// [N].
+    pub drift: Vec<[f64; 3]>,
 }
 
 /// How this version computes a case: raised whenever the same case with the same settings would come out otherwise.
@@ -164,6 +185,9 @@ pub enum SolveError {
         /// Its folder.
         path: PathBuf,
     },
+    /// Gauges that cannot be read.
+    #[error(transparent)]
+    Gauges(#[from] GaugeError),
     /// A force history that does not cover the window.
     #[error("{path}: {fault}")]
     History {
@@ -199,12 +223,17 @@ pub fn solve(
     running.start_flow(&placement)?;
 
     let settings = inputs.settings;
-    let (mut windows, mut end) = (1, inputs.first_end());
+    let (mut windows, mut end) = (1, inputs.first_end(&placement));
+    let still = inputs.case.condition(0.0, 0.0);
     let mut window = loop {
         running.program("interFoam", &[])?;
-        let window = Window::read(folder, inputs, &placement, end)?;
-        let rest = hull.at_rest(inputs.vehicle, &inputs.case.condition(0.0, 0.0));
-        if inputs.case.is_unsteady()
+        let window = match &settings.flow_time {
+            Some(time) => Window::read_labelled(folder, inputs, &placement, &hull, time, end)?,
+            None => Window::read(folder, inputs, &placement, [inputs.window_start(end), end])?,
+        };
+        let rest = hull.at_rest(inputs.vehicle, &still);
+        if settings.flow_time.is_some()
+            || inputs.case.is_unsteady()
             || windows >= settings.windows
             || window.is_settled(&rest, settings.drift)
         {
@@ -216,7 +245,8 @@ pub fn solve(
         std::fs::write(&path, inputs.control(&placement, end - settings.window_s, end))
             .map_err(|source| io(&path, source))?;
     };
-    let rest = hull.at_rest(inputs.vehicle, &inputs.case.condition(0.0, 0.0));
+    let condition = window.measured.as_ref().map_or(still, |flow| Condition { depth: flow.depth_m, ..still });
+    let rest = hull.at_rest(inputs.vehicle, &condition);
     let settled = inputs.case.is_unsteady() || window.is_settled(&rest, settings.drift);
     let (steps, core_s) = running.cost();
     Ok(Outcome {
@@ -240,6 +270,7 @@ pub fn solve(
             .map(|w| Load { force: w.force.into(), moment: w.moment.into(), viscous: [0.0; 3] })
             .collect(),
         surfaces: inputs.vehicle.surfaces.iter().map(|s| s.name.clone()).collect(),
+        measured: window.measured.take(),
         sections: std::mem::take(&mut window.sections),
     })
 }
@@ -369,21 +400,23 @@ struct Window {
     from: f64,
     drift: Vec3,
     mean: Vec3,
+    measured: Option<Measured>,
     sections: Vec<Section>,
 }
 
 impl Window {
-    fn read(folder: &Path, inputs: &Inputs, placement: &Placement, end: f64) -> Result<Self, SolveError> {
-        let settings = inputs.settings;
-        let length = inputs.vehicle.dimensions.length;
-        let from = if inputs.case.is_unsteady() {
-            settings.settle(length, inputs.case.speed_mps) - SECTIONS_BEFORE_S
-        } else {
-            end - settings.window_s
-        };
-        let count = ((end - from) / SECTION_S).round() as usize;
+    fn read(
+        folder: &Path,
+        inputs: &Inputs,
+        placement: &Placement,
+        [from, end]: [f64; 2],
+    ) -> Result<Self, SolveError> {
+        let count = ((end - from) / SECTION_S).round().max(1.0) as usize;
+        // a window in lengths of the vehicle is seldom a whole number of tenths of a second
+        let long = (end - from) / count as f64;
+        let long = if (long - SECTION_S).abs() < 1e-6 { SECTION_S } else { long };
         let mut sections: Vec<Section> = (0..count)
-            .map(|i| section(inputs, from + i as f64 * SECTION_S, from + (i + 1) as f64 * SECTION_S))
+            .map(|i| section(inputs, from + i as f64 * long, from + (i + 1) as f64 * long))
             .collect();
         let back = placement.cfd_from_body.inverse();
         for surface in &inputs.vehicle.surfaces {
@@ -411,12 +444,63 @@ impl Window {
             nets.sum::<Vec3>() / sections.len().max(1) as f64
         };
         let drift = mean(&sections[half..]) - mean(&sections[..half]);
-        Ok(Self { from, drift, mean: mean(&sections), sections })
+        Ok(Self { from, drift, mean: mean(&sections), measured: None, sections })
+    }
+
+    /// The last window by the lengths of `time`, with the flow that the gauges measured. Its drift is the change of the dynamic
+    /// force since the window before, which is brought to the depth times speed squared of the last one.
+    fn read_labelled(
+        folder: &Path,
+        inputs: &Inputs,
+        placement: &Placement,
+        hull: &MeshHull,
+        time: &FlowTime,
+        end: f64,
+    ) -> Result<Self, SolveError> {
+        let weight = inputs.case.density_kgpm3 * GRAVITY;
+        let gauges = gauges::read(folder, weight)?;
+        let (long, shift) = (time.window * inputs.length_s(), time.shift * inputs.length_s());
+        let dynamic = |window: &Self, depth: f64| -> Vec<Vec3> {
+            let still = inputs.case.condition(0.0, 0.0);
+            let rest = hull.at_rest(inputs.vehicle, &Condition { depth, ..still });
+            let count = window.sections.len().max(1) as f64;
+            let mean = |surface: usize| {
+                window.sections.iter().map(|s| Vec3::from(s.loads[surface].force)).sum::<Vec3>() / count
+            };
+            rest.iter()
+                .enumerate()
+                .map(|(surface, rest): (usize, &Wrench)| mean(surface) - rest.force)
+                .collect()
+        };
+        let labelled = |back: f64| -> Result<_, SolveError> {
+            let bounds = [end - back - long, end - back];
+            let window = Self::read(folder, inputs, placement, bounds)?;
+            let path = folder.join("postProcessing/gauges");
+            let [rise, speed] =
+                gauges.mean(bounds[0], bounds[1]).map_err(|fault| SolveError::History { path, fault })?;
+            let flow = inputs.flow_at_vehicle(placement, rise, speed);
+            let loads = dynamic(&window, flow.depth_m);
+            Ok((window, flow, loads))
+        };
+        let (mut window, flow, loads) = labelled(0.0)?;
+        let (_, before, loads_before) = labelled(shift)?;
+        let ratio = (flow.pressure / before.pressure).clamp(0.25, 4.0);
+        let ratio = if ratio.is_nan() { 1.0 } else { ratio };
+        let drift: Vec<Vec3> =
+            loads.iter().zip(&loads_before).map(|(now, before)| now - before * ratio).collect();
+        window.drift = drift.iter().sum();
+        window.measured = Some(Measured {
+            depth_m: flow.depth_m,
+            speed_mps: flow.speed_mps,
+            bed_clearance_m: placement.bed_clearance,
+            drift: drift.iter().map(|drift| (*drift).into()).collect(),
+        });
+        Ok(window)
     }
 
     /// True when the halves differ by less than `share` of the dynamic force in every component, or by what no one
     /// can see beside the force at rest.
-    fn is_settled(&self, rest: &[wade_core::wrench::Wrench], share: f64) -> bool {
+    fn is_settled(&self, rest: &[Wrench], share: f64) -> bool {
         let still: Vec3 = rest.iter().map(|w| w.force).sum();
         let dynamic = (self.mean - still).norm();
         self.drift.amax() <= share * dynamic.max(UNSEEN * still.norm())

@@ -7,6 +7,7 @@ use wade_core::vehicle::Vehicle;
 
 use crate::cfd::case::Settings;
 use crate::cfd::collect::{self, CollectError, Collected};
+use crate::cfd::means;
 use crate::cfd::plan::{self, Campaign, Case, Plan, PlanError, Set};
 use crate::cfd::run::Work;
 use crate::cfd::trials::{self, CaseTrialsError};
@@ -65,7 +66,7 @@ pub struct Beginning {
 }
 
 /// Cases to add to a plan.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Addition {
     /// Which kind.
     pub set: Set,
@@ -73,6 +74,8 @@ pub struct Addition {
     pub cases: usize,
     /// Seed of the hypercube.
     pub seed: u64,
+    /// A campaign whose cases that had not settled a round repeats.
+    pub repeat: Option<PathBuf>,
 }
 
 /// Which cases are computed.
@@ -93,7 +96,8 @@ impl Folder<'_> {
     pub fn extend(&self, beginning: Beginning, add: Addition) -> Result<(Plan, usize), CampaignError> {
         let exists = self.path.join(plan::CAMPAIGN_FILE).exists();
         let folder = || self.path.to_owned();
-        let of_a_campaign = [plan::PLAN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
+        let of_a_campaign =
+            [plan::PLAN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE, means::SURFACES_FILE];
         if let Some(left) = of_a_campaign.into_iter().find(|name| !exists && self.path.join(name).exists()) {
             return Err(CampaignError::Headless { folder: folder(), left });
         }
@@ -104,13 +108,28 @@ impl Folder<'_> {
         }
         let before = plan.cases.len();
         let float = float_depth(&self.vehicle.hull.mesh, self.vehicle.z0, self.vehicle.mass);
-        plan.extend(add.set, add.cases, add.seed, float)?;
+        match add.set {
+            Set::Drive => {
+                let repeats = add.repeat.as_deref().map(|other| self.unsettled(other)).transpose()?;
+                plan.add_round(self.vehicle, add.cases, add.seed, &repeats.unwrap_or_default());
+            }
+            set => plan.extend(set, add.cases, add.seed, float)?,
+        }
         if exists {
             plan.write_cases(self.path)?
         } else {
             plan.write(self.path)?
         }
         Ok((plan, before))
+    }
+
+    /// The cases of the set `paper` of another campaign of the same vehicle that had not settled.
+    fn unsettled(&self, other: &Path) -> Result<Vec<Case>, CampaignError> {
+        let plan = Plan::read(other)?;
+        plan.check_vehicle(other, self.vehicle)?;
+        let collected = Collected::read(other, &plan)?;
+        let has_not_settled = |case: &Case| collected.cases.get(&case.id).is_some_and(|row| !row.settled);
+        Ok(plan.cases.into_iter().filter(|case| case.set == Set::Paper && has_not_settled(case)).collect())
     }
 
     fn begin(&self, beginning: &Beginning) -> Result<Plan, CampaignError> {
