@@ -250,6 +250,12 @@ impl Inputs<'_> {
         if self.case.is_unsteady() { self.settle() - SECTIONS_BEFORE_S } else { end - self.settings.window_s }
     }
 
+    /// The earlier window and the last one, which ends at `end` [s].
+    pub fn windows(&self, time: &FlowTime, end: f64) -> [[f64; 2]; 2] {
+        let long = time.window * self.length_s();
+        [end - time.shift * self.length_s(), end].map(|end| [end - long, end])
+    }
+
     /// The flow at the vehicle, from the rise of the level [m] and the speed [m/s] at the gauges.
     pub fn flow_at_vehicle(&self, placement: &Placement, rise: f64, speed: f64) -> FlowAtVehicle {
         let up = self.case.up().z;

@@ -62,8 +62,8 @@ impl Plan {
         let top_speed = self.campaign.table.speed_mps.max;
         let name =
             self.campaign.vehicle.bytes().fold(seed, |sum, byte| sum.wrapping_mul(31) + u64::from(byte));
-        let design = Design::new(count, round, before, name);
-        let new = (0..count).map(|i| design.case(vehicle, first + i, top_speed, round, i));
+        let design = Design { first, top_speed, ..Design::new(count, round, before, name) };
+        let new = (0..count).map(|i| design.case(vehicle, i));
         let new: Vec<Case> = new.collect();
         let known = |case: &Case| self.cases.iter().any(|planned| planned.id == case.id);
         let again = repeats.iter().map(|case| repeated(case, round)).filter(|case| !known(case));
@@ -89,6 +89,11 @@ fn quota(share: f64, count: usize) -> usize {
 
 /// One round: a place from 0 to 1 of each case in each quantity, and which cases are of which kind.
 struct Design {
+    round: u32,
+    /// Number of the first case.
+    first: usize,
+    /// Greatest speed [m/s].
+    top_speed: f64,
     places: [Vec<f64>; AXES],
     moving: Vec<usize>,
     parked: Vec<usize>,
@@ -128,14 +133,14 @@ impl Design {
                 best = other;
             }
         }
-        Self { places: best, moving, parked, lifted, ramps, heavy }
+        Self { round, first: 0, top_speed: 1.0, places: best, moving, parked, lifted, ramps, heavy }
     }
 
-    fn case(&self, vehicle: &Vehicle, number: usize, top_speed: f64, round: u32, index: usize) -> Case {
+    fn case(&self, vehicle: &Vehicle, index: usize) -> Case {
         let [speed, heading, level, pitch, roll, clearance, share, density] = &self.places;
         let within = |range: Range, place: f64| range.min + place * (range.max - range.min);
         let position = |kind: &[usize]| kind.iter().position(|&other| other == index);
-        let speeds = Range { min: LEAST_SPEED * top_speed, max: top_speed };
+        let speeds = Range { min: LEAST_SPEED * self.top_speed, max: self.top_speed };
         let bed_share = if position(&self.moving).is_some() {
             1.0
         } else if position(&self.parked).is_some() {
@@ -161,8 +166,14 @@ impl Design {
             bed_share: Some(bed_share),
             clearance_m,
             ground,
-            round,
-            ..Case::steady(name, Set::Drive, number, rounded(within(speeds, speed[index]), 3), 0.0)
+            round: self.round,
+            ..Case::steady(
+                name,
+                Set::Drive,
+                self.first + index,
+                rounded(within(speeds, speed[index]), 3),
+                0.0,
+            )
         };
         // on a steep ramp the vehicle may float before its last wheel is in the water
         let mut depths = depths(vehicle, &case);

@@ -9,7 +9,7 @@ use nix::time::{clock_getcpuclockid, clock_gettime};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 
-use super::case::{FlowTime, Inputs, Settings};
+use super::case::{Inputs, Settings};
 use super::claim::Claim;
 use super::gauges::{self, GaugeError};
 use super::openfoam::{MeshKind, internal_vectors};
@@ -228,7 +228,9 @@ pub fn solve(
     let mut window = loop {
         running.program("interFoam", &[])?;
         let window = match &settings.flow_time {
-            Some(time) => Window::read_labelled(folder, inputs, &placement, &hull, time, end)?,
+            Some(time) => {
+                Window::read_labelled(folder, inputs, &placement, &hull, inputs.windows(time, end))?
+            }
             None => Window::read(folder, inputs, &placement, [inputs.window_start(end), end])?,
         };
         let rest = hull.at_rest(inputs.vehicle, &still);
@@ -447,19 +449,17 @@ impl Window {
         Ok(Self { from, drift, mean: mean(&sections), measured: None, sections })
     }
 
-    /// The last window by the lengths of `time`, with the flow that the gauges measured. Its drift is the change of the dynamic
-    /// force since the window before, which is brought to the depth times speed squared of the last one.
+    /// The last of two windows, with the flow that the gauges measured. Its drift is the change of the dynamic force since the
+    /// earlier one, which is brought to the depth times speed squared of the last one.
     fn read_labelled(
         folder: &Path,
         inputs: &Inputs,
         placement: &Placement,
         hull: &MeshHull,
-        time: &FlowTime,
-        end: f64,
+        [earlier, last]: [[f64; 2]; 2],
     ) -> Result<Self, SolveError> {
         let weight = inputs.case.density_kgpm3 * GRAVITY;
         let gauges = gauges::read(folder, weight)?;
-        let (long, shift) = (time.window * inputs.length_s(), time.shift * inputs.length_s());
         let dynamic = |window: &Self, depth: f64| -> Vec<Vec3> {
             let still = inputs.case.condition(0.0, 0.0);
             let rest = hull.at_rest(inputs.vehicle, &Condition { depth, ..still });
@@ -472,8 +472,7 @@ impl Window {
                 .map(|(surface, rest): (usize, &Wrench)| mean(surface) - rest.force)
                 .collect()
         };
-        let labelled = |back: f64| -> Result<_, SolveError> {
-            let bounds = [end - back - long, end - back];
+        let labelled = |bounds: [f64; 2]| -> Result<_, SolveError> {
             let window = Self::read(folder, inputs, placement, bounds)?;
             let path = folder.join("postProcessing/gauges");
             let [rise, speed] =
@@ -482,8 +481,8 @@ impl Window {
             let loads = dynamic(&window, flow.depth_m);
             Ok((window, flow, loads))
         };
-        let (mut window, flow, loads) = labelled(0.0)?;
-        let (_, before, loads_before) = labelled(shift)?;
+        let (mut window, flow, loads) = labelled(last)?;
+        let (_, before, loads_before) = labelled(earlier)?;
         let ratio = (flow.pressure / before.pressure).clamp(0.25, 4.0);
         let ratio = if ratio.is_nan() { 1.0 } else { ratio };
         let drift: Vec<Vec3> =
