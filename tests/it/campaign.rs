@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 use wade_core::bundle;
+use wade_core::frame::Vec3;
 use wade_learn::cfd::collect::Collected;
 use wade_learn::cfd::means::Means;
 use wade_learn::cfd::openfoam::{MeshKind, OpenFoam};
@@ -469,10 +470,18 @@ fn a_ramp_a_deep_bed_and_a_tilted_hull_are_computed_and_labelled_with_the_measur
     assert!(output.status.success(), "{}{}", stdout(&output), stderr(&output));
     assert!(wade(&["campaign", "collect", &campaign]).status.success());
     let summaries = Collected::read(path, &plan).expect("summaries");
-    for case in summaries.cases.values() {
-        let speed = case.measured_speed_mps.expect("measured");
-        assert!((speed / case.speed_mps - 1.0).abs() < 0.1, "{case:?}");
-        assert!(case.fx_n < 0.0 && (case.fz_n / case.rest_fz_n - 1.0).abs() < 0.5, "{case:?}");
+    let means = Means::read(path).expect("means").expect("some");
+    let data = means.dataset(path, &plan, &summaries.cases).expect("a data set");
+    assert_eq!(data.samples.len(), 3);
+    for sample in &data.samples {
+        let (velocity, case) = (sample.condition.velocity, &sample.case);
+        assert!((velocity.norm() / 0.8 - 1.0).abs() < 0.1, "{case}: {velocity}");
+        let rest: Vec3 = sample.surfaces.iter().map(|s| s.rest.expect("at rest").force).sum();
+        let dynamic = sample.net_force() - rest;
+        assert!(dynamic.dot(&velocity) < 0.0, "{case}: drag opposes the motion: {dynamic}");
+        assert!(dynamic.norm() < 0.5 * rest.norm(), "{case}: {dynamic} of {rest} at rest");
+        let up = sample.condition.up.dot(&rest);
+        assert!(rest.norm() - up < 0.1 * up, "{case}: buoyancy is vertical but for the dry contact");
     }
 }
 
