@@ -33,7 +33,8 @@ const GAUGES_AHEAD: f64 = 1.2;
 const GAUGES_ACROSS: [f64; 5] = [-0.44, -0.22, 0.0, 0.22, 0.44];
 /// Places across the channel at which its depth is taken.
 const CROSSINGS: usize = 50;
-/// The ramp in the dictionary of the mesh: its patch is called `ground_ramp`.
+/// The patch of a ramp, and the ramp in the dictionary of the mesh.
+pub(super) const RAMP_PATCH: &str = "ground_ramp";
 const RAMP_GEOMETRY: &str = "ramp.stl { type triSurfaceMesh; name ground_ramp; }";
 const RAMP_LEVEL: &str = "ground_ramp { level (0 0); patchInfo { type wall; } }";
 
@@ -447,6 +448,7 @@ impl Inputs<'_> {
             .iter()
             .map(force)
             .chain(["inlet_water", "inlet_air", "outlet", "top"].map(flow))
+            .chain(placement.ramp.map(|_| flow(RAMP_PATCH)))
             .chain(settings.flow_time.map(|_| self.gauges(placement)))
             .collect();
         let values = [

@@ -9,7 +9,7 @@ use nix::time::{clock_getcpuclockid, clock_gettime};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 
-use super::case::{Inputs, Settings};
+use super::case::{Inputs, RAMP_PATCH, Settings};
 use super::claim::Claim;
 use super::gauges::{self, GaugeError};
 use super::openfoam::{MeshKind, internal_vectors};
@@ -539,9 +539,12 @@ fn mass_imbalance(folder: &Path, start: f64, end: f64) -> f64 {
     };
     let flows: Option<Vec<f64>> =
         ["inlet_water", "inlet_air", "outlet", "top"].map(flow).into_iter().collect();
+    let through_ramp = flow(RAMP_PATCH).unwrap_or(0.0);
     match flows {
         // flows out of the domain are positive
-        Some(flows) if flows[0].abs() > 1e-9 => flows.iter().sum::<f64>().abs() / flows[0].abs(),
+        Some(flows) if flows[0].abs() > 1e-9 => {
+            (flows.iter().sum::<f64>() + through_ramp).abs() / flows[0].abs()
+        }
         _ => 0.0,
     }
 }
