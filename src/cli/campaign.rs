@@ -10,11 +10,13 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use wade_core::vehicle::Vehicle;
 use wade_learn::cfd::collect::{self, Collected};
+use wade_learn::cfd::means;
 use wade_learn::cfd::openfoam::OpenFoam;
 use wade_learn::cfd::plan::{self, Plan, Set};
 use wade_learn::cfd::report;
 use wade_learn::cfd::run::{Event, Machine, Work};
 use wade_learn::cfd::slurm;
+use wade_learn::dataset;
 use wade_learn::workflow::campaign::{Addition, Beginning, Folder, Selection};
 
 use super::Vehicles;
@@ -291,6 +293,9 @@ struct Collect {
     /// Where the cases were computed [default: `work` in the folder of the campaign]
     #[arg(long, value_name = "DIR")]
     work: Option<PathBuf>,
+    /// Also write what was collected as a data set, which `wade train` and `wade dataset` read
+    #[arg(long, value_name = "FILE")]
+    dataset: Option<PathBuf>,
 }
 
 impl Collect {
@@ -298,8 +303,12 @@ impl Collect {
         let (plan, vehicle) = opened(&self.campaign, &self.vehicles)?;
         let work = Work { folder: work_folder(&self.campaign, self.work.as_ref()), keep: true };
         let new = collect::collect(&self.campaign, &plan, &vehicle, &work)?;
-        let all = Collected::read(&self.campaign, &plan)?.cases.len();
+        let collected = Collected::read(&self.campaign, &plan)?;
+        let all = collected.cases.len();
         println!("{}: {all} of {} cases, {new} of them new", self.campaign.display(), plan.cases.len());
+        if let Some(path) = &self.dataset {
+            dataset::write_compact(path, &collect::dataset(&self.campaign, &plan, &collected)?)?;
+        }
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -356,7 +365,13 @@ struct Report {
 
 impl Report {
     fn run(self) -> Result<ExitCode> {
-        let files = [plan::PLAN_FILE, plan::CAMPAIGN_FILE, collect::CASES_FILE, collect::SECTIONS_FILE];
+        let files = [
+            plan::PLAN_FILE,
+            plan::CAMPAIGN_FILE,
+            collect::CASES_FILE,
+            collect::SECTIONS_FILE,
+            means::SURFACES_FILE,
+        ];
         let files = files.map(|name| self.campaign.join(name));
         let written = super::begin_page(self.html.as_deref(), files)?;
         let (plan, vehicle) = opened(&self.campaign, &self.vehicles)?;
@@ -367,7 +382,7 @@ impl Report {
             super::emit(&report.text())?;
         }
         if let Some(written) = written {
-            written.finish(&report.page(&self.campaign, &vehicle)?)?;
+            written.finish(&report.page(&self.campaign, &plan, &vehicle)?)?;
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -418,6 +418,11 @@ fn means_of_a_round_take_two_kilobytes_a_case_and_read_back_as_a_data_set() {
     assert!(stdout(&collected).contains("1 of 12 cases, 1 of them new"), "{}", stderr(&collected));
     let again = wade(&["campaign", "collect", &campaign]);
     assert!(stdout(&again).contains("1 of 12 cases, 0 of them new"), "{}", stderr(&again));
+    let written = path.join("means.parquet").display().to_string();
+    let again = wade(&["campaign", "collect", &campaign, "--dataset", &written]);
+    assert!(again.status.success(), "{}", stderr(&again));
+    let report = wade(&["campaign", "report", &campaign]);
+    assert!(stdout(&report).contains("drive     1 of 12 cases, 1 settled"), "{}", stderr(&report));
     let rows = |name: &str| {
         let text = std::fs::read_to_string(path.join(name)).expect("collected");
         let rows = text.lines().filter(|line| line.starts_with("husky-drive-0000"));
@@ -431,6 +436,8 @@ fn means_of_a_round_take_two_kilobytes_a_case_and_read_back_as_a_data_set() {
     let means = Means::read(path).expect("means").expect("some");
     let data = means.dataset(path, &plan, &summaries.cases).expect("a data set");
     assert_eq!((data.samples.len(), data.samples[0].surfaces.len()), (1, surfaces));
+    let read = dataset::read(Path::new(&written)).expect("a data set");
+    assert_eq!((read.samples.len(), &read.meta), (1, &data.meta));
     let sample = &data.samples[0];
     assert!((sample.surfaces[1].force.x - odd(1)).abs() < 0.1);
     assert!((sample.condition.velocity.norm() - 0.4568).abs() < 1e-9);

@@ -382,6 +382,15 @@ impl Collected {
     }
 }
 
+/// The data set of a campaign: its sections, or its means as a sample a case.
+pub fn dataset(folder: &Path, plan: &Plan, collected: &Collected) -> Result<Dataset, CollectError> {
+    if plan.campaign.settings.flow_time.is_none() {
+        return Ok(dataset::read(&folder.join(SECTIONS_FILE))?);
+    }
+    let means = Means::read(folder)?.ok_or_else(|| CollectError::Nothing { path: folder.to_owned() })?;
+    means.dataset(folder, plan, &collected.cases)
+}
+
 /// Adds the outcomes of `work` to the data set and the summaries in `folder`; gives the number of new cases.
 ///
 /// A case that was collected before and was computed again since, by a newer method, is replaced.

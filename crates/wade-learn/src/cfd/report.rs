@@ -7,10 +7,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::collect::{CaseSummary, CollectError, Collected, SECTIONS_FILE};
+use super::collect::{self, CaseSummary, CollectError, Collected};
 use super::foreword::foreword;
 use super::plan::{Case, Plan, Set};
-use crate::dataset;
 use crate::dataset::page;
 use crate::dataset::summary::Summary;
 use crate::page::PlotError;
@@ -162,7 +161,7 @@ impl Report {
         let most = cases.iter().map(|case| case.cells).max().unwrap_or(0);
         Ok(Self {
             vehicle: vehicle.name.clone(),
-            provenance: dataset::read(&folder.join(SECTIONS_FILE))?.meta.provenance,
+            provenance: collect::dataset(folder, plan, &collected)?.meta.provenance,
             sets,
             outdated: done.iter().filter(|(case, summary)| summary.is_outdated(case)).count(),
             core_hours: cases.iter().map(|case| case.core_s).sum::<f64>() / 3600.0,
@@ -239,8 +238,8 @@ impl Report {
     }
 
     /// The same with plots, as a page of its own.
-    pub fn page(&self, folder: &Path, vehicle: &Vehicle) -> Result<String, PageError> {
-        let dataset = dataset::read(&folder.join(SECTIONS_FILE))?;
+    pub fn page(&self, folder: &Path, plan: &Plan, vehicle: &Vehicle) -> Result<String, PageError> {
+        let dataset = collect::dataset(folder, plan, &Collected::read(folder, plan)?)?;
         let kinds: BTreeMap<String, String> = vehicle
             .surfaces
             .iter()
@@ -255,9 +254,9 @@ impl Report {
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]
 pub enum PageError {
-    /// The data set.
+    /// What was collected.
     #[error(transparent)]
-    Dataset(#[from] dataset::DatasetError),
+    Collected(#[from] CollectError),
     /// A plot.
     #[error(transparent)]
     Plot(#[from] PlotError),
