@@ -188,6 +188,7 @@ impl CaseSummary {
             drift_fx_n: short_number(self.drift_fx_n),
             drift_fy_n: short_number(self.drift_fy_n),
             drift_fz_n: short_number(self.drift_fz_n),
+            core_s: to_four_places(self.core_s),
             mass_imbalance: to_four_places(self.mass_imbalance),
             end_s: to_four_places(self.end_s),
             ground: Some(case.ground),

@@ -249,7 +249,10 @@ pub fn solve(
     };
     let condition = window.measured.as_ref().map_or(still, |flow| Condition { depth: flow.depth_m, ..still });
     let rest = hull.at_rest(inputs.vehicle, &condition);
-    let settled = inputs.case.is_unsteady() || window.is_settled(&rest, settings.drift);
+    let settled = match &window.measured {
+        Some(_) => window.has_settled_flow(&rest, &inputs.case.up(), settings.drift),
+        None => inputs.case.is_unsteady() || window.is_settled(&rest, settings.drift),
+    };
     let (steps, core_s) = running.cost();
     Ok(Outcome {
         case: inputs.case.clone(),
@@ -506,6 +509,18 @@ impl Window {
     }
 }
 
+impl Window {
+    /// True when two windows differ by less than `share` of the horizontal dynamic force, or by what no one can see beside the
+    /// force at rest, and by less than `share` of the whole vertical force.
+    fn has_settled_flow(&self, rest: &[Wrench], up: &Vec3, share: f64) -> bool {
+        let still: Vec3 = rest.iter().map(|w| w.force).sum();
+        let horizontal = |force: Vec3| (force - up * up.dot(&force)).norm();
+        let least = UNSEEN * still.norm();
+        horizontal(self.drift) <= share * horizontal(self.mean - still).max(least)
+            && up.dot(&self.drift).abs() <= share * up.dot(&self.mean).abs()
+    }
+}
+
 fn section(inputs: &Inputs, start_s: f64, end_s: f64) -> Section {
     let case = inputs.case;
     let settle = inputs.settings.settle(inputs.vehicle.dimensions.length, case.speed_mps);
@@ -561,6 +576,20 @@ mod tests {
         };
         assert!(run("sleep 0.4").is_some_and(|status| status.success()));
         assert_eq!(run("while :; do :; done"), None);
+    }
+
+    #[test]
+    fn a_flow_has_settled_by_its_horizontal_and_its_vertical_force() {
+        let force = |x: f64, z: f64| Vec3::new(x, 0.0, z);
+        let rest = [Wrench { force: force(0.0, 200.0), moment: Vec3::zeros() }];
+        let settles = |mean: Vec3, drift: Vec3| {
+            let window = Window { from: 0.0, drift, mean, measured: None, sections: Vec::new() };
+            window.has_settled_flow(&rest, &Vec3::z(), 0.05)
+        };
+        assert!(settles(force(-40.0, 150.0), force(1.9, 7.0)));
+        assert!(!settles(force(-40.0, 150.0), force(2.1, 0.0)));
+        assert!(!settles(force(-40.0, 150.0), force(0.0, 8.0)));
+        assert!(settles(force(-1.0, 200.0), force(0.4, 0.0)), "half a newton beside 200 N");
     }
 
     #[test]
