@@ -147,7 +147,7 @@ pub fn copy_with_every_effect() -> TempDir {
 pub fn without_base_on(vehicle: &str, isa: Isa) -> Model {
     let model = model_on(vehicle, isa);
     let weights = model.weights().expect("the shipped bundles are trained").clone();
-    Model::new(model.vehicle().clone(), model.version(), model.domain().clone(), weights, isa)
+    Model::new(model.vehicle().clone(), model.version(), *model.domain(), weights, isa)
 }
 
 pub fn model_on(vehicle: &str, isa: Isa) -> Model {
