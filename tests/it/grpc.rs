@@ -355,7 +355,7 @@ fn a_server_that_cannot_read_its_bundles_never_says_serving() {
 #[test]
 fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
     let served = Served::with(|config| {
-        config.grpc.max_batch = 1 << 16;
+        config.grpc.max_batch = 1 << 14;
         // this is about what is answered, on a machine of any speed
         config.drain_s = PATIENCE.as_secs_f64();
     });
@@ -372,8 +372,8 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
         watched.stream(ReceiverStream::new(outgoing)).await.expect("opened").into_inner()
     });
     runtime.block_on(answers.message()).expect("answered").expect("one");
-    // long to compute, short to send
-    let request = proto::EvaluateBatchRequest { omit_surfaces: true, ..batch(1 << 16) };
+    // long to compute beside what is sent
+    let request = proto::EvaluateBatchRequest { omit_surfaces: true, ..batch(1 << 14) };
     let in_flight = runtime.spawn(async move { long.evaluate_batch(request).await });
     // the batch is in flight once it has taken a place
     let requests = served.running.metrics().held(wade::metrics::Resource::requests);
