@@ -92,7 +92,7 @@ impl Condition {
     }
 
     /// Share of the motion through the water that is motion over the bed: 1 driving through still water, 0 parked in a current.
-    /// `b = v_ground . v / v^2` between 0 and 1, and a half at rest, smoothly over the slowest [`SLOW`].
+    /// `b = v_ground . v / v^2` between 0 and 1, and a half at rest, smoothly over the slowest `SLOW`.
     pub fn bed(&self) -> f64 {
         self.stated_bed.unwrap_or_else(|| {
             let rest = SLOW * SLOW;

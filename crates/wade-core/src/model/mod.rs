@@ -2,7 +2,7 @@
 //!
 //! There are three kinds. Weights alone, as the paper has them or anchored to a simple drag. The physical base alone
 //! ([`crate::physics`]). And the base with anchored weights: near the cases that these were trained on the answer is theirs, far from
-//! them it is the base's, and [`Blend`] keeps the sum from ever putting power into the hull.
+//! them it is the base's, and `Blend` keeps the sum from ever putting power into the hull.
 
 mod blend;
 pub mod kernel;

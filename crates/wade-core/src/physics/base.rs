@@ -4,7 +4,7 @@
 //! `W_added = -(A nu_dot + C_A(nu) nu + k max(y', 0) dA/dy nu)` about the body origin. `nu` is the velocity through the water, `C_A`
 //! Kirchhoff's cross terms (Newman, Marine Hydrodynamics, section 4.14), `y` the place in the table of [`Radiation`], which
 //! rises with the volume under water. The last term is the momentum that entering water is given (von Karman 1929), by the
-//! share [`ENTRY`] that conserves energy; it acts while `y` rises alone, so that a hull that leaves the water gets nothing
+//! share `ENTRY` that conserves energy; it acts while `y` rises alone, so that a hull that leaves the water gets nothing
 //! back. So the energy of body, added mass, memory and position never rises by what the water does.
 
 use nalgebra::{Matrix6, Vector6};

@@ -70,7 +70,7 @@ pub fn wet_panels(elements: &[Element], level: f64) -> Vec<Panel> {
     elements.iter().filter_map(panel).collect()
 }
 
-/// Without those that face each other across a gap of less than [`NARROW`] of their size: the water between them moves with the
+/// Without those that face each other across a gap of less than `NARROW` of their size: the water between them moves with the
 /// hull, and panels do not resolve it.
 pub fn without_gaps(panels: Vec<Panel>) -> Vec<Panel> {
     let faces = |one: &Panel, other: &Panel| {
