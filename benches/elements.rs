@@ -90,14 +90,13 @@ fn main() {
         let reference: Vec<Wrench> = states.iter().map(|state| finest.wrench(state)).collect();
         for count in COUNTS {
             let mut divided = Divided::new(vehicle, count);
-            let mut share = |size: fn(&Wrench) -> Vec3| {
-                let mut errors: Vec<f64> = Vec::new();
-                for (state, reference) in states.iter().zip(&reference) {
-                    let right = size(reference);
-                    if right.norm() > 1e-6 {
-                        errors.push((size(&divided.wrench(state)) - right).norm() / right.norm());
-                    }
-                }
+            let answers: Vec<Wrench> = states.iter().map(|state| divided.wrench(state)).collect();
+            let share = |size: fn(&Wrench) -> Vec3| {
+                let error = |(answer, right): (&Wrench, &Wrench)| {
+                    let right = size(right);
+                    (right.norm() > 1e-6).then(|| (size(answer) - right).norm() / right.norm())
+                };
+                let mut errors: Vec<f64> = answers.iter().zip(&reference).filter_map(error).collect();
                 errors.sort_by(f64::total_cmp);
                 [0.5, 0.9].map(|quantile| errors[(errors.len() as f64 * quantile) as usize])
             };

@@ -33,7 +33,8 @@ pub const SHELTERING: f64 = 0.5;
 const SIDE_FILM: f64 = 0.01;
 /// The same of a horizontal element, which the water reaches at once: the time that a real bottom, with frame and tilt, takes.
 const BOTTOM_FILM: f64 = 0.5;
-/// Tangential coefficient of a tread that spins in still water [-]: lugs that close a tenth of the annulus they sweep, as plates of a coefficient of 1.2.
+/// Tangential coefficient of a tread that spins in still water [-]: lugs that close a tenth of the annulus they sweep, as
+/// plates of a coefficient of 1.2.
 /// Uncertain by a factor of two.
 pub const TREAD: f64 = 0.12;
 /// Reynolds number below which the friction line is held.
@@ -113,8 +114,8 @@ impl Drag {
                 arm.x.hypot(arm.z)
             };
             let own = elements.iter().filter(|e| e.surface == index);
-            let radius = own.map(from_axle).fold(0.0, f64::max);
-            (surface.kind == SurfaceKind::Wheel).then_some((surface.centroid, radius))
+            let radius = || own.map(from_axle).fold(0.0, f64::max);
+            (surface.kind == SurfaceKind::Wheel).then(|| (surface.centroid, radius()))
         };
         Self {
             blocks,
