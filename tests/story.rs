@@ -101,7 +101,7 @@ fn three_commands_name_the_effect_and_serve_it() {
     let net = |answer: &str| line(answer, "net force [N]").expect("a net force");
     assert!(line(&before, "+ ").is_none() && added[0] > 1.0, "{before}{after}");
     assert!((net(&after)[0] - net(&before)[0] - added[0]).abs() < 0.02, "{before}{after}");
-    // the answer of a model that is told of the water's motion
+    // the answer of a model that knows how the water moves
     let told = run(&format!("{} --current {HIDDEN},0,0", commands[0]));
     let [missed, left] = [&before, &after].map(|answer| (net(answer)[0] - net(&told)[0]).abs());
     assert!(left < 0.1 * missed, "{before}{after}{told}");

@@ -12,8 +12,7 @@ use crate::vehicle::Vehicle;
 /// Elements that are evaluated in one step; the elements of a surface are padded to a multiple of it.
 pub const LANES: usize = 8;
 
-/// Elements aimed at for a hull. On the CFD cases of the shipped hulls 200 to 2,400 elements differ by a few percent of the
-/// force, less than the base misses.
+/// Elements aimed at for a hull: `docs/src/results/latency.md` has the table of error against cost.
 pub const COUNT: usize = 256;
 
 /// Most pieces that a hull is cut into before they are grouped; a finer mesh is grouped as it is.
