@@ -59,10 +59,10 @@ const SETTINGS: &str = "  courant = 8.0                # largest Courant number
   hull_level = 2               # halvings at the hull
   wheel_level = 3              # and at the wheels
   # channel_m = [6.0, 5.0, 1.5]  # length, width, height; default: the paper's
-  # [flow_time]                  # in lengths / speed, in place of the times above;
+  # [flow_time]                # in lengths / speed, in place of the times above
   # lengths = [7.0, 9.0, 12.0, 8.0]  # at Fr < 0.4, < 0.6, < 1.3, above
-  # window = 4.0                 # depth and speed are measured ahead, means kept
-  # shift = 2.0                  # settled: as the window so much earlier
+  # window = 4.0               # depth and speed are measured ahead, means kept
+  # shift = 2.0                # settled: as the window so much earlier
 ";
 
 // What stood above a variant would replace all that its command says of itself.
@@ -124,7 +124,7 @@ Examples:
   wade campaign plan --vehicle husky --set paper --out campaigns/husky
   wade campaign plan --vehicle husky --set driving --cases 24 --out husky
   wade campaign plan --vehicle rover --set paper --table ranges.toml --out rover
-  wade campaign plan --vehicle husky --set drive --cases 10 --out campaigns/drive/husky
+  wade campaign plan --vehicle husky --set drive --cases 10 --out drive/husky
 
 A file of ranges (--table), here the source paper's of the Warthog:
 {TABLE}
