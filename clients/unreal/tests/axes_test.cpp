@@ -1,7 +1,7 @@
 // Unreal's frame and wade's: what a rotation, a force, a moment is called in each.
 
 #include "core/axes.h"
-#include "core/body.h"
+#include "core/water.h"
 #include "expect.h"
 
 using namespace wade;
@@ -82,4 +82,44 @@ TEST(a_rotation_vector_and_its_quaternion_agree) {
   EXPECT_VECTOR(rotate(turn(Vec3{0.0, 0.0, 1e-14}), p), p, 1e-12);
   const Vec3 turned = rotate(turn(Vec3{0.0, 0.0, 0.5}), Vec3{1.0, 0.0, 0.0});
   EXPECT_VECTOR(turned, (Vec3{std::cos(0.5), std::sin(0.5), 0.0}), 1e-15);
+}
+
+// A hull that Unreal has yawed, pitched and rolled over a sloping surface and a bed: each corner of it is there, by Unreal's
+// arithmetic, as far under the surface as in the question by wade's, and the lift at that corner comes back as the same force
+// upward and the same moment. A hull that is mirrored by one axis too few lists to the other side.
+TEST(a_hull_that_is_placed_in_unreal_lists_to_the_same_side_here) {
+  const Vec3 size{50.0, 30.0, 20.0}, place{120.0, -340.0, 35.0}, point{100.0, -300.0, 20.0};  // [cm]
+  const Vec3 slope{0.1, -0.2, 1.0};
+  const Vec3 normal = (1.0 / norm(slope)) * slope;
+  const double z0_cm = -20.0, bed_cm = -250.0;
+  for (const Vec3& tilt : {Vec3{0.4, 0.0, 0.0}, Vec3{0.0, 0.6, 0.0}, Vec3{0.3, -0.9, 2.0}, Vec3{1.4, 0.8, -0.5}}) {
+    const Quat unreal = turn(tilt);
+    Motion motion;
+    motion.position = axes::from_unreal(place);
+    motion.attitude = axes::rotation(unreal);
+    Water water;
+    water.point = axes::from_unreal(point);
+    water.normal = axes::mirrored(normal);
+    water.bed_height = axes::meters_per_unit * bed_cm;
+    const Immersion immersion = immerse(Body{}, motion, water, axes::meters_per_unit * z0_cm);
+    const wade_state state = question(Body{}, motion, water, immersion, {});
+    const Vec3 up{-state.gravity_direction[0], -state.gravity_direction[1], -state.gravity_direction[2]};
+
+    const Vec3 contact = place + rotate(unreal, Vec3{0.0, 0.0, z0_cm});
+    EXPECT_NEAR(state.bed_clearance_m, axes::meters_per_unit * (contact.z - bed_cm), 1e-6);
+    for (const double x : {-1.0, 1.0}) {
+      for (const double y : {-1.0, 1.0}) {
+        const Vec3 corner{x * size.x, y * size.y, -size.z};
+        const Vec3 arm = rotate(unreal, corner);
+        const double under = axes::meters_per_unit * dot(normal, point - (place + arm));
+        const Vec3 ours = axes::from_unreal(corner);
+        EXPECT_NEAR(static_cast<double>(state.water_level_m) - dot(up, ours), under, 1e-6);
+
+        const Vec3 lift = 7.0 * up;
+        const Vec3 force = axes::force_to_unreal(rotate(motion.attitude, lift));
+        EXPECT_VECTOR(force, 700.0 * normal, 1e-4);
+        EXPECT_VECTOR(axes::moment_to_unreal(rotate(motion.attitude, cross(ours, lift))), cross(arm, force), 1e-2);
+      }
+    }
+  }
 }

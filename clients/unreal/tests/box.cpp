@@ -1,6 +1,7 @@
 #include "box.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 using wade::Vec3;
@@ -31,19 +32,31 @@ wade::Body Box::body() const {
 wade_forces Box::answer(const wade_state& state) const {
   constexpr int grid = 8;
   const Vec3 up = -vector(state.gravity_direction);
-  const double level = (z0() + static_cast<double>(state.depth_m)) * up.z;
+  const bool has_level = (state.flags & WADE_HAS_WATER_LEVEL) != 0;
+  const double level = has_level ? static_cast<double>(state.water_level_m) : (z0() + static_cast<double>(state.depth_m)) * up.z;
   const double rho = static_cast<double>(state.density_kgpm3);
+  const std::array<double, 3> size{length, width, height}, n{up.x, up.y, up.z};
+  std::size_t along = 2;
+  for (const std::size_t axis : {1, 0}) {
+    if (std::fabs(n[axis]) > std::fabs(n[along])) along = axis;
+  }
+  const std::size_t first = (along + 1) % 3, second = (along + 2) % 3;
   Vec3 force, moment;
   double volume = 0.0;
   for (int i = 0; i < grid; ++i) {
     for (int j = 0; j < grid; ++j) {
-      const double x = length * ((i + 0.5) / grid - 0.5);
-      const double y = width * ((j + 0.5) / grid - 0.5);
-      const double top = std::clamp((level - up.x * x - up.y * y) / up.z, z0(), -z0());
-      const double wet = (top - z0()) * area() / (grid * grid);
+      std::array<double, 3> at{};
+      at[first] = size[first] * ((i + 0.5) / grid - 0.5);
+      at[second] = size[second] * ((j + 0.5) / grid - 0.5);
+      const double end = 0.5 * size[along];
+      const double cut =
+          std::clamp((level - n[first] * at[first] - n[second] * at[second]) / n[along], -end, end);
+      const double low = n[along] > 0.0 ? -end : cut, high = n[along] > 0.0 ? cut : end;
+      at[along] = 0.5 * (low + high);
+      const double wet = (high - low) * size[first] * size[second] / (grid * grid);
       const Vec3 lift = (rho * weight * wet) * up;
       force += lift;
-      moment += cross(Vec3{x, y, 0.5 * (top + z0())}, lift);
+      moment += cross(Vec3{at[0], at[1], at[2]}, lift);
       volume += wet;
     }
   }
@@ -55,6 +68,9 @@ wade_forces Box::answer(const wade_state& state) const {
   store(forces.force_n, force);
   store(forces.moment_nm, moment);
   forces.bundle_version = 7;
+  forces.flags = WADE_HAS_BASE;
+  forces.water_level_m = static_cast<float>(level);
+  forces.bed_clearance_m = state.bed_clearance_m;
   if (added_share > 0.0) {
     forces.flags |= WADE_HAS_ADDED_MASS;
     for (std::size_t i = 0; i < 3; ++i) forces.added_mass[7 * i] = static_cast<float>(added_share * rho * volume);
@@ -98,8 +114,8 @@ wade::Clock Planted::clock() {
 
 std::shared_ptr<const wade::RestTable> Planted::table() const {
   std::vector<wade_forces> answers;
-  for (const wade_state& state : wade::RestTable::questions()) answers.push_back(box_.answer(state));
-  return std::make_shared<const wade::RestTable>(answers, box_.body().center_of_mass);
+  for (const wade_state& state : wade::RestTable::questions(box_.hull())) answers.push_back(box_.answer(state));
+  return std::make_shared<const wade::RestTable>(answers, box_.hull());
 }
 
 Run::Run(const Box& of, double step_time, double depth) : box(of), frame(step_time), server(of) {
@@ -109,7 +125,8 @@ Run::Run(const Box& of, double step_time, double depth) : box(of), frame(step_ti
 void Run::step() {
   wade::Surroundings surroundings;
   surroundings.z0 = box.z0();
-  last = water.step(box.body(), motion, wade::Water{}, surroundings, frame);
+  surroundings.radius = box.radius();
+  last = water.step(box.body(), motion, surface, surroundings, frame);
   motion = engine_step(box.body(), motion, last.force, last.moment, frame);
 }
 

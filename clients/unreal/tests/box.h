@@ -1,8 +1,8 @@
 // A box whose loads in water are known in closed form, answering as the server does, and an engine to move it.
 //
-// Buoyancy is summed over a grid of columns, each cut at the water plane. Drag is quadratic and added mass diagonal, both in
-// proportion to the share under water. What a test learns from it is how a body moves that is asked for its loads through
-// `Hydrodynamics`; the server's own physics has its own tests.
+// Buoyancy in any attitude is summed over a grid of columns along the axis nearest to up, each cut at the water plane. Drag
+// is quadratic and added mass diagonal, both in proportion to the share under water. What a test learns from it is how a
+// body moves that is asked for its loads through `Hydrodynamics`; the server's own physics has its own tests.
 
 #pragma once
 
@@ -18,8 +18,10 @@ struct Box {
 
   double area() const { return length * width; }
   double z0() const { return -0.5 * height; }
+  double radius() const { return 0.5 * wade::norm(wade::Vec3{length, width, height}); }
+  wade::Hull hull() const { return {body().center_of_mass, z0(), radius()}; }
   wade::Body body() const;
-  // Part of the loads from acceleration left out, as WADE_IMPLICIT_ADDED_MASS asks.
+  // Part of the loads from acceleration left out, as WADE_IMPLICIT_ADDED_MASS asks. Bed clearance and level as stated.
   wade_forces answer(const wade_state& state) const;
 };
 
@@ -52,11 +54,12 @@ class Planted {
   std::uint64_t answers_ = 0;
 };
 
-// A run of the box in still water with its surface at z = 0, a frame at a time.
+// A run of the box in still water with its surface at z = 0, unless it is moved, a frame at a time.
 struct Run {
   Box box;
   double frame = 1.0 / 60.0;
   wade::Motion motion{};
+  wade::Water surface{};
   Planted server{box};
   wade::Hydrodynamics water{server.ask(), server.clock(), wade::Pacing{}};
   wade::StepLoad last{};

@@ -28,7 +28,7 @@ double frozen_exit_speed(const Box& box, double frame, double depth) {
   while (run.depth() > -0.01) {
     const Immersion immersion = immerse(box.body(), before, Water{}, box.z0());
     Vec3 force;
-    if (askable(immersion)) {
+    if (immersion.depth > 0.0) {
       const wade_forces forces = box.answer(question(box.body(), before, Water{}, immersion, {}));
       force = {forces.force_n[0], forces.force_n[1], forces.force_n[2]};
     }
@@ -206,6 +206,7 @@ TEST(a_held_drag_never_does_work) {
   Immersion immersion;
   immersion.up = {0.0, 0.0, 1.0};
   immersion.depth = 0.1;
+  immersion.height = -(box.z0() + 0.1);
   const Planted server(box);
   const auto table = server.table();
   held.renew({immersion, 1000.0, {{2.0, 0.0, 0.0}, {}}, {{forces.force_n[0], 0.0, forces.force_n[2]}, {}}, {}});
@@ -285,6 +286,122 @@ TEST(a_short_step_asks_about_the_state_of_the_engine) {
   run.motion.velocity = {0.8, -0.2, 0.4};
   run.step();
   EXPECT(run.last.asked == 1);
-  EXPECT_NEAR(run.server.last_question.depth_m, 0.17, 1e-6);
+  EXPECT_NEAR(run.server.last_question.water_level_m, 0.17 - 0.5 * run.box.height, 1e-6);
   EXPECT_NEAR(run.server.last_question.velocity_mps[0], 0.8, 1e-6);
+  EXPECT((run.server.last_question.flags & WADE_HAS_BED_CLEARANCE) == 0);
+}
+
+TEST(a_box_afloat_over_deep_water_is_asked_about_with_its_clearance) {
+  Run run(Box{}, 1.0 / 120.0, 0.1);
+  run.surface.bed_height = -3.0;
+  run.step();
+  EXPECT((run.server.last_question.flags & WADE_HAS_BED_CLEARANCE) != 0);
+  EXPECT_NEAR(run.server.last_question.bed_clearance_m, 2.9, 1e-6);
+  EXPECT_NEAR(run.water.forces().bed_clearance_m, 2.9, 1e-6);
+}
+
+TEST(a_share_of_the_bed_is_sent_where_it_is_stated) {
+  const Box box;
+  Planted server(box);
+  Hydrodynamics water(server.ask(), server.clock(), Pacing{});
+  Surroundings surroundings;
+  surroundings.z0 = box.z0();
+  water.step(box.body(), Motion{}, Water{}, surroundings, 1.0 / 120.0);
+  EXPECT((server.last_question.flags & WADE_HAS_BED) == 0);
+  surroundings.bed = 1.0;
+  water.step(box.body(), Motion{}, Water{}, surroundings, 1.0 / 120.0);
+  EXPECT((server.last_question.flags & WADE_HAS_BED) != 0);
+  EXPECT_NEAR(server.last_question.bed, 1.0, 0.0);
+}
+
+// Nose down by 60 degrees, its middle 0.3 m above the water, so that its depth is negative: the nose is in the water, and the
+// load is that of the server for the very level.
+TEST(a_tilted_box_with_its_middle_above_the_water_is_lifted_by_its_nose) {
+  Run run(Box{}, 1.0 / 120.0, 0.1);
+  run.motion.attitude = turn(Vec3{0.0, std::acos(0.5), 0.0});
+  run.motion.position.z = 0.3;
+  const wade_forces wanted = run.box.answer([&] {
+    wade_state state = wade_default_state();
+    state.flags = WADE_HAS_WATER_LEVEL;
+    state.water_level_m = -0.3F;
+    state.gravity_direction[0] = std::sqrt(0.75F);
+    state.gravity_direction[2] = -0.5F;
+    return state;
+  }());
+  run.step();
+  EXPECT(run.last.immersion.depth < 0.0 && run.last.asked == 1 && run.last.answered == 1);
+  EXPECT_NEAR(run.server.last_question.water_level_m, -0.3, 1e-6);
+  const Vec3 force{wanted.force_n[0], wanted.force_n[1], wanted.force_n[2]};
+  EXPECT(norm(force) > 50.0);
+  EXPECT_VECTOR(run.last.force, rotate(turn(Vec3{0.0, std::acos(0.5), 0.0}), force), 0.01);
+  // nose down: it is pushed up at the front, which is a negative pitch
+  EXPECT(run.last.moment.y < -10.0);
+  EXPECT(run.water.link() == LinkState::Serving);
+}
+
+// On its nose the box floats with its middle a quarter of a meter above the water. It goes on so when the server dies; when
+// there was no time for a table and it rises, it falls back.
+TEST(a_box_on_its_nose_stays_afloat_without_a_server) {
+  for (const bool has_table : {true, false}) {
+    Box box;
+    box.drag = 80.0;
+    Run run(box, 1.0 / 60.0, 0.1);
+    run.motion.attitude = turn(Vec3{0.0, std::acos(0.0), 0.0});
+    run.motion.position.z = 0.25;
+    if (has_table) run.water.set_rest_table(run.server.table());
+    for (int i = 0; i < 5; ++i) run.step();
+    EXPECT(run.last.answered > 0);
+    EXPECT_NEAR(run.last.force.z, box.mass * 9.81, 1.0);
+    run.server.mode = Planted::Mode::Gone;
+    if (!has_table) run.motion.velocity.z = 0.2;
+    for (int i = 0; i < 180; ++i) {
+      run.step();
+      run.motion.angular_velocity = {};
+      if (has_table) EXPECT_NEAR(run.motion.position.z, 0.25, 0.02);
+    }
+    EXPECT(run.motion.position.z < 0.27);
+    EXPECT(run.water.link() == LinkState::Lost);
+  }
+}
+
+// Led up on its nose, each answer a step late: the lift is that of where it is, though it does work.
+TEST(a_late_answer_lifts_a_box_that_rises_on_its_nose) {
+  const Box box;
+  const double frame = 1.0 / 120.0, rise = 0.4;
+  Run run(box, frame, 0.1);
+  run.server.mode = Planted::Mode::Late;
+  run.water.set_rest_table(run.server.table());
+  run.motion.attitude = turn(Vec3{0.0, std::acos(0.0), 0.0});
+  run.motion.position.z = 0.1;
+  run.motion.velocity.z = rise;
+  for (int i = 0; i < 20; ++i) {
+    const Motion led = drifted(run.motion, frame);
+    const double wet = 0.5 * box.length - run.motion.position.z;
+    run.step();
+    run.motion = led;
+    if (i > 0) EXPECT_NEAR(run.last.force.z, water_weight * box.width * box.height * wet, 20.0);
+  }
+}
+
+// Weights without the physical base know nothing of a hull on its nose.
+TEST(an_answer_without_the_physical_base_counts_for_upright_hulls_alone) {
+  const Box box;
+  wade_state last{};
+  Hydrodynamics water(
+      [&](const wade_state& state, std::uint64_t, wade_forces& forces) {
+        last = state;
+        forces = box.answer(state);
+        forces.flags = 0;
+        return WADE_STATUS_OK;
+      },
+      [] { return std::uint64_t{1}; }, Pacing{});
+  Surroundings surroundings;
+  surroundings.z0 = box.z0();
+  Motion motion;
+  motion.attitude = turn(Vec3{0.0, 1.5, 0.0});
+  EXPECT_NEAR(norm(water.step(box.body(), motion, Water{}, surroundings, 1.0 / 120.0).force), 0.0, 0.0);
+  EXPECT(water.link() == LinkState::Serving);
+  motion.attitude = {};
+  water.begin_anew();
+  EXPECT(water.step(box.body(), motion, Water{}, surroundings, 1.0 / 120.0).force.z > 1000.0);
 }

@@ -1,4 +1,4 @@
-// Depth, tilt and what the server is asked.
+// Level, depth, tilt, bed and what the server is asked.
 
 #include "core/water.h"
 #include "expect.h"
@@ -35,7 +35,6 @@ TEST(a_level_hull_is_as_deep_as_the_water_over_its_wheels) {
   const Immersion immersion = immerse(Body{}, motion, water, -0.18);
   EXPECT_NEAR(immersion.depth, 0.65 - (0.6 - 0.18), 1e-12);
   EXPECT_VECTOR(immersion.up, (Vec3{0.0, 0.0, 1.0}), 1e-15);
-  EXPECT(askable(immersion));
 }
 
 // The server cuts the hull's z axis at z0 + depth: that point, taken to the world, must lie on the surface.
@@ -91,12 +90,62 @@ TEST(the_question_is_about_the_hulls_origin) {
   EXPECT_NEAR(state.velocity_mps[1], -0.2, 1e-7);
 }
 
-TEST(a_hull_on_its_side_or_above_the_water_is_not_asked_about) {
+// A hull on a ramp, on its nose, on its side and on its back, its origin above the water and below: what of it is under water
+// in the world is under water in the question, up . x < level.
+TEST(the_question_has_the_water_level_in_any_attitude) {
+  for (const Vec3& tilt : {Vec3{}, Vec3{0.0, 0.5, 0.0}, Vec3{0.1, 1.55, 0.0}, Vec3{1.5, 0.0, 0.4}, Vec3{3.1, 0.0, 0.0}}) {
+    for (const double height : {0.3, 0.0, -0.4}) {
+      Case c;
+      c.motion.attitude = turn(tilt);
+      c.motion.position = c.water.point + height * c.water.normal + rotate(c.motion.attitude, c.body.center_of_mass);
+      const Immersion immersion = immerse(c.body, c.motion, c.water, c.z0);
+      const wade_state state = question(c.body, c.motion, c.water, immersion, {});
+      EXPECT((state.flags & WADE_HAS_WATER_LEVEL) != 0);
+      EXPECT_NEAR(state.water_level_m, -height, 1e-6);
+      const Vec3 bumper{0.43, 0.1, -0.1};
+      const Vec3 there = hull_origin(c.body, c.motion) + rotate(c.motion.attitude, bumper);
+      const Vec3 down{state.gravity_direction[0], state.gravity_direction[1], state.gravity_direction[2]};
+      EXPECT_NEAR(static_cast<double>(state.water_level_m) + dot(down, bumper), dot(c.water.normal, c.water.point - there), 1e-6);
+    }
+  }
+}
+
+// On its side a hull has no depth, whose rate would be a wild number.
+TEST(the_question_has_a_depth_rate_where_there_is_a_depth) {
+  Case c;
+  EXPECT((question(c.body, c.motion, c.water, immerse(c.body, c.motion, c.water, c.z0), {}).flags & WADE_HAS_DEPTH_RATE) != 0);
+  c.motion.attitude = turn(Vec3{1.7, 0.0, 0.0});
+  const Immersion side = immerse(c.body, c.motion, c.water, c.z0);
+  EXPECT(std::isfinite(side.depth) && std::isfinite(side.depth_rate));
+  EXPECT((question(c.body, c.motion, c.water, side, {}).flags & WADE_HAS_DEPTH_RATE) == 0);
+}
+
+// Straight down from where the ground-contact plane is at the origin, whatever the waves do.
+TEST(the_question_has_the_clearance_of_a_bed_that_is_known) {
+  Case c;
+  Immersion immersion = immerse(c.body, c.motion, c.water, c.z0);
+  EXPECT(!immersion.bed_clearance);
+  EXPECT((question(c.body, c.motion, c.water, immersion, {}).flags & WADE_HAS_BED_CLEARANCE) == 0);
+
+  c.water.bed_height = -3.0;
+  immersion = immerse(c.body, c.motion, c.water, c.z0);
+  const wade_state state = question(c.body, c.motion, c.water, immersion, {});
+  EXPECT((state.flags & WADE_HAS_BED_CLEARANCE) != 0);
+  const Vec3 contact = hull_origin(c.body, c.motion) + rotate(c.motion.attitude, Vec3{0.0, 0.0, c.z0});
+  EXPECT_NEAR(state.bed_clearance_m, contact.z + 3.0, 1e-6);
+
+  // wheels that sink into the bed are on it
+  c.water.bed_height = contact.z + 0.02;
+  EXPECT_NEAR(*immerse(c.body, c.motion, c.water, c.z0).bed_clearance, 0.0, 0.0);
+}
+
+// The server refuses what is beyond 1000 m.
+TEST(a_hull_in_a_trench_asks_what_the_server_takes) {
   Motion motion;
-  motion.attitude = turn(Vec3{1.5, 0.0, 0.0});
-  const Immersion side = immerse(Body{}, motion, Water{}, -0.2);
-  EXPECT(!askable(side) && std::isfinite(side.depth) && std::isfinite(side.depth_rate));
-  motion.attitude = {};
-  motion.position.z = 0.3;
-  EXPECT(!askable(immerse(Body{}, motion, Water{}, -0.2)));
+  motion.position.z = -4000.0;
+  Water water;
+  water.bed_height = -9000.0;
+  const wade_state state = question(Body{}, motion, water, immerse(Body{}, motion, water, -0.2), {});
+  EXPECT_NEAR(state.water_level_m, 1000.0, 0.0);
+  EXPECT_NEAR(state.bed_clearance_m, 1000.0, 0.0);
 }

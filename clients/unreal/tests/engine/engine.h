@@ -120,6 +120,13 @@ class TObjectPtr {
  public:
   T* operator->() const;
   operator T*() const;
+  T* Get() const;
+};
+template <typename T>
+class TEnumAsByte {
+ public:
+  TEnumAsByte(T value);
+  operator T() const;
 };
 enum class ESPMode { NotThreadSafe, ThreadSafe };
 template <typename T, ESPMode mode = ESPMode::ThreadSafe>
@@ -265,8 +272,19 @@ struct FBodyInstance {
   FPhysicsActorHandle& GetPhysicsActorHandle();
 };
 
+enum ECollisionChannel : int { ECC_WorldStatic, ECC_Visibility };
+class AActor;
+struct FCollisionQueryParams {
+  void AddIgnoredActor(const AActor* actor);
+};
+struct FHitResult {
+  FVector ImpactPoint;
+};
+
 class UWorld : public UObject {
  public:
+  bool LineTraceSingleByChannel(FHitResult& hit, const FVector& start, const FVector& end, ECollisionChannel channel,
+                                const FCollisionQueryParams& params) const;
   FPhysScene* GetPhysicsScene() const;
   float GetGravityZ() const;
 };

@@ -1,6 +1,8 @@
 #include "WadeHydrodynamicsComponent.h"
 
+#include "CollisionQueryParams.h"
 #include "Components/PrimitiveComponent.h"
+#include "Engine/HitResult.h"
 #include "Engine/World.h"
 #include "GameFramework/Actor.h"
 #include "PBDRigidsSolver.h"
@@ -13,9 +15,18 @@
 #include "WadeSettings.h"
 #include "WadeSimCallback.h"
 
+#include <limits>
+#include <optional>
+
 namespace
 {
 	constexpr uint64 VehicleTimeoutNs = 2000000000;
+
+	/** The property's to the core's: 0 is not known. */
+	double RadiusOf(double HullRadiusCm)
+	{
+		return HullRadiusCm > 0.0 ? wade::axes::meters_per_unit * HullRadiusCm : std::numeric_limits<double>::infinity();
+	}
 
 	EWadeLinkState Shown(wade::LinkState State)
 	{
@@ -137,6 +148,19 @@ bool UWadeHydrodynamicsComponent::SampleWaterAt(const FVector& Location, FWadeWa
 	}
 }
 
+double UWadeHydrodynamicsComponent::TraceBedAt(const FVector& Location) const
+{
+	FCollisionQueryParams Params;
+	Params.AddIgnoredActor(GetOwner());
+	if (WaterActor != nullptr)
+	{
+		Params.AddIgnoredActor(WaterActor.Get());
+	}
+	const FVector End = Location - FVector(0.0, 0.0, BedTraceLength);
+	FHitResult Hit;
+	return GetWorld()->LineTraceSingleByChannel(Hit, Location, End, BedTraceChannel, Params) ? Hit.ImpactPoint.Z : End.Z;
+}
+
 void UWadeHydrodynamicsComponent::TakeOutput()
 {
 	while (Chaos::TSimCallbackOutputHandle<FWadeSimOutput> Output = Callback->PopOutputData_External())
@@ -150,7 +174,11 @@ void UWadeHydrodynamicsComponent::TakeOutput()
 	SetLinkState(Shown(Latest->Link));
 	if (Latest->Link == wade::LinkState::Serving)
 	{
-		Link->RefreshTable(Latest->BundleVersion, Latest->CenterOfMass);
+		wade::Hull Hull;
+		Hull.center_of_mass = Latest->CenterOfMass;
+		Hull.z0 = wade::axes::meters_per_unit * GroundContactZ;
+		Hull.radius = RadiusOf(HullRadius);
+		Link->RefreshTable(Latest->BundleVersion, Hull);
 	}
 }
 
@@ -168,9 +196,11 @@ void UWadeHydrodynamicsComponent::GiveInput()
 	Scene.Table = Link->Table();
 	Scene.Beginnings = Beginnings;
 	Scene.Surroundings.z0 = wade::axes::meters_per_unit * GroundContactZ;
+	Scene.Surroundings.radius = RadiusOf(HullRadius);
 	Scene.Surroundings.gravity = WadeAxes::FromUnreal(FVector(0.0, 0.0, GetWorld()->GetGravityZ()));
 	Scene.Surroundings.dry_contact = bDryContact;
 	Scene.Surroundings.session = 1 + Beginnings;
+	Scene.Surroundings.bed = bBedShareStated ? std::optional<double>(BedShare) : std::nullopt;
 	if (bWheelSpeedsKnown)
 	{
 		Scene.Surroundings.wheel_speeds = {{WheelSpeeds[0], WheelSpeeds[1], WheelSpeeds[2], WheelSpeeds[3]}};
@@ -182,6 +212,12 @@ void UWadeHydrodynamicsComponent::GiveInput()
 	Scene.Water.normal = wade::axes::mirrored(WadeAxes::Plain(Sample.Normal.GetSafeNormal(UE_SMALL_NUMBER, FVector(0.0, 0.0, 1.0))));
 	Scene.Water.current = WadeAxes::FromUnreal(Sample.Velocity);
 	Scene.Water.density = Sample.Density;
+	if (Scene.bWater && bTraceBed && !Sample.bBedKnown)
+	{
+		Sample.bBedKnown = true;
+		Sample.BedHeight = TraceBedAt(Location);
+	}
+	Scene.Water.bed_height = Sample.bBedKnown ? std::optional<double>(wade::axes::meters_per_unit * Sample.BedHeight) : std::nullopt;
 }
 
 void UWadeHydrodynamicsComponent::SetLinkState(EWadeLinkState State)
@@ -233,6 +269,16 @@ double UWadeHydrodynamicsComponent::GetWaterDepth() const
 	return Latest.IsValid() ? Latest->DepthCm : 0.0;
 }
 
+double UWadeHydrodynamicsComponent::GetWaterLevel() const
+{
+	return Latest.IsValid() ? Latest->LevelCm : 0.0;
+}
+
+double UWadeHydrodynamicsComponent::GetBedClearance() const
+{
+	return Latest.IsValid() ? Latest->BedClearanceCm : 0.0;
+}
+
 double UWadeHydrodynamicsComponent::GetDepthOutsideDomain() const
 {
 	return Latest.IsValid() ? Latest->DepthOutsideCm : 0.0;
@@ -254,5 +300,7 @@ void UWadeHydrodynamicsComponent::ReadFromServer()
 	}
 	Modify();
 	GroundContactZ = Answer.z0_m / wade::axes::meters_per_unit;
+	// the frame's origin is the middle of the box around the hull
+	HullRadius = 0.5 * wade::norm({Answer.length_m, Answer.width_m, Answer.height_m}) / wade::axes::meters_per_unit;
 	UE_LOG(LogWade, Log, TEXT("%s: ground contact at %.2f cm; the vehicle file has a mass of %.1f kg, to be set on the body."), *Vehicle, GroundContactZ, Answer.mass_kg);
 }

@@ -25,7 +25,7 @@ namespace
 		return wade_client_open(&Options, &Client);
 	}
 
-	std::shared_ptr<const wade::RestTable> AskForTable(const FString& Address, const FString& Vehicle, const wade::Vec3& CenterOfMass)
+	std::shared_ptr<const wade::RestTable> AskForTable(const FString& Address, const FString& Vehicle, const wade::Hull& Hull)
 	{
 		wade_client* Client = nullptr;
 		wade_status Status = Open(Address, Vehicle, WADE_WAIT_BLOCK, TableBatch, Client);
@@ -33,7 +33,7 @@ namespace
 		{
 			return nullptr;
 		}
-		const std::vector<wade_state> Questions = wade::RestTable::questions();
+		const std::vector<wade_state> Questions = wade::RestTable::questions(Hull);
 		std::vector<wade_forces> Answers(Questions.size());
 		Status = wade_client_wait(Client, TableTimeoutNs);
 		for (size_t First = 0; First < Questions.size() && Status == WADE_STATUS_OK; First += TableBatch)
@@ -42,7 +42,7 @@ namespace
 			Status = wade_evaluate_batch(Client, &Questions[First], Count, TableTimeoutNs, &Answers[First], nullptr);
 		}
 		wade_client_close(Client);
-		return Status == WADE_STATUS_OK ? std::make_shared<const wade::RestTable>(Answers, CenterOfMass) : nullptr;
+		return Status == WADE_STATUS_OK ? std::make_shared<const wade::RestTable>(Answers, Hull) : nullptr;
 	}
 }
 
@@ -77,15 +77,15 @@ FString FWadeLink::Reason() const
 	return FString(UTF8_TO_TCHAR(Text));
 }
 
-void FWadeLink::RefreshTable(uint32 BundleVersion, const wade::Vec3& CenterOfMass)
+void FWadeLink::RefreshTable(uint32 BundleVersion, const wade::Hull& Hull)
 {
 	if (Asked.IsValid() || (Known && Known->bundle_version() == BundleVersion))
 	{
 		return;
 	}
-	Asked = Async(EAsyncExecution::ThreadPool, [Where = Address, Whom = Vehicle, CenterOfMass]
+	Asked = Async(EAsyncExecution::ThreadPool, [Where = Address, Whom = Vehicle, Hull]
 	{
-		return AskForTable(Where, Whom, CenterOfMass);
+		return AskForTable(Where, Whom, Hull);
 	});
 }
 

@@ -25,7 +25,7 @@ public:
 	FString Reason() const;
 
 	/** Asks, in the background, for the rest loads of the bundle that answers now, unless that is known or under way. Game thread. */
-	void RefreshTable(uint32 BundleVersion, const wade::Vec3& CenterOfMass);
+	void RefreshTable(uint32 BundleVersion, const wade::Hull& Hull);
 
 	/** The rest loads, or null. Game thread. */
 	std::shared_ptr<const wade::RestTable> Table();

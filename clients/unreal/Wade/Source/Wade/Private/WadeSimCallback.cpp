@@ -98,6 +98,8 @@ void FWadeSimCallback::ReportStep(const wade::Body& Body, const wade::Motion& Mo
 	Report.Place = ToUnreal(Motion.position);
 	Report.Force = Unreal(wade::axes::mirrored(Load.force));
 	Report.DepthCm = Load.immersion.depth / wade::axes::meters_per_unit;
+	Report.LevelCm = -Load.immersion.height / wade::axes::meters_per_unit;
+	Report.BedClearanceCm = Forces.bed_clearance_m / wade::axes::meters_per_unit;
 	Report.DepthOutsideCm = Load.asked > 0 ? Forces.outside[WADE_QUANTITY_DEPTH] / wade::axes::meters_per_unit : 0.0;
 	Report.bWater = Scene.bWater;
 	Report.WaterPoint = ToUnreal(Scene.Water.point);

@@ -32,6 +32,9 @@ struct FWadeReport
 	FVector Place = FVector::ZeroVector;
 	FVector Force = FVector::ZeroVector;
 	double DepthCm = 0.0;
+	double LevelCm = 0.0;
+	/** As the server used it; 0 where it has not answered. */
+	double BedClearanceCm = 0.0;
 	/** How far the depth lies outside the server's training domain: negative below, positive above. */
 	double DepthOutsideCm = 0.0;
 	bool bWater = false;

@@ -5,6 +5,7 @@
 #include "Components/ActorComponent.h"
 #include "Components/PrimitiveComponent.h"
 #include "CoreMinimal.h"
+#include "Engine/EngineTypes.h"
 #include "Templates/SharedPointer.h"
 #include "WadeWaterSurface.h"
 #include "WadeHydrodynamicsComponent.generated.h"
@@ -75,6 +76,11 @@ public:
 	UPROPERTY(EditAnywhere, BlueprintReadOnly, Category = "Wade")
 	double GroundContactZ = -18.45;
 
+	/** No point of the hull is further from its middle [cm]: higher above the water the server is not asked. 0 where it is not
+	 *  known: the server is asked at any height. "Read From Server" fills it in. */
+	UPROPERTY(EditAnywhere, BlueprintReadOnly, Category = "Wade", meta = (ClampMin = "0"))
+	double HullRadius = 0.0;
+
 	/** No water pressure under the tires' contact patches. */
 	UPROPERTY(EditAnywhere, BlueprintReadOnly, Category = "Wade")
 	bool bDryContact = false;
@@ -88,6 +94,26 @@ public:
 
 	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade|Water")
 	TObjectPtr<AActor> WaterActor;
+
+	/** Where the water's sample does not know the bed, a line trace straight down from the body finds it, once a frame. What
+	 *  blocks the trace channel is bed, but the vehicle's own actor and WaterActor. */
+	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade|Water")
+	bool bTraceBed = false;
+
+	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade|Water", meta = (EditCondition = "bTraceBed"))
+	TEnumAsByte<ECollisionChannel> BedTraceChannel = ECC_Visibility;
+
+	/** Length of the trace [cm]. A bed that is not hit is taken to lie at its end, where a vehicle hardly feels it. */
+	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade|Water", meta = (EditCondition = "bTraceBed", ClampMin = "0"))
+	double BedTraceLength = 2000.0;
+
+	/** Whether BedShare holds a share. Else the server computes it from the velocities of vehicle and water. */
+	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade|Water", meta = (InlineEditConditionToggle))
+	bool bBedShareStated = false;
+
+	/** Share of the motion through the water that is motion over the bed: 0 parked in a current, 1 driving in still water. */
+	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade|Water", meta = (EditCondition = "bBedShareStated", ClampMin = "0", ClampMax = "1"))
+	double BedShare = 0.5;
 
 	/** Draws the force on each surface, the net force and the water plane. */
 	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade|Debug")
@@ -120,16 +146,25 @@ public:
 	UFUNCTION(BlueprintPure, Category = "Wade")
 	FVector GetNetForce() const;
 
-	/** Water surface above the ground-contact plane [cm]; negative where the vehicle is dry. */
+	/** Water surface above the ground-contact plane at the middle of the hull [cm]; negative where it is below. Says nothing of a
+	 *  vehicle on its side or its back. */
 	UFUNCTION(BlueprintPure, Category = "Wade")
 	double GetWaterDepth() const;
+
+	/** Water surface above the middle of the hull, in any attitude [cm]; negative where it is below. */
+	UFUNCTION(BlueprintPure, Category = "Wade")
+	double GetWaterLevel() const;
+
+	/** Distance from the ground-contact plane to the bed that the server's last answer rests on [cm]; 0 before it. */
+	UFUNCTION(BlueprintPure, Category = "Wade")
+	double GetBedClearance() const;
 
 	/** How far the depth lies outside the server's training domain [cm]: negative below, positive above, 0 within. Forces there
 	 *  are a guess, which in deep water may be far too large. */
 	UFUNCTION(BlueprintPure, Category = "Wade")
 	double GetDepthOutsideDomain() const;
 
-	/** Fills in GroundContactZ from the running server, over gRPC. */
+	/** Fills in GroundContactZ and HullRadius from the running server, over gRPC. */
 	UFUNCTION(CallInEditor, Category = "Wade")
 	void ReadFromServer();
 
@@ -144,6 +179,7 @@ private:
 
 	UPrimitiveComponent* FindBody() const;
 	bool SampleWaterAt(const FVector& Location, FWadeWaterSample& Sample) const;
+	double TraceBedAt(const FVector& Location) const;
 	void TakeOutput();
 	void GiveInput();
 	void SetLinkState(EWadeLinkState State);

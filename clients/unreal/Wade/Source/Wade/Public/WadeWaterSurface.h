@@ -27,6 +27,15 @@ struct WADE_API FWadeWaterSample
 	/** [kg/m3] */
 	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade")
 	double Density = 1000.0;
+
+	/** Whether BedHeight holds a height. Where it does not, the component's trace finds it, if that is on; else the server takes
+	 *  the vehicle to stand on the bed until it floats. */
+	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade", meta = (InlineEditConditionToggle))
+	bool bBedKnown = false;
+
+	/** Height of the bed under the place, world z [cm]: the level less the depth of the water. */
+	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Wade", meta = (EditCondition = "bBedKnown"))
+	double BedHeight = 0.0;
 };
 
 UINTERFACE(BlueprintType, Blueprintable, MinimalAPI)
@@ -41,7 +50,7 @@ class WADE_API IWadeWaterSurface
 	GENERATED_BODY()
 
 public:
-	/** The water under or over a location; false where there is none. */
+	/** The water under or over a location; false where there is none. The bed's height may be left out. */
 	UFUNCTION(BlueprintNativeEvent, BlueprintCallable, Category = "Wade")
 	bool SampleWater(const FVector& Location, FWadeWaterSample& Sample) const;
 };

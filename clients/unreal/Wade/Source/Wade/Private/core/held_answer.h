@@ -36,12 +36,13 @@ class HeldAnswer {
   bool empty() const { return !asked_.has_value(); }
 
   // The load in another state, about the center of mass, hull axes. Without a table, which is known moments after the first
-  // answer, what the hull feels at rest is taken from the answer itself, along the normal and in proportion to the depth.
+  // answer, what the hull feels at rest is taken from the answer itself, along the normal: in proportion to the depth, or
+  // fading where the hull had none.
   Vec6 load(const Body& body, const Immersion& immersion, double density, const Vec6& twist,
             const RestTable* table) const;
 
-  // The water that the body carries, in proportion to the depth.
-  Mat6 added(const Immersion& immersion) const;
+  // The water that the body carries, in proportion to what the hull displaces; without a table, to the depth.
+  Mat6 added(const Immersion& immersion, const RestTable* table) const;
 
  private:
   std::optional<Asked> asked_;

@@ -81,15 +81,16 @@ Hydrodynamics::WaterLoad Hydrodynamics::water_load(Step& step, const Motion& mot
   const Immersion immersion = immerse(step.body, motion, step.water, step.surroundings.z0);
   held_.pass(time);
   unasked_time_ += time;
-  if (immersion.up.z >= least_up_z && immersion.depth < 0.0) return {};
-  if (askable(immersion) && answered(step, motion, immersion, out)) {
+  if (immersion.height > step.surroundings.radius) return {};
+  if (answered(step, motion, immersion, out)) {
     return {load_about(forces_, step.body.center_of_mass), added_mass(forces_, step.body.center_of_mass)};
   }
   const Vec6 twist = twist_through_water(motion, step.water);
-  return {held_.load(step.body, immersion, step.water.density, twist, table_.get()), held_.added(immersion)};
+  return {held_.load(step.body, immersion, step.water.density, twist, table_.get()),
+          held_.added(immersion, table_.get())};
 }
 
-// Whether the server has answered this very state in time.
+// Whether the server has answered this very state in time, and knows such states.
 bool Hydrodynamics::answered(Step& step, const Motion& motion, const Immersion& immersion, StepLoad& out) {
   // a server that was late once is not waited for again in this step
   if (step.silent) return false;
@@ -97,6 +98,10 @@ bool Hydrodynamics::answered(Step& step, const Motion& motion, const Immersion& 
   state.session = step.surroundings.session;
   state.time_step_s = static_cast<float>(unasked_time_);
   if (step.surroundings.dry_contact) state.flags |= WADE_DRY_CONTACT;
+  if (step.surroundings.bed) {
+    state.flags |= WADE_HAS_BED;
+    state.bed = static_cast<float>(std::clamp(*step.surroundings.bed, 0.0, 1.0));
+  }
   if (step.surroundings.wheel_speeds) {
     state.flags |= WADE_HAS_WHEEL_SPEEDS;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -112,8 +117,7 @@ bool Hydrodynamics::answered(Step& step, const Motion& motion, const Immersion& 
   unasked_time_ = 0.0;
   if (status == WADE_STATUS_OK) {
     ++out.answered;
-    take(step.body, asked);
-    return true;
+    return take(step.body, asked);
   }
   step.silent = true;
   take_late(step.body, clock_());
@@ -121,11 +125,15 @@ bool Hydrodynamics::answered(Step& step, const Motion& motion, const Immersion& 
   return false;
 }
 
-void Hydrodynamics::take(const Body& body, HeldAnswer::Asked asked) {
+// Whether the answer counts: weights without the physical base know upright hulls with water over the ground alone.
+bool Hydrodynamics::take(const Body& body, HeldAnswer::Asked asked) {
+  last_answer_ = forces_.answer;
+  const bool usual = upright(asked.immersion) && asked.immersion.depth >= 0.0;
+  if (!usual && (forces_.flags & WADE_HAS_BASE) == 0) return false;
   asked.load = load_about(forces_, body.center_of_mass);
   asked.added = added_mass(forces_, body.center_of_mass);
   held_.renew(asked);
-  last_answer_ = forces_.answer;
+  return true;
 }
 
 // An answer to a question of an earlier step: its age says which.

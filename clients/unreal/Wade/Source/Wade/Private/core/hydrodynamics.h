@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -42,12 +43,16 @@ struct Pacing {
 struct Surroundings {
   // z of the ground-contact plane in the hull frame [m].
   double z0 = 0.0;
+  // No point of the hull is further from its origin [m]: higher above the water nothing is asked.
+  double radius = std::numeric_limits<double>::infinity();
   // What pulls at the body before anything is known of the forces on it, world [m/s2].
   Vec3 gravity{0.0, 0.0, -9.81};
   // Front left, front right, rear left, rear right [rad/s].
   std::optional<std::array<double, 4>> wheel_speeds;
   // No water pressure under the contact patches.
   bool dry_contact = false;
+  // Share of the motion through the water that is motion over the bed, 0 parked to 1 driving; not given: from the velocities.
+  std::optional<double> bed;
   // Number of the run for effects that remember; 0 for none.
   std::uint64_t session = 0;
 };
@@ -105,7 +110,7 @@ class Hydrodynamics {
   Vec6 external(const Body& body, const Motion& motion, const Vec3& gravity) const;
   WaterLoad water_load(Step& step, const Motion& motion, double time, StepLoad& out);
   bool answered(Step& step, const Motion& motion, const Immersion& immersion, StepLoad& out);
-  void take(const Body& body, HeldAnswer::Asked asked);
+  bool take(const Body& body, HeldAnswer::Asked asked);
   void take_late(const Body& body, std::uint64_t now);
 
   Ask ask_;

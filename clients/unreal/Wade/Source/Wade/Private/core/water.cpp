@@ -5,6 +5,11 @@
 namespace wade {
 namespace {
 
+// The server refuses lengths and rates beyond this [m, m/s]. A hull so deep, or so far above the bed, feels no difference.
+constexpr float largest_asked = 1000.0F;
+
+float within_limit(double value) { return std::clamp(static_cast<float>(value), -largest_asked, largest_asked); }
+
 void put(float (&out)[3], const Vec3& v) {
   out[0] = static_cast<float>(v.x);
   out[1] = static_cast<float>(v.y);
@@ -18,13 +23,17 @@ Immersion immerse(const Body& body, const Motion& motion, const Water& water, do
   const Quat hull_from_world = inverse(motion.attitude);
   immersion.up = rotate(hull_from_world, water.normal);
   immersion.height = dot(water.normal, hull_origin(body, motion) - water.point);
-  // a hull on its side keeps finite numbers; `askable` says that they mean nothing
+  // a hull on its side keeps finite numbers; `upright` says that they mean nothing
   const double up_z = std::max(immersion.up.z, least_up_z);
   immersion.depth = -immersion.height / up_z - z0;
   const double rise = dot(water.normal, hull_velocity(body, motion));
   // d/dt (R^T n) = -omega x (R^T n), omega in hull axes
   const double up_z_rate = -cross(rotate(hull_from_world, motion.angular_velocity), immersion.up).z;
   immersion.depth_rate = -rise / up_z + immersion.height * up_z_rate / (up_z * up_z);
+  if (water.bed_height) {
+    const Vec3 contact = hull_origin(body, motion) + rotate(motion.attitude, Vec3{0.0, 0.0, z0});
+    immersion.bed_clearance = std::max(contact.z - *water.bed_height, 0.0);
+  }
   return immersion;
 }
 
@@ -32,9 +41,16 @@ wade_state question(const Body& body, const Motion& motion, const Water& water, 
                     const Accelerations& accelerations) {
   const Quat hull_from_world = inverse(motion.attitude);
   wade_state state = wade_default_state();
-  state.flags = WADE_IMPLICIT_ADDED_MASS | WADE_HAS_HEADING | WADE_HAS_DEPTH_RATE;
-  state.depth_m = static_cast<float>(immersion.depth);
-  state.depth_rate_mps = static_cast<float>(immersion.depth_rate);
+  state.flags = WADE_IMPLICIT_ADDED_MASS | WADE_HAS_HEADING | WADE_HAS_WATER_LEVEL;
+  state.water_level_m = within_limit(-immersion.height);
+  if (upright(immersion)) {
+    state.flags |= WADE_HAS_DEPTH_RATE;
+    state.depth_rate_mps = within_limit(immersion.depth_rate);
+  }
+  if (immersion.bed_clearance) {
+    state.flags |= WADE_HAS_BED_CLEARANCE;
+    state.bed_clearance_m = within_limit(*immersion.bed_clearance);
+  }
   state.density_kgpm3 = static_cast<float>(water.density);
   put(state.velocity_mps, rotate(hull_from_world, hull_velocity(body, motion)));
   put(state.current_mps, rotate(hull_from_world, water.current));
