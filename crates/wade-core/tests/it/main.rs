@@ -10,6 +10,7 @@ mod anchor;
 mod bodies;
 mod bundle;
 mod bundle_files;
+mod closed_forms;
 mod effects_bundle;
 mod effects_served;
 mod hydrostatics;
