@@ -15,6 +15,7 @@ mod effects_bundle;
 mod effects_served;
 mod hydrostatics;
 mod kernel;
+mod kvlcc2;
 mod mesh;
 mod model;
 mod physics;
