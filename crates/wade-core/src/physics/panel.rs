@@ -22,6 +22,10 @@ const IMAGES: i32 = 4;
 const DIFFRACTED: Vector6<f64> = Vector6::new(1.0, 1.0, 0.5, 0.5, 0.5, 1.0);
 /// Points a side of the grid that stands for a panel at close quarters.
 const CLOSE: usize = 4;
+/// Cosine between normals below which a panel at close quarters is across a plate or a gap [-].
+const ACROSS: f64 = -0.9;
+/// Factor by which the half axes of a panel may be stretched to a rectangle of its area [-].
+const MOST_STRETCHED: f64 = 10.0;
 /// Directions of waves over a full turn.
 const HEADINGS: usize = 24;
 
@@ -116,7 +120,7 @@ pub fn impulse(panels: &[Panel], basin: &Basin) -> Impulse {
     let mut potential = DMatrix::zeros(count, count);
     for (row, at) in panels.iter().enumerate() {
         for (column, from) in panels.iter().enumerate() {
-            let (phi, gradient) = from.potential(&at.center, basin);
+            let (phi, gradient) = from.potential(at, basin);
             potential[(row, column)] = phi;
             velocity[(row, column)] = gradient.dot(&at.normal) + if row == column { 0.5 } else { 0.0 };
         }
@@ -170,13 +174,15 @@ impl Panel {
         Vector6::new(self.normal.x, self.normal.y, self.normal.z, arm.x, arm.y, arm.z)
     }
 
-    /// Potential and velocity at a point of a source of strength one over this panel, images included.
-    fn potential(&self, at: &Vec3, basin: &Basin) -> (f64, Vec3) {
+    /// Potential and velocity at another panel of a source of strength one over this one, images included.
+    fn potential(&self, at: &Panel, basin: &Basin) -> (f64, Vec3) {
         let mut sum = (0.0, Vec3::zeros());
         let mut add = |shift: f64, flip: f64, sign: f64| {
-            // the point as the image's own panel sees it
-            let seen = Vec3::new(at.x, at.y, flip * (at.z - shift));
-            let (phi, gradient) = self.own_potential(&seen);
+            // the other as the image's own panel sees it
+            let seen = Vec3::new(at.center.x, at.center.y, flip * (at.center.z - shift));
+            // an image is across the surface or the bed, where the gap is water
+            let facing = if (shift, flip) == (0.0, 1.0) { at.normal.dot(&self.normal) } else { 0.0 };
+            let (phi, gradient) = self.own_potential(&(seen - self.center), facing);
             sum.0 += sign * phi;
             sum.1 += Vec3::new(gradient.x, gradient.y, flip * gradient.z) * sign;
         };
@@ -200,11 +206,21 @@ impl Panel {
         sum
     }
 
-    /// The same without images: of a point from afar, of a grid of points at close quarters.
-    fn own_potential(&self, at: &Vec3) -> (f64, Vec3) {
-        let arm = at - self.center;
+    /// The same without images, at an arm from the center: of a point from afar, of a grid of points at
+    /// close quarters. `facing` is the cosine between the normals.
+    fn own_potential(&self, arm: &Vec3, facing: f64) -> (f64, Vec3) {
         let near = 4.0 * (self.axes[0].norm_squared() + self.axes[1].norm_squared());
-        let cells = if arm.norm_squared() < near { CLOSE } else { 1 };
+        if arm.norm_squared() >= near {
+            self.potential_of_points(arm, 1)
+        } else if facing < ACROSS {
+            self.potential_across(arm)
+        } else {
+            self.potential_of_points(arm, CLOSE)
+        }
+    }
+
+    /// The same of so many points a side.
+    fn potential_of_points(&self, arm: &Vec3, cells: usize) -> (f64, Vec3) {
         let strength = self.area / (4.0 * PI * (cells * cells) as f64);
         // at the center of a disc of radius a the potential is that of a point at a/2
         let blunt = self.area / (4.0 * PI * (cells * cells) as f64);
@@ -218,6 +234,49 @@ impl Panel {
         }
         sum
     }
+
+    /// The same on the other side of a plate or of a gap, of the rectangle: points let the flow pass
+    /// between them. The potential starts from that of the points in the plane of the panel, so that what
+    /// they miss is the same on both sides.
+    fn potential_across(&self, arm: &Vec3) -> (f64, Vec3) {
+        let sizes = self.axes.map(|axis| axis.norm());
+        let scale = (self.area / (4.0 * sizes[0] * sizes[1])).sqrt();
+        // a sliver has no rectangle of its area
+        if scale.is_nan() || scale > MOST_STRETCHED {
+            return self.potential_of_points(arm, CLOSE);
+        }
+        let height = arm.dot(&self.normal);
+        let in_plane = arm - self.normal * height;
+        let sides = [0, 1].map(|i| (self.axes[i] / sizes[i], scale * sizes[i]));
+        let [(here, _), (there, velocity)] =
+            [0.0, height].map(|height| potential_of_rectangle(&in_plane, &self.normal, height, &sides));
+        (self.potential_of_points(&in_plane, CLOSE).0 + there - here, velocity)
+    }
+}
+
+/// Potential and velocity of a source of strength one over a rectangle, at an arm in its plane from its
+/// center and a height over it (Hess, Smith, Prog. Aeronaut. Sci. 8, 1967). Its half sides are
+/// directions and lengths.
+fn potential_of_rectangle(
+    in_plane: &Vec3,
+    normal: &Vec3,
+    height: f64,
+    sides: &[(Vec3, f64); 2],
+) -> (f64, Vec3) {
+    let [(e, half_e), (f, half_f)] = sides;
+    let (x, y) = (in_plane.dot(e), in_plane.dot(f));
+    let least = 1e-9 * half_e.min(*half_f);
+    let mut sum = (0.0, Vec3::zeros());
+    for (a, b) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+        let (p, q) = (x - a * half_e, y - b * half_f);
+        let r = (p * p + q * q + height * height).sqrt();
+        let (in_p, in_q) = ((r + p).max(least).ln(), (r + q).max(least).ln());
+        let angle = if height.abs() > least { (p * q / (height * r)).atan() } else { 0.0 };
+        let sign = -a * b / (4.0 * PI);
+        sum.0 += sign * (p * in_q + q * in_p - height * angle);
+        sum.1 += (e * in_q + f * in_p - normal * angle) * sign;
+    }
+    sum
 }
 
 /// A wave of amplitude 1 m over the basin.

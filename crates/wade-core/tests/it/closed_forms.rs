@@ -150,19 +150,16 @@ fn a_cylinder_over_the_bed_has_the_added_mass_of_its_images() {
 }
 
 /// DNV-RP-C205, table D-1 for rectangles and D-2 for the cube and the square plate of no thickness.
-/// The estimate loses the added mass of a long plate that is thinner than its elements are wide: to
-/// the points that stand for an element at close quarters the other side of the plate is open. The
-/// last row is outside the 30 % that the base aims at.
 #[test]
 fn blocks_and_plates_have_the_tabulated_added_mass() {
     let disc = PI / 4.0;
     let cube = added(block(1.0, 1.0, 1.0), DEEP, None);
     assert_near("cube, heave", cube[(2, 2)], 0.68, 0.15); // -8.4 %
     let plate = added(block(1.0, 1.0, 0.1), DEEP, None);
-    assert_near("square plate", plate[(2, 2)], 0.579 * disc, 0.1); // -2.1 %
-    // -5.6, -8.4, -19.6 and -30.6 %
+    assert_near("square plate", plate[(2, 2)], 0.579 * disc, 0.15); // +7.3 %
+    // -5.6, -8.4, -3.0, -5.8 and +16.3 %, the last of a plate of no thickness
     for (thickness, coefficient, allowed) in
-        [(1.0, 1.51, 0.15), (0.5, 1.36, 0.15), (0.2, 1.21, 0.3), (0.1, 1.14, 0.35)]
+        [(1.0, 1.51, 0.15), (0.5, 1.36, 0.15), (0.2, 1.21, 0.15), (0.1, 1.14, 0.15), (0.02, 1.0, 0.25)]
     {
         let found = added_per_length(|length| block(length, 1.0, thickness), DEEP, None);
         assert_near(&format!("plate {thickness} thick"), found[(2, 2)], coefficient * disc, allowed);
