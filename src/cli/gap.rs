@@ -71,7 +71,10 @@ Trials: a folder with one CSV file a trial, in SI units and body axes (forward,
 left, up), and trials.toml. Columns:
   t                        time, needed
   vx vy vz wx wy wz        velocity over ground, angular velocity, needed
-  depth                    water above the ground, needed
+  depth                    water above the ground, needed; or in its place
+  water_level              still water above the body origin along up
+  bed_clearance            bed below the ground-contact plane
+  bed                      0 parked in a current, 1 driving
   roll pitch yaw           attitude
   ax ay az alx aly alz     accelerations without gravity; else differentiated
   cx cy cz rho             known current, density
@@ -483,10 +486,84 @@ fn parameters(report: &Report) -> String {
 mod tests {
     use super::*;
 
+    use wade::states::Row;
+    use wade_core::served::{ServedVehicle, Session};
+    use wade_core::wrench::Wrench;
+    use wade_wire::{Evaluator, State};
+
     #[test]
     fn what_the_help_shows_can_be_read_and_is_what_holds_without_it() {
         let mut settings = toml::Table::try_from(Config::default()).expect("a table");
         assert!(settings.remove("library").is_some());
         assert_eq!(toml::from_str(SETTINGS), Ok(settings));
+    }
+
+    /// What `wade predict` answers to a table of states that are one run.
+    fn by_predict(served: &ServedVehicle, table: &str) -> Vec<Wrench> {
+        let mut reader = csv::Reader::from_reader(table.as_bytes());
+        let headers = reader.headers().expect("a header").clone();
+        let (mut evaluator, mut session) = (Evaluator::default(), Session::of_recording());
+        let mut before = None;
+        let mut answer = |record: csv::Result<csv::StringRecord>| {
+            let row = Row::read(&record.expect("a row"), &headers).expect("numbers");
+            let t = row.t.expect("a time");
+            let time_step = before.map_or(0.0, |before| t - before) as f32;
+            before = Some(t);
+            let state = State { time_step, ..row.state() }.check().expect("a state");
+            evaluator.evaluate(served, &state, Some(&mut session)).forces.wrench
+        };
+        reader.records().map(&mut answer).collect()
+    }
+
+    #[test]
+    fn the_model_is_asked_about_level_and_bed_as_predict_asks_it() {
+        // numbers that are the same in single precision, so that the answers must be the same bits
+        let table = |index: u32, level: bool, bed: &str| {
+            let mut text = format!(
+                "t,vx,vy,vz,wx,wy,wz,ax,ay,az,alx,aly,alz,{},fx",
+                if level { "water_level" } else { "depth" }
+            );
+            text += if bed.is_empty() { "\n" } else { ",bed_clearance,bed\n" };
+            for i in 0..64 {
+                let t = f64::from(i) / 64.0;
+                let vx = 0.5 + 0.125 * f64::from(index) + 0.25 * t;
+                let water = if level { 0.0625 } else { 0.25 };
+                text += &format!("{t},{vx},0,0,0,0,0,0.25,0,0,0,0,0,{water},{i}{bed}\n");
+            }
+            text
+        };
+        let library = Library::open(Some(Path::new("vehicles"))).expect("the vehicles");
+        let isa = Isa::available()[0];
+        let (model, served) =
+            (library.model("husky", isa).expect("sound"), library.served("husky", isa).expect("sound"));
+        let mut first = Vec::new();
+        for (level, bed) in [(false, ""), (true, ""), (true, ",0.25,0.5"), (true, ",0,0.5")] {
+            let folder = tempfile::tempdir().expect("a folder");
+            std::fs::write(
+                folder.path().join("trials.toml"),
+                "vehicle = \"husky\"\n[measured]\nmethod = \"cfd\"\n",
+            )
+            .expect("written");
+            let tables: Vec<String> = (0..4).map(|index| table(index, level, bed)).collect();
+            for (index, table) in tables.iter().enumerate() {
+                std::fs::write(folder.path().join(format!("run{index}.csv")), table).expect("written");
+            }
+            let trials = Trials::read(folder.path()).expect("sound");
+            let mut by_gap = Vec::new();
+            let mut predict = predictor(&model, Physics::Full);
+            let mut asked = |asked: &Asked<'_>| {
+                let answer = predict(asked);
+                by_gap.push(answer.wrench);
+                answer
+            };
+            // four short trials are too few for a verdict, not for a prediction
+            let _ =
+                wade_gap::run(&trials, &Body::of_vehicle(model.vehicle()), &mut asked, &Config::default());
+            let by_predict: Vec<Wrench> =
+                tables.iter().flat_map(|table| by_predict(&served, table)).collect();
+            assert_eq!(by_gap, by_predict, "level {level}, bed {bed}");
+            first.push(by_gap[0]);
+        }
+        assert!(first.windows(2).all(|pair| pair[0] != pair[1]), "each of them counts: {first:?}");
     }
 }

@@ -194,10 +194,10 @@ fn an_accelerating_hull_is_held_back_by_the_water_that_moves_with_it() {
             // forward, faster: held back, and with it about the center of mass
             if with.acceleration[i].x > 0.0 {
                 sped_up += 1;
-                assert!(force.x < still.x && with.condition(i, GroundContact::Wetted).velocity.x > 0.0);
+                assert!(force.x < still.x && with.condition(i, GroundContact::Wetted, 0.0).velocity.x > 0.0);
             }
             // without it, what the model says, with water under the tires as in every query
-            let condition = without.condition(i, GroundContact::Wetted);
+            let condition = without.condition(i, GroundContact::Wetted, 0.0);
             model.evaluate(&condition, &mut workspace, &mut forces);
             assert!((still - forces.wrench.force).norm() < 0.05, "{} {i}", with.name);
         }
@@ -213,7 +213,7 @@ fn a_driving_vehicle_moves_over_ground_and_its_wheels_roll() {
     let driving = trials.trials.iter().find(|trial| trial.name.contains("driving")).expect("a driving case");
     let parked = driving.name.replace("driving", "paper");
     let parked = trials.trials.iter().find(|trial| trial.name == parked).expect("its twin");
-    let through = |trial: &wade_learn::trials::Trial| trial.condition(0, GroundContact::Wetted).velocity;
+    let through = |trial: &wade_learn::trials::Trial| trial.condition(0, GroundContact::Wetted, 0.0).velocity;
     assert!((through(driving) - through(parked)).norm() < 1e-6, "the same state through the water");
     assert!(through(driving).x > 0.3);
     assert_eq!((driving.current[0], parked.velocity[0]), (Vec3::zeros(), Vec3::zeros()));

@@ -32,7 +32,10 @@ fn csv(trial: &Trial) -> String {
         ("pitch", trial.pitch.clone()),
         ("yaw", trial.yaw.clone()),
     ]);
-    columns.push(("depth", trial.depth.clone()));
+    let (name, values) = trial.still_water.column();
+    columns.push((name, values.clone()));
+    let bed = [("bed_clearance", &trial.bed_clearance), ("bed", &trial.bed)];
+    columns.extend(bed.into_iter().filter_map(|(name, values)| Some((name, values.clone()?))));
     if trial.acceleration_is_measured {
         columns.extend(vectors(["ax", "ay", "az"], &trial.acceleration));
         columns.extend(vectors(["alx", "aly", "alz"], &trial.angular_acceleration));

@@ -10,7 +10,9 @@ use super::{NoiseKind, Region, Schedule, Simulator, State, Track, Wrench6};
 use wade_core::frame::Vec3;
 use wade_learn::random::Random;
 use wade_learn::signal::{SavitzkyGolay, UniformGrid, interpolate, pieces};
-use wade_learn::trials::{Body, Gap, Manifest, Measured, Method, Trial, Trials, WRENCH, component_of};
+use wade_learn::trials::{
+    Body, Gap, Manifest, Measured, Method, StillWater, Trial, Trials, WRENCH, component_of,
+};
 
 /// How much better or worse than the stated load cell that of a case may be.
 const INSTRUMENTS: [f64; 2] = [0.1, 20.0];
@@ -329,7 +331,9 @@ impl Scene<'_> {
             roll: of(&|state| state.attitude[0]),
             pitch: of(&|state| state.attitude[1]),
             yaw: of(&|state| state.attitude[2]),
-            depth: of(&|state| state.depth),
+            still_water: StillWater::Depth(of(&|state| state.depth)),
+            bed_clearance: None,
+            bed: None,
             density: vec![DENSITY; kept.len()],
             wheel_speeds: std::array::from_fn(|wheel| Some(of(&|state| state.wheels[wheel]))),
             measured: std::array::from_fn(|c| {
@@ -411,7 +415,7 @@ pub fn predicted(trial: &Trial, sample: usize, simulator: &Simulator) -> Wrench6
         acceleration: trial.acceleration[sample],
         angular_acceleration: trial.angular_acceleration[sample],
         attitude: [trial.roll[sample], trial.pitch[sample], trial.yaw[sample]],
-        depth: trial.depth[sample],
+        depth: trial.depth(sample, simulator.hull.z0),
         ..State::default()
     };
     known + simulator.predict(&state)

@@ -325,7 +325,7 @@ fn hash(trials: &Trials) -> String {
         add(&trial.name, trial.len(), &mut std::iter::empty());
         let columns = [
             ("t", &trial.t),
-            ("depth", &trial.depth),
+            trial.still_water.column(),
             ("rho", &trial.density),
             ("roll", &trial.roll),
             ("pitch", &trial.pitch),
@@ -334,7 +334,9 @@ fn hash(trials: &Trials) -> String {
         let wheels = WHEELS.into_iter().zip(&trial.wheel_speeds);
         let wrenches =
             WRENCH.into_iter().zip(&trial.measured).chain(SIMULATED.into_iter().zip(&trial.simulated));
-        let optional = wheels.chain(wrenches).filter_map(|(name, column)| Some((name, column.as_ref()?)));
+        let bed = [("bed_clearance", &trial.bed_clearance), ("bed", &trial.bed)];
+        let optional =
+            wheels.chain(wrenches).chain(bed).filter_map(|(name, column)| Some((name, column.as_ref()?)));
         let stated = trial.other_forces.iter().chain(&trial.known_loads);
         let stated = stated.map(|(name, column)| (name.as_str(), column));
         for (name, column) in columns.into_iter().chain(optional).chain(stated) {

@@ -151,13 +151,15 @@ pub enum GapError {
     },
     /// Deeper than anything that wades.
     #[error(
-        "{trial}.csv, row {row}, column depth: {depth} m of water over the ground, where the hull is {height:.2} m high: is it in another unit?"
+        "{trial}.csv, row {row}, column {column}: {depth} m of water over the ground, where the hull is {height:.2} m high: is it in another unit?"
     )]
     Deep {
         /// Name of the trial.
         trial: String,
         /// Line of its file.
         row: u64,
+        /// The column that states it.
+        column: &'static str,
         /// The depth [m].
         depth: f64,
         /// Height of the hull [m].

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::measurement::{Measurement, Motion, is_computed, measurement, of_columns};
 use super::rates::{Coherence, mean_step, rates, smooth_rates, wetting_rate};
 use super::{Asked, Config, GapError, Predicted};
-use wade_core::condition::Condition;
+use wade_core::condition::{Condition, LEAST_UPRIGHT};
 use wade_core::effects::{Body, Immersion, Input};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::wrench::Wrench;
@@ -177,10 +177,13 @@ fn of_trial(
     }
     let count = trial.len();
     let mut conditions: Vec<Condition> =
-        (0..count).map(|sample| trial.condition(sample, config.ground_contact)).collect();
-    if let Some(sample) = (0..count).find(|&i| !simulated && conditions[i].depth > DEEPEST * body.height) {
+        (0..count).map(|sample| trial.condition(sample, config.ground_contact, body.z0)).collect();
+    // near its side a vehicle has no depth that could be too large
+    let deep = |c: &Condition| c.up.z >= LEAST_UPRIGHT && c.depth > DEEPEST * body.height;
+    if let Some(sample) = (0..count).find(|&i| !simulated && deep(&conditions[i])) {
         let (row, depth, height) = (trial.rows[sample], conditions[sample].depth, body.height);
-        return Err(GapError::Deep { trial: trial.name.clone(), row, depth, height });
+        let (column, _) = trial.still_water.column();
+        return Err(GapError::Deep { trial: trial.name.clone(), row, column, depth, height });
     }
     let immersion = |condition: &Condition| {
         let mut immersion = Immersion::default();
@@ -233,7 +236,8 @@ fn of_trial(
         }
         predicted.push(wrench);
     }
-    let wetting_rate = wetting_rate(&trial.t, &pieces, &trial.depth);
+    let depths: Vec<f64> = conditions.iter().map(|condition| condition.depth).collect();
+    let wetting_rate = wetting_rate(&trial.t, &pieces, &depths);
     coherence[6] = Coherence::of(&trial.t, &pieces, |i| wetting_rate[i]);
     let known = of_columns(&trial.known_loads, count);
     let seen: Vec<[f64; 6]> =

@@ -149,6 +149,7 @@ fn noise(trials: &Trials, predictions: &[Vec<Wrench6>]) -> Wrench6 {
 /// Every term of a trial, by sample.
 fn values(trial: &Trial, predicted: &[Wrench6], simulator: &Simulator, late: bool) -> Vec<Vec<Wrench6>> {
     let hull = simulator.hull;
+    let depth_at = |sample: usize| trial.depth(sample, hull.z0);
     let e = |c: usize, value: f64| {
         let mut wrench = Wrench6::zeros();
         wrench[c] = value;
@@ -159,7 +160,7 @@ fn values(trial: &Trial, predicted: &[Wrench6], simulator: &Simulator, late: boo
     let mut columns = vec![Vec::with_capacity(trial.len()); TERMS.len()];
     for i in 0..trial.len() {
         let (v, a) = (trial.velocity[i], trial.acceleration[i]);
-        let (r, depth) = (trial.angular_velocity[i].z, trial.depth[i].max(0.0));
+        let (r, depth) = (trial.angular_velocity[i].z, depth_at(i).max(0.0));
         let turning = trial.angular_acceleration[i].z;
         let before = i.saturating_sub(1);
         let dt = (trial.t[i] - trial.t[before]).max(1e-6);
@@ -179,7 +180,7 @@ fn values(trial: &Trial, predicted: &[Wrench6], simulator: &Simulator, late: boo
         let along = [1000.0 * 1.2 * hull.width, 1000.0 * 1.5 * hull.length].map(|k| k * depth);
         let speeds = [v.x.abs().max(0.1), v.y.abs().max(0.1)];
         let towards = |x: f64, y: f64| e(0, along[0] * speeds[0] * x) + e(1, along[1] * speeds[1] * y);
-        let entry = ((trial.depth[i] - trial.depth[before]) / dt).max(0.0) * wet;
+        let entry = ((depth_at(i) - depth_at(before)) / dt).max(0.0) * wet;
         let area = 1000.0 * GRAVITY * hull.waterplane(depth);
         let wheel = trial.wheel_speeds[0].as_ref().map_or(0.0, |speeds| speeds[i]) * hull.wheel[0] - v.x;
         let drive = trial.other_forces.get(DRIVE).map_or(0.0, |drive| drive[i]);

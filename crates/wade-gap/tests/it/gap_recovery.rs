@@ -9,7 +9,7 @@ use wade_core::frame::Vec3;
 use wade_core::wrench::Wrench;
 use wade_gap::{Asked, Config, GapError, Predicted, Report, Verdict};
 use wade_learn::random::Random;
-use wade_learn::trials::{Method, Trials};
+use wade_learn::trials::{Method, StillWater, Trials};
 
 const NOISE: [f64; 6] = [8.0, 8.0, 12.0, 4.0, 4.0, 4.0];
 const TRIALS: usize = 20;
@@ -1044,4 +1044,57 @@ fn bad_input_is_named() {
     let mut bodiless = good.clone();
     bodiless.manifest.body = None;
     assert!(matches!(wade_gap::body_of(&bodiless), Err(GapError::NoBody { .. })));
+}
+
+/// The same trials with the level of the water, and with depths that belong to it to the last bit.
+fn with_levels(trials: &Trials, z0: f64) -> [Trials; 2] {
+    let (mut by_depth, mut by_level) = (trials.clone(), trials.clone());
+    for (depths, levels) in by_depth.trials.iter_mut().zip(&mut by_level.trials) {
+        let level: Vec<f64> = (0..levels.len()).map(|i| levels.depth(i, z0) + z0).collect();
+        let depth: Vec<f64> = level.iter().map(|level| level - z0).collect();
+        let level: Vec<f64> = depth.iter().map(|depth| z0 + depth).collect();
+        assert!(level.iter().zip(&depth).all(|(level, depth)| level - z0 == *depth));
+        (depths.still_water, levels.still_water) = (StillWater::Depth(depth), StillWater::Level(level));
+    }
+    [by_depth, by_level]
+}
+
+#[test]
+fn trials_with_a_water_level_give_the_bits_of_those_with_the_depth() {
+    for simulated in [true, false] {
+        let (trials, _) = with(&["water_level_offset"], 3.0, 41);
+        let z0 = wade_gap::body_of(&trials).expect("a body").z0;
+        let [by_depth, by_level] = with_levels(&trials, z0).map(|trials| {
+            let mut report = if simulated { run(&trials) } else { run_with_doubts(trials) };
+            report.sources = Default::default();
+            report
+        });
+        // a model that doubts itself by six noises allows no name
+        let named: &[&str] = if simulated { &["water_level_offset"] } else { &[] };
+        assert_eq!(names(&by_level), named, "{}", by_level.summary);
+        assert_eq!(format!("{by_level:?}"), format!("{by_depth:?}"));
+    }
+}
+
+#[test]
+fn the_model_is_asked_about_the_level_and_the_bed_of_a_trial() {
+    let (mut trials, _) = with(&["added_mass"], 3.0, 42);
+    let z0 = wade_gap::body_of(&trials).expect("a body").z0;
+    for trial in &mut trials.trials {
+        trial.simulated = Default::default();
+        trial.roll = vec![0.3; trial.len()];
+        trial.still_water = StillWater::Level(vec![0.0625; trial.len()]);
+        (trial.bed_clearance, trial.bed) = (Some(vec![0.5; trial.len()]), Some(vec![0.25; trial.len()]));
+    }
+    let mut asked = 0;
+    let mut model = |about: &Asked<'_>| {
+        let state = about.condition;
+        assert_eq!((state.water_level, state.bed_clearance), (Some(0.0625), Some(0.5)));
+        assert_eq!((state.stated_bed, state.depth), (Some(0.25), 0.0625 / 0.3_f64.cos() - z0));
+        asked += 1;
+        Predicted::default()
+    };
+    let body = wade_gap::body_of(&trials).expect("a body");
+    let _ = wade_gap::run(&trials, &body, &mut model, &Config::default());
+    assert_eq!(asked, TRIALS * SAMPLES);
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use wade_core::frame::Vec3;
 use wade_learn::random::Random;
-use wade_learn::trials::{Body, Manifest, Measured, Method, Trial, Trials};
+use wade_learn::trials::{Body, Manifest, Measured, Method, StillWater, Trial, Trials};
 
 pub const LENGTH: f64 = 1.5;
 pub const WIDTH: f64 = 1.4;
@@ -215,7 +215,9 @@ fn trial(name: &str, motion: &[State], added: &[[f64; 6]], noise: &Noise, random
         roll: vec![0.0; count],
         pitch: vec![0.0; count],
         yaw: column(&|s| s.yaw),
-        depth: column(&|s| s.depth),
+        still_water: StillWater::Depth(column(&|s| s.depth)),
+        bed_clearance: None,
+        bed: None,
         acceleration: seen.iter().map(|s| s.a).collect(),
         angular_acceleration: seen.iter().map(|s| s.al).collect(),
         acceleration_is_measured: true,

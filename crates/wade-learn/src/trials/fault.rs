@@ -2,6 +2,7 @@
 
 use super::glitch::Glitch;
 use super::manifest::MANIFEST_FILE;
+use wade_core::condition::LEAST_UPRIGHT;
 
 /// What is wrong with a file of measured data. Rows are lines of the file, the header being row 1.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +37,44 @@ pub enum Fault {
         column: String,
         /// Those in the file.
         present: String,
+    },
+    /// Neither a depth nor a water level.
+    #[error("column depth is missing, or water_level in its place; there are: {present}")]
+    NoLevel {
+        /// Columns of the file.
+        present: String,
+    },
+    /// A depth and a water level.
+    #[error("columns depth and water_level are both there: give one of the two")]
+    TwoLevels,
+    /// A depth of a vehicle that lies on its side or its back.
+    #[error(
+        "row {row}, column depth: a depth means nothing for a vehicle on its side or its back (body z within {:.0} degrees of level or below): give water_level",
+        LEAST_UPRIGHT.asin().to_degrees()
+    )]
+    NoDepth {
+        /// The row.
+        row: u64,
+    },
+    /// A bed above the ground-contact plane.
+    #[error("row {row}, column {column}: {value} must not be negative: leave the column out for the default")]
+    Negative {
+        /// The row.
+        row: u64,
+        /// The column.
+        column: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// No share.
+    #[error("row {row}, column {column}: {value} must lie between 0 (parked) and 1 (driving)")]
+    NoShare {
+        /// The row.
+        row: u64,
+        /// The column.
+        column: &'static str,
+        /// The value.
+        value: f64,
     },
     /// Another vehicle than the folder's.
     #[error(

@@ -24,7 +24,7 @@ use wade_core::at::At;
 pub use glitch::Glitch;
 pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method, SimIs, component_of};
 pub use table::{Table, csv_text};
-pub use trial::{Gap, SIMULATED, Trial, WHEELS, WRENCH};
+pub use trial::{Gap, SIMULATED, StillWater, Trial, WHEELS, WRENCH};
 pub use write::{Columns, write};
 
 /// Why measured data was refused. The message names the file, and the row and column where there is one.

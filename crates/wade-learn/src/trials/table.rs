@@ -97,8 +97,12 @@ impl Table {
 
     /// The fault of having no such column.
     pub(super) fn missing(&self, column: &str) -> TrialError {
-        let present = self.columns.keys().chain(&self.unknown_columns).cloned().collect::<Vec<_>>();
-        At::path(&self.path)(Fault::MissingColumn { column: column.into(), present: present.join(", ") })
+        At::path(&self.path)(Fault::MissingColumn { column: column.into(), present: self.present() })
+    }
+
+    /// The columns of the file, for messages.
+    pub(super) fn present(&self) -> String {
+        self.columns.keys().chain(&self.unknown_columns).cloned().collect::<Vec<_>>().join(", ")
     }
 }
 

@@ -11,7 +11,7 @@ use super::units::{check_accelerometer, check_angles, check_limits};
 use super::{Fault, Remark, TrialError, stem};
 use crate::signal::{median_step, pieces};
 use wade_core::at::At;
-use wade_core::condition::{Condition, FRESH_WATER, GroundContact};
+use wade_core::condition::{Condition, FRESH_WATER, GroundContact, LEAST_UPRIGHT};
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 
 /// Components of a measured wrench.
@@ -21,10 +21,32 @@ pub const WHEELS: [&str; 4] = ["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"];
 
 /// Components of another simulator's wrench.
 pub const SIMULATED: [&str; 6] = ["sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
-/// Columns that every trial has.
-pub(super) const REQUIRED: [&str; 8] = ["t", "vx", "vy", "vz", "wx", "wy", "wz", "depth"];
-const OPTIONAL: [&str; 13] =
-    ["cx", "cy", "cz", "roll", "pitch", "yaw", "ax", "ay", "az", "alx", "aly", "alz", "rho"];
+/// Columns that every trial has, beside one of [`DEPTH`] and [`WATER_LEVEL`].
+pub(super) const REQUIRED: [&str; 7] = ["t", "vx", "vy", "vz", "wx", "wy", "wz"];
+/// The two columns of which one says where the still water stands.
+pub(super) const DEPTH: &str = "depth";
+pub(super) const WATER_LEVEL: &str = "water_level";
+pub(super) const BED_CLEARANCE: &str = "bed_clearance";
+pub(super) const BED: &str = "bed";
+const OPTIONAL: [&str; 17] = [
+    DEPTH,
+    WATER_LEVEL,
+    BED_CLEARANCE,
+    BED,
+    "cx",
+    "cy",
+    "cz",
+    "roll",
+    "pitch",
+    "yaw",
+    "ax",
+    "ay",
+    "az",
+    "alx",
+    "aly",
+    "alz",
+    "rho",
+];
 
 /// A median step above this is no second's fraction any more [s].
 const LONG_STEP: f64 = 1.0;
@@ -36,6 +58,25 @@ pub struct Gap {
     pub row: u64,
     /// Length [s].
     pub seconds: f64,
+}
+
+/// Where the still water stands, a value a sample, as one of two columns states it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StillWater {
+    /// Undisturbed water surface above the ground-contact plane at the body origin [m]; negative on dry ground.
+    Depth(Vec<f64>),
+    /// Signed height of the still-water plane above the body origin along up [m].
+    Level(Vec<f64>),
+}
+
+impl StillWater {
+    /// Name of the column, and its values.
+    pub fn column(&self) -> (&'static str, &Vec<f64>) {
+        match self {
+            Self::Depth(values) => (DEPTH, values),
+            Self::Level(values) => (WATER_LEVEL, values),
+        }
+    }
 }
 
 /// One trial, a value a sample; body frame, SI units.
@@ -59,8 +100,12 @@ pub struct Trial {
     pub pitch: Vec<f64>,
     /// Yaw [rad].
     pub yaw: Vec<f64>,
-    /// Undisturbed water surface above the ground-contact plane at the body origin [m]; negative on dry ground.
-    pub depth: Vec<f64>,
+    /// Depth or level of the water.
+    pub still_water: StillWater,
+    /// Distance of the bed below the ground-contact plane [m], where a column states it.
+    pub bed_clearance: Option<Vec<f64>>,
+    /// Share of the motion through the water that is motion over the bed [-], where a column states it.
+    pub bed: Option<Vec<f64>>,
     /// Acceleration without gravity [m/s2]: as measured, else the derivative of the velocity in an inertial frame,
     /// `dv/dt + omega x v`.
     pub acceleration: Vec<Vec3>,
@@ -102,6 +147,8 @@ impl Trial {
         // what contradicts another column is told more precisely than what lies beyond a limit
         check_angles(&table)?;
         check_limits(&table)?;
+        check_bed(&table)?;
+        check_upright(&table)?;
         let glitches = without_glitches(&mut table, manifest)?;
         let trial = Self { glitches, ..Self::from_table(&table, manifest) };
         match vectors(&table, ["ax", "ay", "az"]) {
@@ -136,7 +183,12 @@ impl Trial {
             roll: or_constant("roll", 0.0),
             pitch: or_constant("pitch", 0.0),
             yaw: or_constant("yaw", 0.0),
-            depth: table.column("depth").to_vec(),
+            still_water: match column(WATER_LEVEL) {
+                Some(level) => StillWater::Level(level),
+                None => StillWater::Depth(table.column(DEPTH).to_vec()),
+            },
+            bed_clearance: column(BED_CLEARANCE),
+            bed: column(BED),
             density: or_constant("rho", manifest.fluid_density.unwrap_or(FRESH_WATER)),
             wheel_speeds: WHEELS.map(column),
             measured: WRENCH.map(|name| column(name).filter(|_| manifest.measured.is_compared(name))),
@@ -166,10 +218,15 @@ impl Trial {
         up_from_roll_pitch(self.roll[sample], self.pitch[sample])
     }
 
-    /// The state at a sample.
-    pub fn condition(&self, sample: usize, ground_contact: GroundContact) -> Condition {
+    /// The state at a sample, with the depth that belongs to its water level above a ground-contact plane at `z0` [m].
+    pub fn condition(&self, sample: usize, ground_contact: GroundContact, z0: f64) -> Condition {
         let velocity = self.velocity[sample] - self.current[sample];
-        Condition {
+        let (depth, water_level) = match &self.still_water {
+            StillWater::Depth(depth) => (depth[sample], None),
+            StillWater::Level(level) => (0.0, Some(level[sample])),
+        };
+        let stated = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[sample]);
+        let state = Condition {
             ground_velocity: self.velocity[sample],
             angular_velocity: self.angular_velocity[sample],
             acceleration: self.acceleration[sample],
@@ -177,8 +234,17 @@ impl Trial {
             density: self.density[sample],
             up: self.up(sample),
             ground_contact,
-            ..Condition::level(velocity, self.depth[sample])
-        }
+            water_level,
+            bed_clearance: stated(&self.bed_clearance),
+            stated_bed: stated(&self.bed),
+            ..Condition::level(velocity, depth)
+        };
+        state.resolved(z0)
+    }
+
+    /// The depth at a sample above a ground-contact plane at `z0` [m].
+    pub fn depth(&self, sample: usize, z0: f64) -> f64 {
+        self.condition(sample, GroundContact::default(), z0).depth
     }
 
     pub(super) fn remarks(&self) -> Vec<Remark> {
@@ -212,9 +278,39 @@ fn check_presence(table: &Table, manifest: &Manifest) -> Result<(), TrialError> 
             return Err(table.missing(missing));
         }
     }
+    match (table.has(DEPTH), table.has(WATER_LEVEL)) {
+        (false, false) => return Err(At::path(&table.path)(Fault::NoLevel { present: table.present() })),
+        (true, true) => return Err(At::path(&table.path)(Fault::TwoLevels)),
+        _ => {}
+    }
     let promised = manifest.measured.columns.iter().flatten().chain(&manifest.measured.other_forces);
     match promised.into_iter().find(|name| !table.has(name)) {
         Some(missing) => Err(table.missing(missing)),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a bed above the ground-contact plane, and one that moves with more than the whole motion.
+fn check_bed(table: &Table) -> Result<(), TrialError> {
+    let outside = |column: &'static str, max: f64| {
+        let row = table.column(column).iter().position(|value| !(0.0..=max).contains(value))?;
+        Some((table.rows[row], column, table.column(column)[row]))
+    };
+    if let Some((row, column, value)) = outside(BED_CLEARANCE, f64::INFINITY) {
+        return Err(At::path(&table.path)(Fault::Negative { row, column, value }));
+    }
+    match outside(BED, 1.0) {
+        Some((row, column, value)) => Err(At::path(&table.path)(Fault::NoShare { row, column, value })),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a depth of a vehicle on its side or its back.
+fn check_upright(table: &Table) -> Result<(), TrialError> {
+    let angle = |name: &str, row: usize| table.column(name).get(row).copied().unwrap_or(0.0);
+    let lies = |row: &usize| up_from_roll_pitch(angle("roll", *row), angle("pitch", *row)).z < LEAST_UPRIGHT;
+    match (0..table.rows.len()).find(lies).filter(|_| table.has(DEPTH)) {
+        Some(row) => Err(At::path(&table.path)(Fault::NoDepth { row: table.rows[row] })),
         None => Ok(()),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::manifest::component_of;
 use super::table::Table;
-use super::trial::WRENCH;
+use super::trial::{DEPTH, WATER_LEVEL, WRENCH};
 use super::{Fault, TrialError};
 use wade_core::at::At;
 use wade_core::frame::{GRAVITY, Vec3};
@@ -11,13 +11,16 @@ use wade_core::frame::{GRAVITY, Vec3};
 const LIMITS: [(&[&str], f64, f64, &str); 8] = [
     (&["vx", "vy", "vz", "cx", "cy", "cz"], -50.0, 50.0, "m/s"),
     (&["wx", "wy", "wz"], -50.0, 50.0, "rad/s"),
-    (&["roll", "pitch"], -1.6, 1.6, "rad"),
-    (&["depth"], -100.0, 20.0, "m"),
+    (&["pitch"], -1.6, 1.6, "rad"),
+    (&[DEPTH, WATER_LEVEL], -100.0, 20.0, "m"),
     (&["ax", "ay", "az"], -500.0, 500.0, "m/s2"),
     (&["alx", "aly", "alz"], -5000.0, 5000.0, "rad/s2"),
     (&["rho"], 500.0, 3000.0, "kg/m3"),
     (&["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"], -1000.0, 1000.0, "rad/s"),
 ];
+
+/// Largest roll of a trial with a depth, and of one with a water level, in which a vehicle may lie on its back [rad].
+const ROLL: [f64; 2] = [1.6, 3.2];
 
 /// No force, and no moment, measured, predicted or known, is larger.
 const LOADS: [(f64, &str); 2] = [(1e7, "N"), (1e8, "N m")];
@@ -38,6 +41,8 @@ const FACTOR_TOLERANCE: f64 = 0.3;
 pub(super) fn check_limits(table: &Table) -> Result<(), TrialError> {
     let start = table.column("t").first().copied().unwrap_or_default();
     check_column(table, "t", (start, start + LONGEST, "s"))?;
+    let roll = ROLL[usize::from(table.has(WATER_LEVEL))];
+    check_column(table, "roll", (-roll, roll, "rad"))?;
     for (names, min, max, unit) in LIMITS {
         for &name in names {
             check_column(table, name, (min, max, unit))?;

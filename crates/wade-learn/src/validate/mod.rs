@@ -160,7 +160,7 @@ pub fn run(
         let (trials, asked) = (trials.manifest.vehicle.clone(), vehicle.name.clone());
         return Err(ValidateError::Vehicle { trials, asked });
     }
-    let (sections, left_out) = section::sections(trials, config, predict)?;
+    let (sections, left_out) = section::sections(trials, vehicle.z0, config, predict)?;
     let groups = section::by_depth(&sections, config.groups.depth_m);
     let least = config.thresholds.sections;
     if groups.iter().all(|group| group.sections.len() < least) {

@@ -66,13 +66,17 @@ pub(super) fn speed_squared(trial: &Trial, sample: usize) -> f64 {
     (v - up.into_inner() * up.dot(&v)).norm_squared()
 }
 
-/// The samples of a trial's planar section.
-pub fn planar_section(trial: &Trial, config: &PlanarConfig) -> Result<Range<usize>, NotPlanar> {
+/// The samples of the planar section of a trial with these depths [m].
+pub fn planar_section(
+    trial: &Trial,
+    depths: &[f64],
+    config: &PlanarConfig,
+) -> Result<Range<usize>, NotPlanar> {
     let moving: Vec<bool> = (0..trial.len())
-        .map(|i| trial.depth[i] > 0.0 && speed_squared(trial, i) > config.least_speed_mps.powi(2))
+        .map(|i| depths[i] > 0.0 && speed_squared(trial, i) > config.least_speed_mps.powi(2))
         .collect();
-    let depth = most_frequent_depth(trial, &moving, config).ok_or(NotPlanar::Dry)?;
-    let inside = |i: &usize| moving[*i] && (trial.depth[*i] - depth).abs() <= config.depth_tolerance_m;
+    let depth = most_frequent_depth(depths, &moving, config).ok_or(NotPlanar::Dry)?;
+    let inside = |i: &usize| moving[*i] && (depths[*i] - depth).abs() <= config.depth_tolerance_m;
     let run = longest_run(trial, inside);
     // few samples at the ends of the window may all be a rounding farther from their mean than the tolerance
     let duration_s = run.clone().last().map_or(0.0, |last| trial.t[last] - trial.t[run.start]);
@@ -88,9 +92,9 @@ pub fn planar_section(trial: &Trial, config: &PlanarConfig) -> Result<Range<usiz
 }
 
 /// The mean of the samples in the window of twice the tolerance that holds most of them.
-fn most_frequent_depth(trial: &Trial, moving: &[bool], config: &PlanarConfig) -> Option<f64> {
+fn most_frequent_depth(depths: &[f64], moving: &[bool], config: &PlanarConfig) -> Option<f64> {
     let mut depths: Vec<f64> =
-        trial.depth.iter().zip(moving).filter(|(_, moving)| **moving).map(|(depth, _)| *depth).collect();
+        depths.iter().zip(moving).filter(|(_, moving)| **moving).map(|(depth, _)| *depth).collect();
     depths.sort_by(f64::total_cmp);
     let window = 2.0 * config.depth_tolerance_m;
     let within = |start: usize| depths.partition_point(|depth| *depth <= depths[start] + window) - start;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::planar::{NotPlanar, planar_section, speed_squared};
 use super::{Config, ValidateError};
 use crate::trials::{Trial, Trials};
-use wade_core::condition::{Condition, GroundContact};
+use wade_core::condition::Condition;
 use wade_core::frame::Vec3;
 
 /// The answer of whatever is being tested.
@@ -67,18 +67,22 @@ pub struct LeftOut {
     pub why: String,
 }
 
-/// Predicts every sample of every planar section.
+/// Predicts every sample of every planar section of a vehicle whose ground-contact plane is at `z0` [m].
 pub fn sections(
     trials: &Trials,
+    z0: f64,
     config: &Config,
     predict: &mut dyn FnMut(&Condition) -> Prediction,
 ) -> Result<(Vec<Section>, Vec<LeftOut>), ValidateError> {
     let (mut found, mut left_out) = (Vec::new(), Vec::new());
     for trial in &trials.trials {
-        match planar_section(trial, &config.planar) {
+        let states: Vec<Condition> =
+            (0..trial.len()).map(|i| trial.condition(i, config.ground_contact, z0)).collect();
+        let depths: Vec<f64> = states.iter().map(|state| state.depth).collect();
+        match planar_section(trial, &depths, &config.planar) {
             Ok(samples) => {
                 let nominal = trials.manifest.nominal_depth.get(&trial.name).copied();
-                found.push(section(trial, samples, nominal, config.ground_contact, predict)?);
+                found.push(section(trial, &states, samples, nominal, predict)?);
             }
             Err(why) => left_out.push((trial.name.clone(), why)),
         }
@@ -98,14 +102,14 @@ fn no_section(trial: &str, why: &NotPlanar, trials: usize) -> ValidateError {
 
 fn section(
     trial: &Trial,
+    states: &[Condition],
     samples: std::ops::Range<usize>,
     nominal_depth: Option<f64>,
-    ground_contact: GroundContact,
     predict: &mut dyn FnMut(&Condition) -> Prediction,
 ) -> Result<Section, ValidateError> {
     let n = samples.len() as f64;
     let mean = |values: &[f64]| values[samples.clone()].iter().sum::<f64>() / n;
-    let measured_depth_m = mean(&trial.depth);
+    let measured_depth_m = states[samples.clone()].iter().map(|state| state.depth).sum::<f64>() / n;
     let mut sum = Section {
         trial: trial.name.clone(),
         start_s: trial.t[samples.start],
@@ -121,7 +125,7 @@ fn section(
         in_domain: 0.0,
     };
     for sample in samples.clone() {
-        let Prediction { force, in_domain } = predict(&levelled(&trial.condition(sample, ground_contact)));
+        let Prediction { force, in_domain } = predict(&levelled(&states[sample]));
         if !force.iter().all(|component| component.is_finite()) {
             return Err(ValidateError::NotFinite { trial: trial.name.clone(), row: trial.rows[sample] });
         }
@@ -146,6 +150,8 @@ fn levelled(condition: &Condition) -> Condition {
         velocity: level(&condition.velocity),
         ground_velocity: level(&condition.ground_velocity),
         up: Vec3::z_axis(),
+        // the level is that of the tilted vehicle; its depth stays
+        water_level: None,
         ..*condition
     }
 }

@@ -118,7 +118,7 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
     assert_eq!(read.trials[1].known_loads["hung_fz"], [20.0, 20.0]);
     assert_eq!(trial.wheel_speeds[0].as_deref(), Some(&[4.5, 4.6][..]));
     assert_eq!(trial.wheel_speeds[1], None);
-    let condition = trial.condition(1, GroundContact::Dry);
+    let condition = trial.condition(1, GroundContact::Dry, 0.0);
     assert_eq!((condition.velocity.x, condition.velocity.y, condition.depth), (1.6, 0.1, 0.21));
     assert_eq!((condition.density, condition.ground_contact), (1025.0, GroundContact::Dry));
     assert!((condition.up.x - 0.02_f64.sin()).abs() < 1e-12, "a negative pitch raises the nose");
@@ -442,4 +442,68 @@ fn a_sample_that_stands_alone_is_remarked_and_an_impact_is_not() {
     assert_eq!((trial.len(), trial.rows[4], trial.rows[5]), (199, 6, 8));
     // most of it the same: no noise to judge by
     assert_eq!(remarks(&|t| if t == 0.05 { 1e4 } else { 0.0 }), nothing);
+}
+
+/// The table with another column in the place of `depth`.
+fn with_level(level: &dyn Fn(f64) -> f64, more: &[(&str, &dyn Fn(f64) -> f64)]) -> String {
+    let more: Vec<(&str, &dyn Fn(f64) -> f64)> =
+        [("depth", level)].into_iter().chain(more.iter().copied()).collect();
+    table(&more, 200).replacen("depth", "water_level", 1)
+}
+
+#[test]
+fn a_water_level_stands_in_the_place_of_the_depth_in_every_attitude() {
+    const Z0: f64 = -0.25;
+    // from upright over the side onto the back
+    let roll = |t: f64| std::f64::consts::PI * t / 2.0;
+    let rate = |_: f64| std::f64::consts::PI / 2.0;
+    let text = with_level(
+        &|_| 0.0625,
+        &[("roll", &roll), ("wx", &rate), ("bed_clearance", &|t| t), ("bed", &|_| 0.5)],
+    );
+    let trial = read(MANIFEST, &[("run.csv", &text)]).expect("sound").trials.remove(0);
+    let state = |sample: usize| trial.condition(sample, GroundContact::Wetted, Z0);
+    assert_eq!((state(0).water_level, state(0).depth), (Some(0.0625), 0.0625 - Z0));
+    assert_eq!((state(100).bed_clearance, state(100).stated_bed), (Some(1.0), Some(0.5)));
+    for sample in [50, 199] {
+        let depth = 0.0625 / roll(0.01 * sample as f64).cos().max(0.1) - Z0;
+        assert!((trial.depth(sample, Z0) - depth).abs() < 1e-12, "{sample}");
+    }
+    let level = self::trial(&[]).condition(0, GroundContact::Wetted, Z0);
+    assert_eq!((level.water_level, level.bed_clearance, level.stated_bed), (None, None, None));
+}
+
+#[test]
+fn depth_and_level_are_given_once_and_the_bed_is_where_it_can_be() {
+    let message = |text: &str| {
+        let message = read(MANIFEST, &[("run.csv", text)]).expect_err("refused").to_string();
+        assert!(message.contains("run.csv"), "{message}");
+        message
+    };
+    let both = message(&table(&[("water_level", &|_| 0.0)], 20));
+    assert!(both.contains("columns depth and water_level are both there: give one of the two"), "{both}");
+    let none = message(&table(&[], 20).replacen("depth", "height", 1));
+    assert!(none.contains("column depth is missing, or water_level in its place; there are: "), "{none}");
+    let cell = |column: &str, value: f64| {
+        message(&table(&[(column, &move |t| if t == 0.05 { value } else { 0.0 })], 200))
+    };
+    for (column, value, expected) in [
+        ("bed_clearance", f64::NAN, "is no finite number"),
+        ("bed_clearance", f64::INFINITY, "is no finite number"),
+        ("bed_clearance", -0.1, "must not be negative"),
+        ("bed", f64::NAN, "is no finite number"),
+        ("bed", 1.5, "must lie between 0 (parked) and 1 (driving)"),
+        ("bed", -0.1, "must lie between 0 (parked) and 1 (driving)"),
+        ("roll", 1.55, "on its side or its back"),
+    ] {
+        let message = cell(column, value);
+        let column = if column == "roll" { "depth" } else { column };
+        let named = message.contains(&format!("row 7, column {column}: "));
+        assert!(named && message.contains(expected), "{message}");
+    }
+    let step = |t: f64| if t == 0.05 { f64::NAN } else { 0.0 };
+    let level = message(&with_level(&step, &[]));
+    assert!(level.contains("row 7, column water_level: \"NaN\" is no finite number"), "{level}");
+    let level = message(&with_level(&|t| if t == 0.05 { 203.0 } else { 0.0 }, &[]));
+    assert!(level.contains("row 7, column water_level: 203 lies outside"), "{level}");
 }

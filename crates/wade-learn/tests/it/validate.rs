@@ -8,7 +8,7 @@ use wade_core::frame::Vec3;
 use wade_core::vehicle::Vehicle;
 use wade_learn::recordings::{Kinematics, MocapConfig, Recording, Recordings, Rig, generated};
 use wade_learn::signal::FilterError;
-use wade_learn::trials::Trials;
+use wade_learn::trials::{StillWater, Trial, Trials};
 use wade_learn::validate::{self, Config, NotPlanar, PlanarConfig, Prediction, ValidateError};
 
 fn warthog() -> Vehicle {
@@ -281,6 +281,33 @@ fn trials_of(runs: &[(OfTime<'_>, OfTime<'_>, f64)]) -> Trials {
     Trials::read(folder.path()).expect("sound")
 }
 
+fn planar_section(trial: &Trial, config: &PlanarConfig) -> Result<std::ops::Range<usize>, NotPlanar> {
+    let depths: Vec<f64> = (0..trial.len()).map(|sample| trial.depth(sample, 0.0)).collect();
+    validate::planar_section(trial, &depths, config)
+}
+
+/// The same trials with the water level that belongs to each depth over a ground-contact plane at `z0` [m].
+fn with_levels(mut trials: Trials, z0: f64) -> Trials {
+    for trial in &mut trials.trials {
+        let level = |sample: usize| (trial.depth(sample, z0) + z0) * trial.up(sample).z;
+        trial.still_water = StillWater::Level((0..trial.len()).map(level).collect());
+    }
+    trials
+}
+
+#[test]
+fn trials_with_a_water_level_are_tested_as_those_with_the_depth() {
+    let (vehicle, trials) = generated_trials(5);
+    let run =
+        |trials: &Trials| validate::run(trials, &vehicle, &Config::default(), &mut obeys).expect("a verdict");
+    let (by_depth, by_level) = (run(&trials), run(&with_levels(trials.clone(), vehicle.z0)));
+    for (a, b) in by_depth.sections.iter().zip(&by_level.sections) {
+        assert_eq!((&a.trial, a.start_s, a.samples), (&b.trial, b.start_s, b.samples));
+        assert!((a.measured_depth_m - b.measured_depth_m).abs() < 1e-12 && (a.fz_n - b.fz_n).abs() < 1e-9);
+    }
+    assert_eq!(by_depth.sections.len(), by_level.sections.len());
+}
+
 #[test]
 fn the_planar_section_is_the_stay_at_one_depth() {
     // 2 s at rest on the dry, down a ramp, 1.5 s on flat ground, up again
@@ -293,7 +320,7 @@ fn the_planar_section_is_the_stay_at_one_depth() {
     let speed = |t: f64| if t < 2.0 { 0.0 } else { 2.0 };
     let trials = trials_of(&[(&speed, &depth, 5.5)]);
     let trial = &trials.trials[0];
-    let found = validate::planar_section(trial, &PlanarConfig::default()).expect("there is one");
+    let found = planar_section(trial, &PlanarConfig::default()).expect("there is one");
     // 0.02 s of each ramp lie within a centimeter
     assert!((trial.t[found.start] - 2.98).abs() < 0.011 && (trial.t[found.end - 1] - 4.52).abs() < 0.011);
 }
@@ -302,7 +329,7 @@ fn the_planar_section_is_the_stay_at_one_depth() {
 fn trials_without_a_planar_section_say_why() {
     let config = PlanarConfig::default();
     let why = |speed: OfTime<'_>, depth: OfTime<'_>, seconds: f64| {
-        validate::planar_section(&trials_of(&[(speed, depth, seconds)]).trials[0], &config)
+        planar_section(&trials_of(&[(speed, depth, seconds)]).trials[0], &config)
     };
     assert_eq!(why(&|_| 2.0, &|_| -0.1, 2.0), Err(NotPlanar::Dry));
     assert_eq!(why(&|_| 0.0, &|_| 0.2, 2.0), Err(NotPlanar::Dry), "at rest");
