@@ -53,7 +53,8 @@ const SETTINGS: &str = "  ground_contact = \"wetted\"    # or \"dry\": water und
 A folder of recordings holds recordings.toml and one CSV a recording: t, x y z,
 qw qx qy qz of the marker frame, z up. --generated writes one to OUT/recordings.
 A folder of trials holds trials.toml and one CSV a trial: t, vx vy vz, wx wy wz,
-roll pitch yaw, depth and more. Trials made from recordings go to OUT/trials.
+roll pitch yaw, depth or water_level, bed_clearance, bed and more. Trials made
+from recordings go to OUT/trials.
 
 Settings that a file (--config) leaves out are these:
 {SETTINGS}"))]
