@@ -183,6 +183,10 @@ fn the_metadata_are_those_of_the_answers() {
             metadata.outputs.iter().all(|t| t.shape[0] == -1)
                 && response.outputs.iter().all(|t| t.shape[0] == 2)
         );
+        let by_level =
+            ModelInferRequest { inputs: vec![tensor("water_level_m", 1, depth.to_vec())], ..request.clone() };
+        let by_level = inference.model_infer(by_level).await.expect("answered").into_inner();
+        assert!(by_level.outputs.iter().all(|t| t.shape[0] == 2));
         // outputs are those asked for, in the order asked for
         let asked = |name: &str| InferRequestedOutputTensor { name: name.into(), ..Default::default() };
         let some = ModelInferRequest {

@@ -230,7 +230,9 @@ impl InferenceHandlers {
     ) -> Result<(ModelInferResponse, Answered), Refusal> {
         let vehicle = self.model(&request.model_name, &request.model_version)?;
         let mut batch = inputs::batch(&request, self.handlers.max_batch)?;
-        let outputs = outputs::requested(&vehicle, &request.outputs, batch.depth_m.len() as i64)?;
+        // a state has one of the two
+        let rows = batch.depth_m.len().max(batch.water_level_m.len());
+        let outputs = outputs::requested(&vehicle, &request.outputs, rows as i64)?;
         batch.omit_surfaces = !outputs::need_surfaces(&outputs);
         let (mut answer, answered) = self.handlers.batch_of(call, vehicle, &batch).await?;
         let parameters = [
