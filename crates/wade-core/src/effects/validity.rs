@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::condition::Condition;
+use crate::condition::{Condition, LEAST_UPRIGHT};
 
 crate::named_enum! {
     /// A quantity of the box. The discriminants are the wire's.
@@ -99,12 +99,16 @@ impl Validity {
             if value > high { high.max(0.0) / value } else { 1.0 }
         };
         let speed = share(BoxQuantity::Speed);
+        let depth = condition.depth.min(self.depth_m[1]);
+        // the water level that belongs to the depth, as in `Condition::resolved`
+        let lowered = (condition.depth - depth) * condition.up.z.max(LEAST_UPRIGHT);
         Condition {
             velocity: condition.velocity * speed,
             ground_velocity: condition.ground_velocity * speed,
             angular_velocity: condition.angular_velocity * share(BoxQuantity::AngularSpeed),
             acceleration: condition.acceleration * share(BoxQuantity::Acceleration),
-            depth: condition.depth.min(self.depth_m[1]),
+            depth,
+            water_level: condition.water_level.map(|level| level - lowered),
             ..*condition
         }
     }
@@ -137,6 +141,12 @@ mod tests {
         assert_eq!(validity().outside(&fast)[..3], [0.3 - 0.2, 4.0, 1.5]);
         let slow = Condition::level(Vec3::new(0.1, 0.0, 0.0), 0.05);
         assert_eq!(validity().clamped(&slow), slow);
+        // by level as by depth, and a level within the box stays to the last bit
+        let (z0, up) = (-0.1, crate::frame::up_from_roll_pitch(0.2, -0.3));
+        let by_level = |level: f64| Condition { water_level: Some(level), up, ..fast }.resolved(z0);
+        let moved = validity().clamped(&by_level(0.2));
+        assert!((moved.water_plane(z0).offset - (z0 + 0.2) * up.z).abs() < 1e-12 && moved.depth == 0.2);
+        assert_eq!(validity().clamped(&by_level(0.01)).water_level, Some(0.01));
         assert_eq!(validity().outside(&slow)[..2], [0.05 - 0.1, 0.1 - 0.2]);
     }
 }
