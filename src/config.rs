@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use wade_core::physics::Physics;
 
 use crate::service::accounts::Limits;
 use crate::service::{grpc, health, http, shm};
@@ -15,6 +16,8 @@ pub struct Config {
     pub vehicles: PathBuf,
     /// CPUs that the server may use; empty: all.
     pub cpus: Vec<usize>,
+    /// How much of the physical base answers a query that does not state it.
+    pub physics: Physics,
     /// Longest time between SIGTERM and the end [s].
     pub drain_s: f64,
     /// Length of the window of `GetLatency` [s].
@@ -36,6 +39,7 @@ impl Default for Config {
         Self {
             vehicles: PathBuf::new(),
             cpus: Vec::new(),
+            physics: Physics::Full,
             drain_s: 5.0,
             latency_window_s: 10.0,
             grpc: grpc::Config::default(),

@@ -84,6 +84,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     let reloader = Arc::new(Reloader::new(
         config.named_vehicles().map(Path::to_owned),
         isa,
+        config.physics,
         Arc::clone(&engine),
         Arc::clone(&metrics),
     ));

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use common::{Numbers, Served, VEHICLES, comparable, served_vehicle};
 use wade_client::{InProcess, Reply};
+use wade_core::physics::Physics;
 use wade_wire::State;
 
 fn states(count: usize) -> Vec<State> {
@@ -62,6 +63,34 @@ fn a_batch_answers_the_bits_of_its_states_alone() {
             let replies = client.evaluate_batch(&states).expect("answered");
             let replies: Vec<Reply> = replies.into_iter().map(comparable).collect();
             assert_eq!(replies, expected, "{vehicle} over {name}");
+        }
+    }
+}
+
+#[test]
+fn the_physics_of_the_server_answers_what_states_none_over_every_transport() {
+    for setting in Physics::ALL {
+        let served = Served::with(|config| config.physics = setting);
+        // at the weights' own steady states nothing of the base is left to differ
+        let moving = State { acceleration: [1.0, 0.0, 0.0], ..State::still(0.2) };
+        let states = [moving, State { velocity: [0.5, 0.5, 0.1], gravity: [0.6, 0.0, -0.8], ..moving }];
+        let mut library = InProcess::new(Arc::new(served_vehicle("husky")));
+        let mut expected = |physics: Physics| -> Vec<Reply> {
+            let stated = states.map(|state| State { physics: Some(physics), ..state });
+            stated.iter().map(|state| comparable(library.evaluate(state).expect("valid"))).collect()
+        };
+        let [unstated, full] = [setting, Physics::Full].map(&mut expected);
+        assert_eq!(unstated == full, setting == Physics::Full, "the states show the setting");
+        for (name, mut client) in served.clients("husky") {
+            for (physics, expected) in [(None, &unstated), (Some(Physics::Full), &full)] {
+                let states = states.map(|state| State { physics, ..state });
+                let single = |state: &State| comparable(client.evaluate(state).expect("answered"));
+                let replies: Vec<Reply> = states.iter().map(single).collect();
+                assert_eq!(&replies, expected, "{setting:?} over {name}, {physics:?}");
+                let replies = client.evaluate_batch(&states).expect("answered");
+                let replies: Vec<Reply> = replies.into_iter().map(comparable).collect();
+                assert_eq!(&replies, expected, "{setting:?} over {name} in a batch, {physics:?}");
+            }
         }
     }
 }

@@ -42,7 +42,7 @@ pub fn starting(config: &Config, file: Option<&Path>) {
     }
     // what cannot be opened is an error in a moment
     if let Ok(library) = Library::open(config.named_vehicles()) {
-        tracing::info!(from = library.origin(), "vehicles");
+        tracing::info!(from = library.origin(), physics = config.physics.name(), "vehicles");
     }
 }
 

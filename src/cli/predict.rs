@@ -78,7 +78,7 @@ impl Predict {
             let row = Row::read(&record, &headers).with_context(at)?;
             let time_step = time_step(row.t, before, session.is_some()).with_context(at)?;
             before = row.t;
-            let state = State { time_step, physics: self.physics.into(), ..row.state() };
+            let state = State { time_step, physics: Some(self.physics.into()), ..row.state() };
             let state = state.check().with_context(at)?;
             let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut());
             far.count(&evaluated.forces.outside);

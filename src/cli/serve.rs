@@ -13,9 +13,11 @@ use wade::config::Config;
 use wade::cores;
 use wade::server::{self, Running};
 use wade::service::admin::Reload;
+use wade_core::physics::Physics;
 use wade_wire::shm::Wait;
 
 use super::log;
+use super::state::Terms;
 
 /// Serve vehicles over gRPC, a Unix socket and shared memory
 ///
@@ -48,6 +50,9 @@ pub struct Serve {
     /// Shared memory: how the server waits for requests
     #[arg(long, value_enum)]
     shm: Option<Shm>,
+    /// How much of the physical base answers a query that does not state it
+    #[arg(long, value_enum, env = "WADE_PHYSICS")]
+    physics: Option<Terms>,
     /// CPUs that the server may use, such as 0 or 0,1
     #[arg(long, value_delimiter = ',')]
     cpus: Option<Vec<usize>>,
@@ -100,6 +105,7 @@ impl Serve {
         set(&mut config.grpc.listen, self.listen);
         set(&mut config.grpc.unix_socket, self.unix_socket);
         set(&mut config.http.listen, self.http);
+        set(&mut config.physics, self.physics.map(Physics::from));
         set(&mut config.cpus, self.cpus);
         set(&mut config.log.filter, self.log);
         set(&mut config.shm.namespace, self.namespace);

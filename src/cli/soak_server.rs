@@ -83,7 +83,7 @@ impl Server {
         // Ctrl-C is for the soak, which ends its server once it has written its report
         command.process_group(0);
         // what the caller's environment says is for the caller's server
-        command.env_remove("WADE_VEHICLES").env_remove("WADE_LOG");
+        command.env_remove("WADE_VEHICLES").env_remove("WADE_LOG").env_remove("WADE_PHYSICS");
         let child = command.spawn().context("starting the server")?;
         Ok(Self { child, address, _folder: folder })
     }

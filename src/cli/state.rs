@@ -31,9 +31,9 @@ pub struct StateArgs {
     /// Share of the motion through the water that is motion over the bed: 0 or parked, 1 or driving [default: from the velocities]
     #[arg(long, value_name = "B", value_parser = bed)]
     bed: Option<f32>,
-    /// How much of the physical base answers
-    #[arg(long, value_enum, default_value_t = Terms::Full)]
-    physics: Terms,
+    /// How much of the physical base answers [default: as the server is set; in process full]
+    #[arg(long, value_enum)]
+    physics: Option<Terms>,
     /// Density of the fluid [kg/m3]
     #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
     density: f32,
@@ -138,7 +138,7 @@ impl StateArgs {
             wheel_speeds: self.wheel_speeds,
             time_step: 0.0,
             implicit_added_mass: self.implicit_added_mass,
-            physics: self.physics.into(),
+            physics: self.physics.map(Physics::from),
         }
     }
 }

@@ -78,6 +78,7 @@ impl Worker {
         let reloader = Reloader::new(
             config.named_vehicles().map(Path::to_owned),
             isa,
+            config.physics,
             Arc::clone(&engine),
             Arc::clone(&metrics),
         );

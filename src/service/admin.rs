@@ -11,6 +11,7 @@ use crate::engine::Engine;
 use crate::metrics::Metrics;
 use wade_core::bundle::{self, BundleError, Fault, Library, LibraryError};
 use wade_core::model::kernel::Isa;
+use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
 use wade_wire::UnknownVehicle;
 
@@ -46,6 +47,8 @@ pub struct Reloader {
     /// The folder that was named.
     named: Option<PathBuf>,
     isa: Isa,
+    /// How much of the physical base answers where a query does not state it.
+    physics: Physics,
     engine: Arc<Engine>,
     metrics: Arc<Metrics>,
     /// Two reloads at once could put the older bundle last.
@@ -65,9 +68,19 @@ impl std::fmt::Debug for Reloader {
 
 impl Reloader {
     /// Reads bundles into this engine: of the folder that is named, or of the first that exists of the usual ones.
-    pub fn new(named: Option<PathBuf>, isa: Isa, engine: Arc<Engine>, metrics: Arc<Metrics>) -> Self {
+    pub fn new(
+        named: Option<PathBuf>,
+        isa: Isa,
+        physics: Physics,
+        engine: Arc<Engine>,
+        metrics: Arc<Metrics>,
+    ) -> Self {
         let (one_at_a_time, follower) = (Mutex::new(()), OnceLock::new());
-        Self { named, isa, engine, metrics, one_at_a_time, follower }
+        Self { named, isa, physics, engine, metrics, one_at_a_time, follower }
+    }
+
+    fn read(&self, library: &Library, vehicle: &str) -> Result<ServedVehicle, LibraryError> {
+        Ok(library.served(vehicle, self.isa)?.with_physics(self.physics))
     }
 
     /// Reads every bundle of the folder; one that is not sound stops the start, one without weights is left out.
@@ -75,7 +88,7 @@ impl Reloader {
         let library = Library::open(self.named.as_deref())?;
         let mut vehicles = Vec::new();
         for name in library.names()? {
-            match library.served(&name, self.isa) {
+            match self.read(&library, &name) {
                 Ok(vehicle) => vehicles.push(vehicle),
                 Err(LibraryError::Bundle(BundleError { fault: Fault::NoWeights, .. })) => {
                     tracing::warn!(
@@ -158,7 +171,7 @@ impl Reloader {
     fn reload_one(&self, vehicle: String) -> Reload {
         // a folder may have been made since
         let library = Library::open(self.named.as_deref());
-        let loaded = library.and_then(|library| library.served(&vehicle, self.isa));
+        let loaded = library.and_then(|library| self.read(&library, &vehicle));
         self.metrics.count_reload(loaded.is_ok());
         match loaded {
             Ok(served) => {

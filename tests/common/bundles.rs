@@ -275,7 +275,7 @@ impl Drawn {
             wheel_speeds: Some(self.wheel_speeds.map(f64::from)),
             time_step: self.time_step.into(),
             implicit_added_mass: false,
-            physics: Physics::Full,
+            physics: None,
         }
     }
 }

@@ -37,6 +37,19 @@ fn a_value_out_of_range_is_named() {
 }
 
 #[test]
+fn a_physics_that_is_none_is_refused_with_file_key_and_what_there_is() {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let path = folder.path().join("wade.toml");
+    std::fs::write(&path, "physics = \"fast\"\n").expect("written");
+    let message = Config::read(&path).expect_err("refused").to_string();
+    for part in ["wade.toml", "physics = \"fast\"", "`hydrostatic`", "`quasi_steady`", "`full`"] {
+        assert!(message.contains(part), "{message}");
+    }
+    std::fs::write(&path, "physics = \"quasi_steady\"\n").expect("written");
+    assert_eq!(Config::read(&path).expect("sound").physics, wade_core::physics::Physics::QuasiSteady);
+}
+
+#[test]
 fn an_address_that_is_none_is_refused_and_never_binds_another() {
     let mut config = Config::default();
     config.grpc.listen = "localhost".into();

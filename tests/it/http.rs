@@ -13,6 +13,7 @@ use crate::common::{Numbers, PATIENCE, Served, VEHICLES};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use wade_client::{Client, GrpcClient, Method};
+use wade_core::physics::Physics;
 use wade_wire::State;
 
 fn address(served: &Served) -> SocketAddr {
@@ -171,6 +172,18 @@ fn a_query_as_json_has_the_bits_of_grpc_with_every_effect() {
             );
         }
     }
+}
+
+#[test]
+fn the_physics_of_a_query_as_json_wins_over_that_of_the_server() {
+    let served = Served::with(|config| config.physics = Physics::Hydrostatic);
+    let force = |physics: Option<&str>| {
+        let state = json!({"depth_m": 0.2, "acceleration_mps2": {"x": 1.0}, "physics": physics});
+        let query = json!({"vehicle": "husky", "state": state}).to_string();
+        vector_bits(&post(address(&served), "/v1/query", &query).json()["wrench"]["force_n"])
+    };
+    assert_eq!(force(None), force(Some("PHYSICS_HYDROSTATIC")));
+    assert_ne!(force(None), force(Some("PHYSICS_FULL")));
 }
 
 #[test]

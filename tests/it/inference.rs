@@ -8,6 +8,7 @@ use tonic::transport::Channel;
 use tonic::{Code, Status};
 use tonic_types::StatusExt;
 use wade_client::{Client, ClientError, Method, Reply};
+use wade_core::physics::Physics;
 use wade_wire::State;
 use wade_wire::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
 use wade_wire::proto::inference::infer_parameter::ParameterChoice;
@@ -153,6 +154,25 @@ fn the_tensors_have_the_bits_of_single_queries_in_both_forms_with_every_effect()
             assert_eq!(found[&tensor.name].len() as i64, count, "{}", tensor.name);
         }
     }
+}
+
+#[test]
+fn the_physics_of_the_server_answers_tensors() {
+    let served = Served::with(|config| config.physics = Physics::Hydrostatic);
+    let state = State { acceleration: [1.0, 0.0, 0.0], heading: Some(0.0), ..State::still(0.2) };
+    let state = State { depth_rate: Some(0.0), wheel_speeds: Some([0.0; 4]), ..state };
+    let mut client = Client::Grpc(Box::new(served.tcp("husky", Method::Unary)));
+    let mut force = |physics: Physics| {
+        let reply = client.evaluate(&State { physics: Some(physics), ..state }).expect("answered");
+        reply.force.map(f32::to_bits).to_vec()
+    };
+    let response = runtime().block_on(async {
+        let request = request("husky", &[state]);
+        connect(&served).await.model_infer(request).await.expect("answered").into_inner()
+    });
+    let found = outputs(&response).remove("force_n").expect("a force");
+    assert_eq!(found, force(Physics::Hydrostatic));
+    assert_ne!(found, force(Physics::Full));
 }
 
 #[test]

@@ -11,9 +11,9 @@ use tempfile::TempDir;
 use wade_client::{ClientError, ShmClient};
 use wade_wire::shm::Wait;
 use wade_wire::shm::layout::{
-    Answer, BatchAnswer, BatchHeader, BatchQuery, HAS_BED, HAS_BED_CLEARANCE, HAS_HEADING, HAS_WATER_LEVEL,
-    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, MAX_BATCH, MAX_WHEELS, Names, QUASI_STEADY, Query,
-    SERVER_POLLS, Status, SurfaceAnswer,
+    Answer, BatchAnswer, BatchHeader, BatchQuery, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_HEADING,
+    HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, MAX_BATCH, MAX_WHEELS, Names,
+    QUASI_STEADY, Query, SERVER_POLLS, Status, SurfaceAnswer,
 };
 use wade_wire::{Field, InvalidState, Problem};
 
@@ -195,6 +195,7 @@ fn what_is_set_and_cannot_be_used_is_refused_by_name() {
         (Query { flags: 1 << 63, ..good }, Field::Flags, Unsupported),
         (Query { depth_m: f32::NAN, ..good }, Field::Depth, NoLevel),
         (Query { flags: HYDROSTATIC | QUASI_STEADY, ..good }, Field::Physics, Unknown),
+        (Query { flags: HYDROSTATIC | FULL, ..good }, Field::Physics, Unknown),
     ];
     for (query, field, problem) in cases {
         let answer = asked(&raw, query);

@@ -60,6 +60,9 @@
 // Flag of a state: of the physical base the pressure of still water and the drag.
 #define WADE_PHYSICS_QUASI_STEADY 1024
 
+// Flag of a state: the whole physical base, however the server is set.
+#define WADE_PHYSICS_FULL 2048
+
 // Flag of forces: no quantity lies outside the training domain.
 #define WADE_IN_DOMAIN 1
 

@@ -39,6 +39,8 @@ pub const WADE_HAS_BED: u32 = 128;
 pub const WADE_PHYSICS_HYDROSTATIC: u32 = 512;
 /// Flag of a state: of the physical base the pressure of still water and the drag.
 pub const WADE_PHYSICS_QUASI_STEADY: u32 = 1024;
+/// Flag of a state: the whole physical base, however the server is set.
+pub const WADE_PHYSICS_FULL: u32 = 2048;
 
 /// Flag of forces: no quantity lies outside the training domain.
 pub const WADE_IN_DOMAIN: u32 = 1;

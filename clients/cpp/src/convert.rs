@@ -12,8 +12,8 @@ use crate::abi::{
     WADE_DRY_CONTACT, WADE_HAS_ADDED_MASS, WADE_HAS_BASE, WADE_HAS_BED, WADE_HAS_BED_CLEARANCE,
     WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WATER_LEVEL, WADE_HAS_WHEEL_SPEEDS,
     WADE_IMPLICIT_ADDED_MASS, WADE_IN_DOMAIN, WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE,
-    WADE_NEVER, WADE_PHYSICS_HYDROSTATIC, WADE_PHYSICS_QUASI_STEADY, WADE_SESSION_BEGINS, WadeEffectLoad,
-    WadeForces, WadeState, WadeStatus,
+    WADE_NEVER, WADE_PHYSICS_FULL, WADE_PHYSICS_HYDROSTATIC, WADE_PHYSICS_QUASI_STEADY, WADE_SESSION_BEGINS,
+    WadeEffectLoad, WadeForces, WadeState, WadeStatus,
 };
 use crate::last::nanoseconds_since;
 
@@ -30,7 +30,15 @@ const STATE_FLAGS: u32 = WADE_DRY_CONTACT
     | WADE_HAS_BED_CLEARANCE
     | WADE_HAS_BED
     | WADE_PHYSICS_HYDROSTATIC
-    | WADE_PHYSICS_QUASI_STEADY;
+    | WADE_PHYSICS_QUASI_STEADY
+    | WADE_PHYSICS_FULL;
+
+/// Flags of which a state has one at most.
+const PHYSICS: [(u32, Physics); 3] = [
+    (WADE_PHYSICS_HYDROSTATIC, Physics::Hydrostatic),
+    (WADE_PHYSICS_QUASI_STEADY, Physics::QuasiSteady),
+    (WADE_PHYSICS_FULL, Physics::Full),
+];
 
 impl From<&WadeState> for State {
     fn from(state: &WadeState) -> Self {
@@ -55,13 +63,7 @@ impl From<&WadeState> for State {
             wheel_speeds: has(WADE_HAS_WHEEL_SPEEDS).then_some(wheel_speeds),
             time_step: state.time_step_s,
             implicit_added_mass: has(WADE_IMPLICIT_ADDED_MASS),
-            physics: if has(WADE_PHYSICS_HYDROSTATIC) {
-                Physics::Hydrostatic
-            } else if has(WADE_PHYSICS_QUASI_STEADY) {
-                Physics::QuasiSteady
-            } else {
-                Physics::Full
-            },
+            physics: PHYSICS.into_iter().find(|(flag, _)| has(*flag)).map(|(_, physics)| physics),
         }
     }
 }
@@ -73,7 +75,7 @@ pub fn checked(state: &WadeState) -> Result<State, InvalidState> {
     if state.flags & !STATE_FLAGS != 0 {
         return wrong(Field::Flags, Problem::Unsupported);
     }
-    if has(WADE_PHYSICS_HYDROSTATIC | WADE_PHYSICS_QUASI_STEADY) {
+    if PHYSICS.into_iter().filter(|(flag, _)| has(*flag)).count() > 1 {
         return wrong(Field::Physics, Problem::Unknown);
     }
     if has(WADE_HAS_WHEEL_SPEEDS) && !matches!(state.wheel_count, 0 | WHEELS) {

@@ -142,7 +142,7 @@ pub(super) fn message(state: &State) -> proto::State {
         wheel_speed_radps: state.wheel_speeds.map_or_else(Vec::new, Vec::from),
         time_step_s: state.time_step,
         implicit_added_mass: state.implicit_added_mass,
-        physics: state.physics as i32,
+        physics: state.physics.map_or(0, |physics| physics as i32),
     }
 }
 
@@ -178,7 +178,7 @@ pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateB
         depth_rate_mps: states.iter().filter_map(|s| s.depth_rate).collect(),
         wheel_speed_radps: states.iter().filter_map(|s| s.wheel_speeds).flatten().collect(),
         implicit_added_mass: states.first().is_some_and(|s| s.implicit_added_mass),
-        physics: states.first().map_or(0, |s| s.physics as i32),
+        physics: states.first().and_then(|s| s.physics).map_or(0, |physics| physics as i32),
     }
 }
 

@@ -4,7 +4,7 @@ use crate::condition::Condition;
 use crate::effects::{ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, EffectsSession};
 use crate::forces::Forces;
 use crate::model::{Form, Model, Workspace};
-use crate::physics::{Memory, Motion};
+use crate::physics::{Memory, Motion, Physics};
 
 /// What a served vehicle answers. Reused from query to query.
 #[derive(Debug, Clone, Default)]
@@ -43,18 +43,24 @@ pub struct ServedVehicle {
     model: Model,
     effects: Option<ActiveEffects>,
     origin: String,
+    physics: Physics,
 }
 
 impl ServedVehicle {
     /// A model with the effects of its bundle, where it has any.
     pub fn new(model: Model, effects: Option<EffectsFile>) -> Self {
         let effects = effects.map(|file| ActiveEffects::new(file, model.vehicle()));
-        Self { model, effects, origin: String::new() }
+        Self { model, effects, origin: String::new(), physics: Physics::Full }
     }
 
     /// The same, which knows where it is from.
     pub fn with_origin(self, origin: String) -> Self {
         Self { origin, ..self }
+    }
+
+    /// The same, which answers with so much of the physical base where a caller states nothing else.
+    pub fn with_physics(self, physics: Physics) -> Self {
+        Self { physics, ..self }
     }
 
     /// Where the bundle is: its folder, or "carried by the binary"; empty of one made in memory.
@@ -95,7 +101,7 @@ impl ServedVehicle {
             wheel_speeds: &speeds,
             time_step: circumstances.time_step,
             implicit_added_mass: circumstances.implicit_added_mass,
-            physics: circumstances.physics,
+            physics: circumstances.physics.unwrap_or(self.physics),
         };
         self.model.evaluate_moving(condition, (&motion, memory), workspace, forces);
         match &self.effects {

@@ -45,12 +45,13 @@ pub fn state(message: &proto::State) -> Result<State, InvalidState> {
     })
 }
 
-fn physics(code: i32) -> Result<Physics, InvalidState> {
+fn physics(code: i32) -> Result<Option<Physics>, InvalidState> {
     match code {
-        0 => Ok(Physics::Full),
+        0 => Ok(None),
         code => Physics::ALL
             .into_iter()
             .find(|physics| *physics as i32 == code)
+            .map(Some)
             .ok_or(InvalidState { field: Field::Physics, problem: Problem::Unknown }),
     }
 }

@@ -44,8 +44,8 @@ pub struct State {
     pub time_step: f32,
     /// The caller integrates added mass himself.
     pub implicit_added_mass: bool,
-    /// How much of the physical base answers.
-    pub physics: Physics,
+    /// How much of the physical base answers; by default as the server is set.
+    pub physics: Option<Physics>,
 }
 
 impl Default for State {
@@ -68,7 +68,7 @@ impl Default for State {
             wheel_speeds: None,
             time_step: 0.0,
             implicit_added_mass: false,
-            physics: Physics::Full,
+            physics: None,
         }
     }
 }

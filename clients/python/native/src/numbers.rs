@@ -3,8 +3,8 @@
 use wade_core::physics::Physics;
 use wade_wire::State;
 use wade_wire::shm::layout::{
-    DRY_CONTACT, HAS_BED, HAS_BED_CLEARANCE, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_SPEEDS,
-    HYDROSTATIC, IMPLICIT_ADDED_MASS, QUASI_STEADY,
+    DRY_CONTACT, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL,
+    HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, QUASI_STEADY,
 };
 
 /// Numbers of a state.
@@ -56,10 +56,11 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
         water_level: has(HAS_WATER_LEVEL).then_some(water_level),
         bed_clearance: has(HAS_BED_CLEARANCE).then_some(bed_clearance),
         bed: has(HAS_BED).then_some(bed),
-        physics: match flags & (HYDROSTATIC | QUASI_STEADY) {
-            HYDROSTATIC => Physics::Hydrostatic,
-            QUASI_STEADY => Physics::QuasiSteady,
-            _ => Physics::Full,
+        physics: match flags & (HYDROSTATIC | QUASI_STEADY | FULL) {
+            HYDROSTATIC => Some(Physics::Hydrostatic),
+            QUASI_STEADY => Some(Physics::QuasiSteady),
+            FULL => Some(Physics::Full),
+            _ => None,
         },
     }
 }

@@ -37,6 +37,8 @@ def flags(state: State) -> int:
         flags |= layout.HYDROSTATIC
     elif state.physics == Physics.QUASI_STEADY:
         flags |= layout.QUASI_STEADY
+    elif state.physics == Physics.FULL:
+        flags |= layout.FULL
     return flags
 
 

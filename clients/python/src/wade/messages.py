@@ -100,7 +100,7 @@ def evaluate_request(vehicle: str, state: State) -> Message:
         message.bed_clearance_m = bed_clearance
     if state.bed is not None:
         message.bed = bed
-    if not state.is_default("physics"):
+    if state.physics is not None:
         message.physics = state.physics
     if state.heading_rad is not None:
         message.heading_rad = heading
@@ -131,7 +131,7 @@ def evaluate_batch_request(vehicle: str, states: State, surfaces: bool) -> tuple
         ground_contact=states.ground_contact,
         omit_surfaces=not surfaces,
         implicit_added_mass=states.implicit_added_mass,
-        physics=states.physics,
+        physics=states.physics or 0,
         **arrays,
     )
     return request, states.length(rows)

@@ -40,6 +40,7 @@ HAS_BED = 128
 HAS_WHEEL_LEVELS = 256
 HYDROSTATIC = 512
 QUASI_STEADY = 1024
+FULL = 2048
 #: Flag of an answer: the server polls, so that waking it is of no use.
 SERVER_POLLS = 1
 #: Flag of an answer: the session begins with this query.

@@ -106,8 +106,8 @@ class State:
     bed_clearance_m: ArrayLike | None = None
     #: Share of the motion through the water that is motion over the bed, 0 parked to 1 driving. None: from velocities.
     bed: ArrayLike | None = None
-    #: How much of the physical base answers, for tests. One for the whole batch.
-    physics: Physics = Physics.FULL
+    #: How much of the physical base answers. One for the whole batch. None: as the server is set, by default all of it.
+    physics: Physics | None = None
     #: Time since the state before it in the run [s]. 0: what effects remember stays as it is.
     time_step_s: ArrayLike = _NO_TIME
     #: The caller adds `Forces.added_mass` to a mass matrix of his own: the forces leave `-M_A nu_dot` out and keep the

@@ -32,8 +32,8 @@ pub struct Circumstances {
     pub time_step: f64,
     /// The caller integrates added mass himself with the matrix: forces leave `-M_A nu_dot` out.
     pub implicit_added_mass: bool,
-    /// How much of the physical base answers.
-    pub physics: Physics,
+    /// How much of the physical base answers; by default as the vehicle is served.
+    pub physics: Option<Physics>,
 }
 
 /// What effects remember from state to state: waves and flooding. Starts at rest and dry.

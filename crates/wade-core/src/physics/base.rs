@@ -22,7 +22,8 @@ use crate::wrench::Wrench;
 
 crate::named_enum! {
     /// How much of the base answers: for tests, and to see what a term does.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+    #[serde(rename_all = "snake_case")]
     #[repr(u8)]
     pub enum Physics {
         /// The pressure of still water.

@@ -1,10 +1,10 @@
 //! Between the pages of shared memory and what is behind them: a query to a checked kind of state, an evaluation to an answer.
 
 use super::layout::{
-    Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE, HAS_DAMPING,
-    HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC,
-    IMPLICIT_ADDED_MASS, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, Status,
-    SurfaceAnswer,
+    Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, FULL, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE,
+    HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS,
+    HYDROSTATIC, IMPLICIT_ADDED_MASS, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY,
+    Query, Status, SurfaceAnswer,
 };
 use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, by_rows, single};
 use wade_core::domain::{Outside, Quantity};
@@ -24,7 +24,8 @@ const QUERY_FLAGS: u64 = DRY_CONTACT
     | HAS_BED
     | HAS_WHEEL_LEVELS
     | HYDROSTATIC
-    | QUASI_STEADY;
+    | QUASI_STEADY
+    | FULL;
 
 /// Wheels that effects know of.
 const WHEELS: usize = 4;
@@ -69,10 +70,11 @@ impl Query {
             wheel_speeds: wheel_speeds.then_some([a, b, c, d]),
             time_step: self.time_step_s,
             implicit_added_mass: self.flags & IMPLICIT_ADDED_MASS != 0,
-            physics: match self.flags & (HYDROSTATIC | QUASI_STEADY) {
-                0 => Physics::Full,
-                HYDROSTATIC => Physics::Hydrostatic,
-                QUASI_STEADY => Physics::QuasiSteady,
+            physics: match self.flags & (HYDROSTATIC | QUASI_STEADY | FULL) {
+                0 => None,
+                HYDROSTATIC => Some(Physics::Hydrostatic),
+                QUASI_STEADY => Some(Physics::QuasiSteady),
+                FULL => Some(Physics::Full),
                 _ => return Err(InvalidState { field: Field::Physics, problem: Problem::Unknown }),
             },
         })
@@ -104,8 +106,11 @@ impl From<&State> for Query {
                 | flag(state.water_level.is_some(), HAS_WATER_LEVEL)
                 | flag(state.bed_clearance.is_some(), HAS_BED_CLEARANCE)
                 | flag(state.bed.is_some(), HAS_BED)
-                | flag(state.physics == Physics::Hydrostatic, HYDROSTATIC)
-                | flag(state.physics == Physics::QuasiSteady, QUASI_STEADY),
+                | state.physics.map_or(0, |physics| match physics {
+                    Physics::Hydrostatic => HYDROSTATIC,
+                    Physics::QuasiSteady => QUASI_STEADY,
+                    Physics::Full => FULL,
+                }),
             depth_m: state.depth,
             water_level_m: state.water_level.unwrap_or(f32::NAN),
             bed_clearance_m: state.bed_clearance.unwrap_or(f32::NAN),

@@ -111,6 +111,8 @@ pub const HAS_WHEEL_LEVELS: u64 = 256;
 pub const HYDROSTATIC: u64 = 512;
 /// Flag of [`Query::flags`]: of the physical base the pressure of still water and the drag.
 pub const QUASI_STEADY: u64 = 1024;
+/// Flag of [`Query::flags`]: the whole physical base, however the server is set.
+pub const FULL: u64 = 2048;
 /// Flag of [`Answer::flags`]: the server polls, so that waking it is of no use.
 pub const SERVER_POLLS: u64 = 1;
 /// Flag of [`Answer::flags`]: the session begins with this query, at rest and dry. In the middle of a run it says that the
