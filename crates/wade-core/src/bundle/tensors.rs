@@ -157,7 +157,6 @@ impl Kind {
 #[serde(deny_unknown_fields)]
 struct RadiationMetadata {
     source: String,
-    volume_step_m3: f64,
     bed_reach_m: f64,
     frequency_radps: f64,
     /// Natural frequency [rad/s] and damping ratio of each oscillator.
@@ -347,7 +346,6 @@ pub fn read_radiation(bytes: &[u8]) -> Result<Radiation, TensorError> {
         deep: table(RADIATION_TABLES[0])?,
         standing: table(RADIATION_TABLES[1])?,
         source: meta.source,
-        volume_step: meta.volume_step_m3,
         bed_reach: meta.bed_reach_m,
         frequency: meta.frequency_radps,
         poles: meta.poles.map(|[frequency, damping]| Pole { frequency, damping }),
@@ -358,7 +356,6 @@ pub fn read_radiation(bytes: &[u8]) -> Result<Radiation, TensorError> {
 pub fn write_radiation(radiation: &Radiation) -> Vec<u8> {
     let meta = RadiationMetadata {
         source: radiation.source.clone(),
-        volume_step_m3: radiation.volume_step,
         bed_reach_m: radiation.bed_reach,
         frequency_radps: radiation.frequency,
         poles: radiation.poles.map(|pole| [pole.frequency, pole.damping]),

@@ -3,7 +3,7 @@
 //! `W = W_hydrostatic + sum_elements f + W_added + W_waves` with
 //! `W_added = -(A nu_dot + C_A(nu) nu + k max(y', 0) dA/dy nu)` about the body origin. `nu` is the velocity through the water, `C_A`
 //! Kirchhoff's cross terms (Newman, Marine Hydrodynamics, section 4.14), `y` the place in the table of [`Radiation`], which
-//! rises with the volume under water. The last term is the momentum that entering water is given (von Karman 1929), by the
+//! rises with the share of the height of [`Ellipsoid`] that is under water. The last term is the momentum that entering water is given (von Karman 1929), by the
 //! share `ENTRY` that conserves energy; it acts while `y` rises alone, so that a hull that leaves the water gets nothing
 //! back. So the energy of body, added mass, memory and position never rises by what the water does.
 
@@ -11,11 +11,11 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::drag::{Drag, SurfaceDrag};
 use super::elements::{COUNT, elements};
-use super::radiation::{NODES, Node, POLES, Pole, Radiation, STEPS};
+use super::immersion::Ellipsoid;
+use super::radiation::{NODES, Node, POLES, Pole, Radiation, STEP};
 use crate::condition::{Condition, GroundContact};
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::geometry::hydrostatics::float_depth;
-use crate::geometry::mesh::Bounds;
 use crate::geometry::wetting::{Wetting, WettingTable};
 use crate::vehicle::{ContactPatch, MAX_SURFACES, Vehicle};
 use crate::wrench::Wrench;
@@ -36,17 +36,14 @@ crate::named_enum! {
     }
 }
 
-/// Clearance of a covered hull of which nobody stated it, over its height [-]: the bed is then next to nothing.
+/// Clearance of a hull a height deeper than afloat of which nobody stated it, over its height [-]: the bed is then next to
+/// nothing.
 const LIFTED: f64 = 2.0;
 /// Share of the momentum that entering water takes from the hull at once [-]. At a half the energy of added mass and body stays
 /// what it is; von Karman's 1 spends as much again on the spray, which a hull with frame and tilt makes less of.
 const ENTRY: f64 = 0.5;
 /// Share of a surface that is wet from which its elements bear all of their drag [-].
 const REACHED: f64 = 0.05;
-/// Depth of the covered hull over its height by which the table goes on one step, from where the surface is a fifth of it away.
-const SUNK_STEP: f64 = 0.5;
-const SUNK_ONSET: f64 = 0.2;
-
 /// What is remembered from state to state: waves made, and the acceleration of explicit integration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Memory {
@@ -101,8 +98,6 @@ pub struct BaseLoads {
     pub added_mass: Matrix6<f64>,
     /// Derivative of the linear wave load with respect to the velocity, with the sign changed [kg/s, kg m/s, kg m2/s].
     pub damping: Matrix6<f64>,
-    /// Volume under water as softly as it gets wet, the coordinate of the table [m3].
-    pub volume: f64,
     /// Clearance over the bed that was used [m].
     pub bed_clearance: f64,
     /// Share of the motion through the water that is motion over the bed, as used.
@@ -146,15 +141,13 @@ pub struct Base {
     radiation: Radiation,
     /// Rows of the table at [`Radiation::frequency`], as a state without a session is answered.
     steady: [Vec<Steady>; 2],
-    bounds: Bounds,
+    ellipsoid: Ellipsoid,
     z0: f64,
     height: f64,
-    /// [`BaseLoads::volume`] afloat in fresh water, or of the whole hull where it sinks [m3].
-    float_volume: f64,
+    /// Share of the height under water of the hull afloat in fresh water, upright; 1 where it sinks.
+    float_share: f64,
     rigid: Matrix6<f64>,
     contacts: Vec<ContactPatch>,
-    /// Of the whole hull [m2].
-    area: f64,
     areas: Vec<f64>,
     centers: Vec<Vec3>,
 }
@@ -179,24 +172,20 @@ impl Base {
     /// Prepares a vehicle with the table of its waves.
     pub fn new(vehicle: &Vehicle, radiation: Radiation) -> Self {
         let count = vehicle.surfaces.len();
-        let bounds = vehicle.hull.mesh.bounds().unwrap_or(Bounds { min: Vec3::zeros(), max: Vec3::zeros() });
+        let ellipsoid = Ellipsoid::within(&vehicle.hull.mesh);
         let steady = steady(&radiation);
-        let whole = radiation.volume_step * STEPS as f64;
-        let drag = Drag::new(vehicle, &elements(vehicle, COUNT));
-        let afloat = float_depth(&vehicle.hull.mesh, vehicle.z0, vehicle.mass);
-        let float_volume = drag.volume(&WaterPlane::level(vehicle.z0, afloat)).clamp(1e-9, whole.max(1e-9));
+        let afloat = vehicle.z0 + float_depth(&vehicle.hull.mesh, vehicle.z0, vehicle.mass);
         Self {
             table: WettingTable::new(&vehicle.hull, count),
-            drag,
+            drag: Drag::new(vehicle, &elements(vehicle, COUNT)),
             radiation,
             steady,
-            bounds,
+            ellipsoid,
             z0: vehicle.z0,
             height: vehicle.dimensions.height,
-            float_volume,
+            float_share: ellipsoid.share_under(&WaterPlane::level(afloat, 0.0)).clamp(0.0, 1.0),
             rigid: rigid_mass(vehicle),
             contacts: vehicle.contacts.clone(),
-            area: vehicle.surfaces.iter().map(|s| s.area).sum(),
             areas: vehicle.surfaces.iter().map(|s| s.area).collect(),
             centers: vehicle.surfaces.iter().map(|s| s.centroid).collect(),
         }
@@ -239,12 +228,13 @@ impl Base {
             }
         }
         out.bed = condition.bed();
-        out.bed_clearance = condition.bed_clearance.unwrap_or_else(|| self.usual_clearance(out.volume));
+        let immersion = self.ellipsoid.immersion(condition, &plane);
+        out.bed_clearance = condition.bed_clearance.unwrap_or_else(|| self.usual_clearance(immersion[0]));
         (out.hull, out.added_mass, out.damping) = Default::default();
         if motion.physics == Physics::Full {
             // in a session in which no time has passed yet there is nothing to remember
             let memory = memory.filter(|memory| motion.time_step > 0.0 || !memory.is_empty());
-            self.add_waves(condition, motion, memory, out);
+            self.add_waves(condition, motion, (immersion, memory), out);
         }
     }
 
@@ -262,10 +252,9 @@ impl Base {
     fn sum_surfaces(&self, condition: &Condition, out: &mut BaseLoads) {
         let weight = condition.density * GRAVITY;
         out.surfaces.clear();
-        (out.volume, out.shaft_power) = (0.0, 0.0);
+        out.shaft_power = 0.0;
         for (index, (wetting, drag)) in out.wetting.iter().zip(&out.drags).enumerate() {
             let reached = reached(wetting, self.areas[index]);
-            out.volume += drag.volume;
             out.shaft_power += drag.shaft_power * reached;
             out.surfaces.push(SurfaceLoad {
                 hydrostatic: wetting.pressure * weight,
@@ -274,20 +263,19 @@ impl Base {
                 center: wetting.centroid().unwrap_or(self.centers[index]),
             });
         }
-        out.volume = out.volume.max(0.0);
     }
 
     /// Clearance of a hull of which nobody stated it [m]: it stands on the bed up to the level at which it floats, and is lifted
     /// smoothly from there.
-    fn usual_clearance(&self, volume: f64) -> f64 {
-        LIFTED * self.height * self.lifted(volume).powi(2)
+    fn usual_clearance(&self, immersion: f64) -> f64 {
+        LIFTED * self.height * self.lifted(immersion).powi(2)
     }
 
     fn add_waves(
         &self,
         condition: &Condition,
         motion: &Motion<'_>,
-        memory: Option<&mut Memory>,
+        ([immersion, immersion_rate], memory): ([f64; 2], Option<&mut Memory>),
         out: &mut BaseLoads,
     ) {
         let soaked: f64 = out.wetting.iter().map(|wetting| wetting.soaked_area).sum();
@@ -300,9 +288,7 @@ impl Base {
         let (density, up) = (condition.density, condition.up.into_inner());
         let (v, omega) = (condition.velocity, condition.angular_velocity);
         let nu = joined(&v, &omega);
-        let sinking = -up.dot(&v);
-        let flux: f64 = out.drags.iter().map(|drag| drag.flux).sum();
-        let place = self.place(out.volume, flux, self.sunk(&condition.water_plane(self.z0)), sinking);
+        let place = place(immersion, immersion_rate);
         let bed = self.near_bed(out.bed_clearance);
         let remembers = memory.is_some();
         // a state alone is answered at the natural frequency of heave
@@ -310,25 +296,24 @@ impl Base {
             true => self.rows(table)[row].mass,
             false => self.steady[table][row].mass,
         };
-        let (mut mass, mut growth) = (Matrix6::zeros(), Matrix6::zeros());
+        let (mut far_from_bed, mut growth) = (Matrix6::zeros(), Matrix6::zeros());
         let mut bed_adds = Matrix6::zeros();
         for &(row, weight, slope) in &place.rows {
             let deep = mass_of(0, row);
             let added = mass_of(1, row) - deep;
-            mass += (deep + added * bed.share) * weight;
+            far_from_bed += deep * weight;
             growth += (deep + added * bed.share) * slope;
             bed_adds += added * weight;
         }
-        // elements know the hull's lowest points by their spread alone
-        let reached = (soaked / (REACHED * self.area)).min(1.0);
-        let mass = mass * (density * reached);
+        let mass = (far_from_bed + bed_adds * bed.share) * density;
         // entry gives momentum to the water; so does a hull that sinks toward the bed
         let closing = match condition.bed_clearance {
             Some(_) => (-up.dot(&condition.ground_velocity)).max(0.0),
-            None => (-self.clearance_rate(out.volume, flux)).max(0.0),
+            None => (-self.clearance_rate(immersion, immersion_rate)).max(0.0),
         };
         let entry = growth * place.rate.max(0.0) + bed_adds * (bed.closing * closing);
-        let mut load = -(entry * nu) * (ENTRY * density * reached) - cross_terms(&mass, &v, &omega);
+        // what the bed adds resists motion toward it, and turns with nothing
+        let mut load = -(entry * nu) * (ENTRY * density) - cross_terms(&(far_from_bed * density), &v, &omega);
         let rate = joined(
             &(condition.acceleration - omega.cross(&condition.velocity)),
             &condition.angular_acceleration,
@@ -338,7 +323,7 @@ impl Base {
             let push: [Vector6<f64>; POLES] = std::array::from_fn(|m| factors[m].transpose() * nu);
             memory.advance(&self.radiation.poles, &push, motion.time_step);
             for (factor, [output, _]) in factors.iter().zip(&memory.waves) {
-                load -= factor * output * (density * reached);
+                load -= factor * output * density;
             }
             if !motion.implicit_added_mass {
                 load -= mass * memory.settled(&self.rigid, &mass, rate, motion.time_step);
@@ -351,7 +336,7 @@ impl Base {
             }
             // only what moves up and down or tilts makes waves in steady motion
             let lifting = lifting(&up);
-            out.damping = lifting * damping * lifting * (density * reached);
+            out.damping = lifting * damping * lifting * density;
             load -= out.damping * nu;
             if !motion.implicit_added_mass {
                 load -= mass * rate;
@@ -368,40 +353,6 @@ impl Base {
         if table == 0 { &self.radiation.deep } else { &self.radiation.standing }
     }
 
-    /// Depth of the highest point of the box around the hull below the surface [m]; 0 where it looks out.
-    fn sunk(&self, plane: &WaterPlane) -> f64 {
-        let n = plane.normal.into_inner();
-        let top: f64 = (0..3).map(|i| (n[i] * self.bounds.min[i]).max(n[i] * self.bounds.max[i])).sum();
-        (plane.offset - top).max(0.0)
-    }
-
-    /// Where a hull is in the table, and how fast it goes down there.
-    fn place(&self, volume: f64, flux: f64, sunk: f64, sinking: f64) -> Place {
-        let step = self.radiation.volume_step;
-        let depth = sunk / self.height;
-        let below = depth * depth / (depth + SUNK_ONSET) / SUNK_STEP;
-        let below_rate = depth * (depth + 2.0 * SUNK_ONSET) / (depth + SUNK_ONSET).powi(2) / SUNK_STEP;
-        // the spline lags by half a step
-        let v = (volume / step).clamp(0.0, STEPS as f64);
-        let square = v * v;
-        let y = v + 0.5 * square / (square + 1.0) + below;
-        let rate = (1.0 + v / (square + 1.0).powi(2)) * flux / step + below_rate * sinking / self.height;
-        let end = NODES as f64 - 1e-9;
-        let (y, rate) = if y < end { (y, rate) } else { (end, 0.0) };
-        let row = (y.floor() as usize).min(NODES - 1);
-        let t = y - row as f64;
-        // quadratic B-splines: weights that are never negative, sums with a continuous slope
-        let last = (0.5 * t * t, t);
-        // the row before the first is dry as well, so that the slope begins at zero
-        let [a, b] = match row {
-            0 => [(0.0, 0.0); 2],
-            _ => [(0.5 * (1.0 - t).powi(2), t - 1.0), (0.5 + t - t * t, 1.0 - 2.0 * t)],
-        };
-        let next = (row + 1).min(NODES - 1);
-        let before = row.saturating_sub(1);
-        Place { rows: [(before, a.0, a.1), (row, b.0, b.1), (next, last.0, last.1)], rate }
-    }
-
     /// How much of what the bed adds is left at a clearance, and how that grows as it closes [-, 1/m].
     fn near_bed(&self, clearance: f64) -> NearBed {
         let x = 1.0 + clearance.max(0.0) / self.radiation.bed_reach;
@@ -409,18 +360,13 @@ impl Base {
     }
 
     /// Rate of [`Self::usual_clearance`] [m/s].
-    fn clearance_rate(&self, volume: f64, flux: f64) -> f64 {
-        LIFTED * self.height * 2.0 * self.lifted(volume) * flux / self.lifting_volume()
+    fn clearance_rate(&self, immersion: f64, rate: f64) -> f64 {
+        LIFTED * self.height * 2.0 * self.lifted(immersion) * rate
     }
 
-    /// Where a hull is between floating and covered, 0 to 1.
-    fn lifted(&self, volume: f64) -> f64 {
-        ((volume - self.float_volume) / self.lifting_volume()).clamp(0.0, 1.0)
-    }
-
-    fn lifting_volume(&self) -> f64 {
-        let whole = self.radiation.volume_step * STEPS as f64;
-        (whole - self.float_volume).max(0.1 * whole).max(1e-9)
+    /// How much deeper a hull is than afloat, over its height, up to 1.
+    fn lifted(&self, immersion: f64) -> f64 {
+        (immersion - self.float_share).clamp(0.0, 1.0)
     }
 
     /// Square roots of the gains at a place.
@@ -449,6 +395,27 @@ fn reached(wetting: &Wetting, area: f64) -> f64 {
 struct Place {
     rows: [(usize, f64, f64); 3],
     rate: f64,
+}
+
+/// Where a hull is in the table at an immersion, and how fast it goes down there.
+fn place(immersion: f64, immersion_rate: f64) -> Place {
+    // a row weighs most in the middle of its step
+    let y = immersion.max(0.0) / STEP;
+    let rate = immersion_rate / STEP;
+    let end = NODES as f64 - 1e-9;
+    let (y, rate) = if y < end { (y, rate) } else { (end, 0.0) };
+    let row = (y.floor() as usize).min(NODES - 1);
+    let t = y - row as f64;
+    // quadratic B-splines: weights that are never negative, sums with a continuous slope
+    let last = (0.5 * t * t, t);
+    // the row before the first is dry as well, so that the slope begins at zero
+    let [a, b] = match row {
+        0 => [(0.0, 0.0); 2],
+        _ => [(0.5 * (1.0 - t).powi(2), t - 1.0), (0.5 + t - t * t, 1.0 - 2.0 * t)],
+    };
+    let next = (row + 1).min(NODES - 1);
+    let before = row.saturating_sub(1);
+    Place { rows: [(before, a.0, a.1), (row, b.0, b.1), (next, last.0, last.1)], rate }
 }
 
 struct NearBed {

@@ -74,18 +74,11 @@ pub struct SurfaceDrag {
     pub load: Wrench,
     /// Power that a turning wheel must be given at its shaft [W]: what the rim's own velocity takes.
     pub shaft_power: f64,
-    /// Volume over the wet parts of the elements, as they get wet [m3]: those of all surfaces sum to the volume under water,
-    /// which sets in as softly as their loads.
-    pub volume: f64,
-    /// Rate of that volume [m3/s].
-    pub flux: f64,
 }
 
 /// The state in the form that every block uses.
 struct Flow {
     up: [f64; 3],
-    /// Rate of `up` in body axes [1/s].
-    tilting: [f64; 3],
     offset: f64,
     velocity: [f64; 3],
     rate: [f64; 3],
@@ -165,15 +158,6 @@ impl Drag {
         }
     }
 
-    /// The volume over the wet elements at rest [m3], see [`SurfaceDrag::volume`].
-    pub fn volume(&self, plane: &WaterPlane) -> f64 {
-        let still = Condition { up: plane.normal, ..Condition::level(Vec3::zeros(), 0.0) };
-        let flow = self.flow(plane, &still);
-        let mut sums = Sums::default();
-        self.blocks.iter().for_each(|block| block.add(&flow, None, &mut sums));
-        sums.finish().volume
-    }
-
     fn flow(&self, plane: &WaterPlane, condition: &Condition) -> Flow {
         let up = plane.normal.into_inner();
         let v = condition.velocity;
@@ -190,7 +174,6 @@ impl Drag {
         let line = reynolds.log10() - 2.0;
         Flow {
             up: up.into(),
-            tilting: up.cross(&condition.angular_velocity).into(),
             offset: plane.offset,
             velocity: v.into(),
             rate: condition.angular_velocity.into(),
@@ -207,8 +190,6 @@ struct Sums {
     force: [Lane; 3],
     moment: [Lane; 3],
     power: Lane,
-    volume: Lane,
-    flux: Lane,
 }
 
 impl Sums {
@@ -219,8 +200,6 @@ impl Sums {
         SurfaceDrag {
             load: Wrench { force: vector(&self.force), moment: vector(&self.moment) },
             shaft_power: sum(&self.power),
-            volume: sum(&self.volume),
-            flux: sum(&self.flux),
         }
     }
 }
@@ -266,15 +245,6 @@ impl Block {
             let reach = variance.max(0.0).sqrt();
             let facing = nx * ux + ny * uy + nz * uz;
             let square = facing * facing;
-            let [tx, ty, tz] = flow.tilting;
-            let spreading = s(0) * ux * tx
-                + s(1) * uy * ty
-                + s(2) * uz * tz
-                + 0.5
-                    * (s(3) * (ux * ty + uy * tx) + s(4) * (ux * tz + uz * tx) + s(5) * (uy * tz + uz * ty));
-            let reach_rate = if reach > 0.0 { spreading / reach } else { 0.0 };
-            let facing_rate = nx * tx + ny * ty + nz * tz;
-            let film_rate = 6.0 * (self.film[1] - self.film[0]) * square * square * facing * facing_rate;
             // of what is nearly horizontal alone
             let sixth = square * square * square;
             let film = self.film[0] + (self.film[1] - self.film[0]) * sixth;
@@ -313,14 +283,7 @@ impl Block {
             sums.moment[0][i] += y * fz - z * fy;
             sums.moment[1][i] += z * fx - x * fz;
             sums.moment[2][i] += x * fy - y * fx;
-            // the integral of the share over the depth
-            let height = 0.5 * range * share * share + (depth + reach - range).max(0.0);
-            sums.volume[i] -= self.area[i] * facing * height;
             sums.power[i] -= fx * skin[0] + fz * skin[1];
-            let sinking = -(hull[0] * ux + hull[1] * uy + hull[2] * uz);
-            let height_rate =
-                share * (sinking + reach_rate) - 0.5 * share * share * (2.0 * reach_rate + film_rate);
-            sums.flux[i] -= self.area[i] * (facing_rate * height + facing * height_rate);
         }
     }
 }

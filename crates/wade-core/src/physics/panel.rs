@@ -55,11 +55,6 @@ impl Basin {
     }
 }
 
-/// Gap between panels, over the smaller of them, that they cannot resolve [-].
-const NARROW: f64 = 0.3;
-/// Cosine between normals from which panels face each other [-].
-const OPPOSITE: f64 = -0.9;
-
 /// The wet parts of elements under level water.
 pub fn wet_panels(elements: &[Element], level: f64) -> Vec<Panel> {
     let panel = |element: &Element| {
@@ -72,21 +67,6 @@ pub fn wet_panels(elements: &[Element], level: f64) -> Vec<Panel> {
         (share > 0.02).then_some(Panel { area: element.area * share, normal: element.normal, center, axes })
     };
     elements.iter().filter_map(panel).collect()
-}
-
-/// Without those that face each other across a gap of less than `NARROW` of their size: the water between them moves with the
-/// hull, and panels do not resolve it.
-pub fn without_gaps(panels: Vec<Panel>) -> Vec<Panel> {
-    let faces = |one: &Panel, other: &Panel| {
-        let away = other.center - one.center;
-        let (gap, size) = (away.dot(&one.normal), one.area.min(other.area).sqrt());
-        let within = |axis: &Vec3| away.dot(axis).abs() <= axis.norm_squared();
-        one.normal.dot(&other.normal) < OPPOSITE
-            && (0.0..NARROW * size).contains(&gap)
-            && other.axes.iter().all(within)
-    };
-    let is_open = |panel: &&Panel| !panels.iter().any(|other| faces(panel, other));
-    panels.iter().filter(is_open).cloned().collect()
 }
 
 /// Half axes of a rectangle in the plane of an element with its second moments, which the water reaches to a share.
@@ -158,14 +138,20 @@ pub fn damping(panels: &[Panel], basin: &Basin, impulse: &Impulse, frequency: f6
 }
 
 impl Panel {
-    /// Corners of a rectangle of its area in its place, counter-clockwise seen from outside; body frame [m].
-    pub fn corners(&self) -> [[f64; 3]; 4] {
-        let [a, b] = self.axes;
-        let stated = 4.0 * a.norm() * b.norm();
-        let scale = if stated > 0.0 { (self.area / stated).sqrt() } else { 0.0 };
-        let turn = a.cross(&b).dot(&self.normal).signum();
-        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|(x, y)| (self.center + a * (scale * x) + b * (scale * y * turn)).into())
+    /// A panel of four corners, counter-clockwise seen from outside, the last one twice in a triangle; body frame [m].
+    pub fn from_corners(corners: &[[f64; 3]; 4]) -> Self {
+        let [a, b, c, d] = corners.map(Vec3::from);
+        let halves =
+            [[a, b, c], [a, c, d]].map(|[a, b, c]| ((b - a).cross(&(c - a)) * 0.5, (a + b + c) / 3.0));
+        let [area, other] = halves.map(|(vector, _)| vector.norm());
+        let whole = (area + other).max(f64::MIN_POSITIVE);
+        let normal = (halves[0].0 + halves[1].0).try_normalize(0.0).unwrap_or_else(Vec3::z);
+        // the rectangle of its area along its longer middle line
+        let lines = [(b + c - a - d) / 4.0, (c + d - a - b) / 4.0];
+        let longer = lines[usize::from(lines[1].norm() > lines[0].norm())];
+        let across = normal.cross(&longer);
+        let axes = [longer, across * (0.25 * (area + other) / longer.norm_squared().max(f64::MIN_POSITIVE))];
+        Self { area: area + other, normal, center: (halves[0].1 * area + halves[1].1 * other) / whole, axes }
     }
 
     /// Generalized normal about the body origin.
@@ -330,18 +316,4 @@ impl Wave {
         let along = phase * Complex::new(0.0, -self.number * level);
         nalgebra::Vector3::new(along * direction.x, along * direction.y, -phase * rate)
     }
-}
-
-/// Center of buoyancy of panels of an upright hull with the water surface as lid [m]; `None` where nothing is wet.
-pub fn center_of_buoyancy(panels: &[Panel], level: f64) -> Option<(f64, Vec3)> {
-    let mut volume = 0.0;
-    // int x_i n_i x_i / 2 over the closed surface; the lid has a vertical normal
-    let mut at = Vec3::zeros();
-    for Panel { area, normal, center, .. } in panels {
-        volume += area * normal.z * (center.z - level);
-        at.x += 0.5 * area * normal.x * center.x * center.x;
-        at.y += 0.5 * area * normal.y * center.y * center.y;
-        at.z += 0.5 * area * normal.z * (center.z * center.z - level * level);
-    }
-    (volume > 0.0).then(|| (volume, at / volume))
 }

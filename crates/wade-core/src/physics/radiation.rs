@@ -1,4 +1,4 @@
-//! Added mass, and the waves that a moving hull makes, as functions of the displaced volume and of the clearance over the bed.
+//! Added mass, and the waves that a moving hull makes, as functions of the immersion and of the clearance over the bed.
 //!
 //! Cummins (1962): `F = -A nu_dot - int K(s) nu(t - s) ds` with the added mass `A` of infinite frequency. `K` is a sum of
 //! damped oscillators, in the frequency domain `H(s) = sum_m G_m s / (s^2 + 2 zeta_m w_m s + w_m^2)` with gains `G_m` that are
@@ -6,12 +6,12 @@
 //! At one frequency `w` the same is an added mass `A + Im H(iw) / w` and a damping `Re H(iw)`; a state without a session is
 //! answered with these at the natural frequency of heave.
 //!
-//! All matrices are over the density, about the body origin, in body axes, and of the upright hull that displaces as much.
+//! All matrices are over the density, about the body origin, in body axes, and of the upright hull under water to the same share of its height.
 
 use nalgebra::{Matrix6, SymmetricEigen};
 
-use super::drag::Drag;
-use super::elements::{COUNT, elements};
+use super::elements::elements;
+use super::immersion::Ellipsoid;
 use super::panel::{Basin, damping, impulse, wet_panels};
 use crate::frame::{GRAVITY, WaterPlane};
 use crate::geometry::hydrostatics::hydrostatics;
@@ -19,19 +19,19 @@ use crate::vehicle::Vehicle;
 
 /// Oscillators of the memory.
 pub const POLES: usize = 2;
-/// Steps of the displaced volume from dry to covered.
-pub const STEPS: usize = 4;
-/// Further steps down to where the surface is too far to matter, each of half the height of the hull.
-pub const SUNK_STEPS: usize = 3;
-/// Rows of a table: dry, the steps to covered, and those below.
-pub const NODES: usize = 1 + STEPS + SUNK_STEPS;
+/// Step of a table, over the height of the hull's ellipsoid [-]. A longer one would blur the level at which a bottom gets
+/// wet; a shorter one would let a flat bottom that slams change the load by more than a hundredth of the dynamic pressure a
+/// millimeter.
+pub const STEP: f64 = 0.3;
+/// Rows of a table: dry, and one for the middle of each step but the first, as far below covered as above.
+pub const NODES: usize = 7;
 
 /// Elements of the estimate; `docs/src/concepts/physics.md` has its error.
 const PANELS: usize = 600;
-/// Share of the volume at which a hull counts as covered [-]: the last of it comes over a fifth of the height.
-const ALL_BUT: f64 = 0.98;
+/// What of the hull looks out of the water where it counts as covered, over its height [-].
+const DECK: f64 = 0.002;
 /// Clearance of a hull that stands on the bed, over its height [-]: treads and stones.
-const STANDING: f64 = 0.02;
+const STANDING: f64 = 0.1;
 /// Clearance at which the reach of the bed is measured, over the height of the hull [-].
 const RAISED: f64 = 0.25;
 /// Largest damping ratio of heave [-]: panel codes give 0.17 to 0.38 for the shipped hulls afloat, the latter over shallow water.
@@ -75,8 +75,6 @@ pub struct Node {
 pub struct Radiation {
     /// How it was computed: [`ESTIMATE`] or the name of a panel code.
     pub source: String,
-    /// Volume of the covered hull over [`STEPS`] [m3].
-    pub volume_step: f64,
     /// The oscillators.
     pub poles: [Pole; POLES],
     /// Clearance at which a quarter of what the bed adds is left [m].
@@ -130,8 +128,38 @@ pub enum RadiationError {
 pub struct Solved {
     /// Added mass at infinite frequency.
     pub mass: Matrix6<f64>,
-    /// Damping at each of the frequencies of [`frequencies`].
-    pub damping: Vec<Matrix6<f64>>,
+    /// What the waves do at each of the frequencies of [`frequencies`].
+    pub waves: Vec<SolvedWaves>,
+}
+
+/// The same at one frequency.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolvedWaves {
+    /// Added mass; `None` where the code has the damping alone, from which it follows (Kramers and Kronig).
+    pub mass: Option<Matrix6<f64>>,
+    /// Damping.
+    pub damping: Matrix6<f64>,
+}
+
+impl Solved {
+    /// Without what couples motion in the plane of symmetry to motion out of it: panels are not mirror images to the bit.
+    fn of_mirrored_hull(self) -> Self {
+        let mirrored = |matrix: Matrix6<f64>| {
+            Matrix6::from_fn(|i, j| if (i + j) % 2 == 0 { matrix[(i, j)] } else { 0.0 })
+        };
+        let waves = self
+            .waves
+            .into_iter()
+            .map(|waves| SolvedWaves { mass: waves.mass.map(mirrored), damping: mirrored(waves.damping) });
+        Self { mass: mirrored(self.mass), waves: waves.collect() }
+    }
+}
+
+impl SolvedWaves {
+    /// Damping alone.
+    pub fn damped(damping: Matrix6<f64>) -> Self {
+        Self { mass: None, damping }
+    }
 }
 
 /// Frequencies at which a table wants the damping [rad/s].
@@ -145,22 +173,12 @@ fn unit_frequency(vehicle: &Vehicle) -> f64 {
 
 /// Water levels of the rows of a table over the body origin [m], upright.
 pub fn levels(vehicle: &Vehicle) -> Vec<f64> {
-    let Some(bounds) = vehicle.hull.mesh.bounds() else { return Vec::new() };
-    let drag = Drag::new(vehicle, &elements(vehicle, COUNT));
-    let volume = |level: f64| drag.volume(&WaterPlane::level(level, 0.0));
-    let height = bounds.extent().z;
-    let full = volume(bounds.max.z + height);
-    let covered = (0..=STEPS).map(|row| {
-        let wanted = full * (row as f64 / STEPS as f64).min(ALL_BUT);
-        let (mut low, mut high) = (bounds.min.z, bounds.max.z + height);
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if volume(middle) < wanted { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
-    });
-    let sunk = (0..SUNK_STEPS).map(|row| bounds.max.z + 0.5 * height * (row as f64 + 1.0));
-    covered.chain(sunk).collect()
+    let ellipsoid = Ellipsoid::within(&vehicle.hull.mesh);
+    let top = vehicle.hull.mesh.bounds().map_or(0.0, |bounds| bounds.max.z);
+    let room = DECK * vehicle.dimensions.height;
+    // a deck that is awash is no deck under water and none above it
+    let aside = |level: f64| if (level - top).abs() < room { top - room } else { level };
+    (0..NODES).map(|row| aside(ellipsoid.level_at((row as f64 + 0.5) * STEP))).collect()
 }
 
 impl Radiation {
@@ -172,9 +190,8 @@ impl Radiation {
             let basin = Basin { level, bed: clearance.map(|clearance| vehicle.z0 - clearance) };
             let panels = wet_panels(&elements, level);
             let impulse = impulse(&panels, &basin);
-            let damping =
-                frequencies.iter().map(|w| damping(&panels, &basin, &impulse, *w)).collect::<Vec<_>>();
-            Solved { mass: impulse.mass, damping }
+            let waves = |w: &f64| SolvedWaves::damped(damping(&panels, &basin, &impulse, *w));
+            Solved { mass: impulse.mass, waves: frequencies.iter().map(waves).collect() }
         };
         Self::from_solved(vehicle, ESTIMATE, solve)
     }
@@ -187,7 +204,12 @@ impl Radiation {
     ) -> Self {
         let height = vehicle.dimensions.height;
         let levels = levels(vehicle);
-        let dry = Solved { mass: Matrix6::zeros(), damping: vec![Matrix6::zeros(); FREQUENCIES.len()] };
+        let still = SolvedWaves::damped(Matrix6::zeros());
+        let dry = Solved { mass: Matrix6::zeros(), waves: vec![still; FREQUENCIES.len()] };
+        let mut solve = |level: f64, clearance: Option<f64>| {
+            let solved = solve(level, clearance);
+            if vehicle.symmetric_left_right { solved.of_mirrored_hull() } else { solved }
+        };
         let mut table = |clearance: Option<f64>| {
             let wet: Vec<Solved> = levels[1..].iter().map(|level| solve(*level, clearance)).collect();
             std::iter::once(dry.clone()).chain(wet).collect::<Vec<_>>()
@@ -197,8 +219,9 @@ impl Radiation {
         let mesh = &vehicle.hull.mesh;
         let origin = crate::frame::Vec3::zeros();
         let afloat = crate::geometry::hydrostatics::float_depth(mesh, vehicle.z0, vehicle.mass);
-        let float_level = (vehicle.z0 + afloat).min(levels[STEPS]);
-        let row = levels[..STEPS].iter().position(|level| *level >= float_level).unwrap_or(STEPS);
+        let float_level = vehicle.z0 + afloat;
+        let off = |row: &usize| (levels[*row] - float_level).abs();
+        let row = (1..NODES).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(1);
         let raised = solve(levels[row], Some(RAISED * height));
         // what the bed adds falls as 1 / (1 + c / l)^2
         let heave = |solved: &Solved| solved.mass[(2, 2)];
@@ -208,11 +231,8 @@ impl Radiation {
         let bed_reach = RAISED * height / ((added.max(1e-12) / left).sqrt() - 1.0);
         let scale = unit_frequency(vehicle);
         let poles = best_poles(&deep[row], &FREQUENCIES.map(|x| x * scale), scale);
-        let whole = hydrostatics(mesh, &WaterPlane::level(1e3, 0.0), 1.0, &origin).displaced_volume;
-        let step = whole / STEPS as f64;
         let mut table = Self {
             source: source.to_owned(),
-            volume_step: step,
             poles,
             bed_reach,
             frequency: scale,
@@ -245,7 +265,6 @@ impl Radiation {
     /// The same table, whose numbers water can have.
     pub fn checked(self) -> Result<Self, RadiationError> {
         for (quantity, value) in [
-            ("volume_step_m3", self.volume_step),
             ("bed_reach_m", self.bed_reach),
             ("frequency_radps", self.frequency),
             ("frequency of oscillator 0", self.poles[0].frequency),
@@ -293,34 +312,54 @@ impl Radiation {
 fn nodes(solved: &[Solved], poles: &[Pole; POLES], frequencies: &[f64]) -> Vec<Node> {
     solved
         .iter()
-        .map(|row| Node { mass: not_negative(row.mass), gains: gains(row, poles, frequencies) })
+        .map(|row| Node { mass: not_negative(row.mass), gains: gains(&samples(row, poles, frequencies)) })
         .collect()
 }
 
+/// One equation of the fit: what a gain of one of each oscillator gives, and what was solved [N s/m over the density, and so on].
+///
+/// The damping is the real part of the memory at a frequency, the frequency times the added mass above that of infinite
+/// frequency its imaginary part.
+struct Sample {
+    response: [f64; POLES],
+    solved: Matrix6<f64>,
+}
+
+fn samples(solved: &Solved, poles: &[Pole; POLES], frequencies: &[f64]) -> Vec<Sample> {
+    let at = |(w, waves): (&f64, &SolvedWaves)| {
+        let response = poles.map(|pole| pole.response(*w));
+        let damping = Sample { response: response.map(|[_, damping]| damping), solved: waves.damping };
+        let mass = waves.mass.map(|mass| Sample {
+            response: response.map(|[mass, _]| mass * w),
+            solved: (mass - solved.mass) * *w,
+        });
+        std::iter::once(damping).chain(mass)
+    };
+    frequencies.iter().zip(&solved.waves).flat_map(at).collect()
+}
+
 /// Gains of least squares, made symmetric and not negative.
-fn gains(solved: &Solved, poles: &[Pole; POLES], frequencies: &[f64]) -> [Matrix6<f64>; POLES] {
-    let rows: Vec<[f64; POLES]> =
-        frequencies.iter().map(|w| std::array::from_fn(|m| poles[m].response(*w)[1])).collect();
+fn gains(samples: &[Sample]) -> [Matrix6<f64>; POLES] {
     // normal equations of two unknowns, by element
     let [mut aa, mut ab, mut bb] = [0.0; 3];
-    rows.iter().for_each(|[a, b]| {
+    for Sample { response: [a, b], .. } in samples {
         aa += a * a;
         ab += a * b;
         bb += b * b;
-    });
+    }
     let determinant = (aa * bb - ab * ab).max(1e-12 * aa * bb);
     let (mut first, mut second) = (Matrix6::zeros(), Matrix6::zeros());
-    for (row, damping) in rows.iter().zip(&solved.damping) {
-        first += damping * (row[0] * bb - row[1] * ab) / determinant;
-        second += damping * (row[1] * aa - row[0] * ab) / determinant;
+    for Sample { response: [a, b], solved } in samples {
+        first += solved * (a * bb - b * ab) / determinant;
+        second += solved * (b * aa - a * ab) / determinant;
     }
     // what one oscillator gives up to stay positive, the other takes over in part: once more with each alone
     let (first, second) = (not_negative(first), not_negative(second));
     let rest = |own: usize, other: &Matrix6<f64>| {
         let (mut sum, mut weight) = (Matrix6::zeros(), 0.0);
-        for (row, damping) in rows.iter().zip(&solved.damping) {
-            sum += (damping - other * row[1 - own]) * row[own];
-            weight += row[own] * row[own];
+        for Sample { response, solved } in samples {
+            sum += (solved - other * response[1 - own]) * response[own];
+            weight += response[own] * response[own];
         }
         not_negative(sum / weight)
     };
@@ -330,10 +369,12 @@ fn gains(solved: &Solved, poles: &[Pole; POLES], frequencies: &[f64]) -> [Matrix
     [first, second]
 }
 
-/// The two oscillators that describe the damping of a row best, each mode in units of its own largest value.
+/// The two oscillators that describe heave, roll and pitch of a row best, each in units of its own largest damping: those modes
+/// swing by themselves, where a fit that serves surge, sway and yaw too was a fifth off.
 fn best_poles(solved: &Solved, frequencies: &[f64], unit: f64) -> [Pole; POLES] {
-    let largest: [f64; 6] =
-        std::array::from_fn(|mode| solved.damping.iter().map(|b| b[(mode, mode)]).fold(1e-12, f64::max));
+    let largest: [f64; 6] = std::array::from_fn(|mode| {
+        solved.waves.iter().map(|w| w.damping[(mode, mode)]).fold(1e-12, f64::max)
+    });
     let candidates: Vec<Pole> = POLE_FREQUENCIES
         .iter()
         .flat_map(|x| POLE_DAMPINGS.map(|damping| Pole { frequency: x * unit, damping }))
@@ -342,15 +383,13 @@ fn best_poles(solved: &Solved, frequencies: &[f64], unit: f64) -> [Pole; POLES] 
     for (index, first) in candidates.iter().enumerate() {
         for second in candidates[index + 1..].iter().filter(|p| p.frequency > first.frequency) {
             let poles = [*first, *second];
-            let gains = gains(solved, &poles, frequencies);
-            let mut error = 0.0;
-            for (w, damping) in frequencies.iter().zip(&solved.damping) {
-                let fitted =
-                    (0..POLES).fold(Matrix6::zeros(), |sum, m| sum + gains[m] * poles[m].response(*w)[1]);
-                error += (0..6)
-                    .map(|mode| ((fitted - damping)[(mode, mode)] / largest[mode]).powi(2))
-                    .sum::<f64>();
-            }
+            let samples = samples(solved, &poles, frequencies);
+            let gains = gains(&samples);
+            let miss = |sample: &Sample| {
+                let fitted = gains[0] * sample.response[0] + gains[1] * sample.response[1] - sample.solved;
+                (2..5).map(|mode| (fitted[(mode, mode)] / largest[mode]).powi(2)).sum::<f64>()
+            };
+            let error = samples.iter().map(miss).sum();
             if error < best.1 {
                 best = (poles, error);
             }

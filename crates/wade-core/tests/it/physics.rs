@@ -341,15 +341,16 @@ fn decay(swing: &[f64], dt: f64) -> (f64, f64) {
     (third.0 - first.0, decrement / decrement.hypot(TAU))
 }
 
-/// Heave, roll and pitch of the Warthog from 5 cm and 3 degrees, with the estimate of its waves. The periods are capytaine's for
-/// 308 panels, and so are the damping ratios of radiation, to which drag adds.
+/// Heave, roll and pitch of the Warthog from 5 cm and 3 degrees, as it is shipped. The periods are capytaine's for 308 panels of
+/// another mesh, and so are the damping ratios of radiation, to which drag adds.
 #[test]
-fn a_floating_hull_that_is_let_go_swings_nearly_as_the_panel_method_says() {
-    let subject = shipped("warthog");
+fn a_floating_hull_that_is_let_go_swings_as_the_panel_method_says() {
+    let subject = shipped("warthog, trained");
     let mut out = BaseLoads::default();
     for (mode, period, ratios) in [(2, 1.43, [0.17, 0.38]), (3, 1.33, [0.014, 0.1]), (4, 1.40, [0.05, 0.15])]
     {
         let mut run = afloat(subject);
+        run.bed = Some(-100.0);
         if mode == 2 {
             run.height += 0.05;
         } else {
@@ -363,14 +364,14 @@ fn a_floating_hull_that_is_let_go_swings_nearly_as_the_panel_method_says() {
             })
             .collect();
         let (found, ratio) = decay(&swing, dt);
-        assert!((found / period - 1.0).abs() < 0.2, "mode {mode}: {found} s");
+        assert!((found / period - 1.0).abs() < 0.1, "mode {mode}: {found} s");
         assert!(ratio > ratios[0] / 1.5 && ratio < ratios[1] * 1.5, "mode {mode}: {ratio}");
     }
 }
 
 #[test]
 fn a_hull_that_is_held_across_a_current_stays_where_it_is() {
-    let subject = shipped("warthog");
+    let subject = shipped("warthog, trained");
     let mut out = BaseLoads::default();
     for speed in [1.0, 1.5, 2.0] {
         let mut run = afloat(subject);
@@ -386,7 +387,7 @@ fn a_hull_that_is_held_across_a_current_stays_where_it_is() {
             run.nu[5] = 0.0;
             moved = moved.max((run.height - at).abs());
             tilt = tilt.max((run.attitude * Vec3::z()).z.clamp(-1.0, 1.0).acos());
-            if step > 10_000 {
+            if step > 12_500 {
                 late = [late[0].min(run.height), late[1].max(run.height)];
             }
         }

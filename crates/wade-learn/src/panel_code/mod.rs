@@ -1,5 +1,7 @@
 //! Added mass and waves of a hull by capytaine, a boundary-element code for linear waves in Python.
 
+mod net;
+
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -7,9 +9,8 @@ use std::process::{Command, Stdio};
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use wade_core::physics::elements::elements;
-use wade_core::physics::panel::{Basin, Panel, impulse, wet_panels, without_gaps};
-use wade_core::physics::radiation::{Radiation, Solved, frequencies};
+use wade_core::physics::panel::{Basin, Panel, impulse};
+use wade_core::physics::radiation::{Radiation, Solved, SolvedWaves, frequencies};
 use wade_core::vehicle::Vehicle;
 
 /// How to get it.
@@ -19,14 +20,15 @@ const HOW_TO_INSTALL: &str = "`python3 -m pip install capytaine==3.0.0 trimesh m
 /// What solves a case: JSON in, a line of JSON a case out.
 const SCRIPT: &str = include_str!("solve.py");
 
-/// Most that an added mass may differ from its transpose, over its norm [-]. Panels that are sound come to 1 to 3 %.
-const MOST_SKEW: f64 = 0.1;
+/// Most that an added mass may differ from its transpose, over its norm [-]: ten times what sound panels come to.
+const MOST_SKEW: f64 = 0.03;
 
-/// Factor from the estimate to which an added mass is believed [-]: the estimate is within 1.3 of panels that resolve the hull.
-const FARTHEST: f64 = 1.6;
+/// Factor to which two solvers must agree on the added mass of the same panels [-]: `wade_core::physics::panel` has the
+/// velocities of a grid of points a panel where capytaine integrates, and is within a tenth of it for sound panels.
+const FARTHEST: f64 = 1.3;
 
-/// Most panels of a hull: a case then takes seconds.
-const PANELS: usize = 400;
+/// Most panels of a hull: a table takes minutes, and twice as many change its heave by a tenth.
+const PANELS: usize = 800;
 
 /// The Python that has capytaine.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,6 +58,16 @@ pub enum PanelCodeError {
         cases: usize,
         /// The last line that it wrote to its standard error.
         reason: String,
+    },
+    /// The hull has no panels that describe it.
+    #[error(
+        "at a water level of {level:.3} m (over the body origin): {fault}; the bundle keeps the table it has"
+    )]
+    Unresolved {
+        /// Level of the case [m].
+        level: f64,
+        /// How far off they are.
+        fault: net::Unresolved,
     },
     /// It answers for panels that it cannot solve.
     #[error(
@@ -87,7 +99,7 @@ struct Task {
 struct Case {
     level: f64,
     depth: Option<f64>,
-    panels: Vec<[[f64; 3]; 4]>,
+    panels: Vec<net::Panel>,
 }
 
 #[derive(Deserialize)]
@@ -95,8 +107,17 @@ struct Case {
 struct Answer {
     #[serde(rename = "case")]
     _case: usize,
+    /// Of infinite frequency.
     mass: [[f64; 6]; 6],
-    damping: Vec<[[f64; 6]; 6]>,
+    waves: Vec<Waves>,
+}
+
+/// At a frequency.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Waves {
+    mass: [[f64; 6]; 6],
+    damping: [[f64; 6]; 6],
 }
 
 impl Capytaine {
@@ -124,25 +145,29 @@ impl Capytaine {
         vehicle: &Vehicle,
         progress: &dyn Fn(usize, usize),
     ) -> Result<Radiation, PanelCodeError> {
-        let elements = elements(vehicle, PANELS);
-        let mut cases = Vec::new();
+        let mut asked = Vec::new();
         // what is asked for, in order; the answers are not used
         Radiation::from_solved(vehicle, "", |level, clearance| {
-            let bed = clearance.map(|clearance| vehicle.z0 - clearance);
-            cases.push(Case {
-                level,
-                depth: bed.map(|bed| level - bed),
-                panels: without_gaps(wet_panels(&elements, level)).iter().map(Panel::corners).collect(),
-            });
-            Solved { mass: Matrix6::identity(), damping: vec![Matrix6::zeros(); frequencies(vehicle).len()] }
+            asked.push((level, clearance));
+            Solved {
+                mass: Matrix6::identity(),
+                waves: vec![SolvedWaves::damped(Matrix6::zeros()); frequencies(vehicle).len()],
+            }
         });
+        let cases = asked.into_iter().map(|(level, clearance)| {
+            let bed = clearance.map(|clearance| vehicle.z0 - clearance);
+            let panels = net::wet_panels(&vehicle.hull.mesh, level, PANELS)
+                .map_err(|fault| PanelCodeError::Unresolved { level, fault })?;
+            Ok(Case { level, depth: bed.map(|bed| level - bed), panels })
+        });
+        let cases = cases.collect::<Result<Vec<Case>, PanelCodeError>>()?;
         let count = cases.len();
         let task = Task { cases, frequencies: frequencies(vehicle).to_vec() };
         let solved = self.solve(&task, count, progress)?;
         for (case, solved) in task.cases.iter().zip(&solved) {
             let basin = Basin { level: case.level, bed: case.depth.map(|depth| case.level - depth) };
-            let estimate = impulse(&wet_panels(&elements, case.level), &basin).mass;
-            if let Some(reason) = unsound(&solved.mass, &estimate) {
+            let panels: Vec<Panel> = case.panels.iter().map(Panel::from_corners).collect();
+            if let Some(reason) = unsound(&solved.mass, &impulse(&panels, &basin).mass) {
                 return Err(PanelCodeError::Unsound { level: case.level, reason });
             }
         }
@@ -177,7 +202,14 @@ impl Capytaine {
                 let matrix = |rows: &[[f64; 6]; 6]| Matrix6::from_fn(|i, j| rows[i][j]);
                 solved.push(Solved {
                     mass: matrix(&answer.mass),
-                    damping: answer.damping.iter().map(matrix).collect(),
+                    waves: answer
+                        .waves
+                        .iter()
+                        .map(|waves| SolvedWaves {
+                            mass: Some(matrix(&waves.mass)),
+                            damping: matrix(&waves.damping),
+                        })
+                        .collect(),
                 });
                 progress(solved.len(), count);
             }
@@ -191,17 +223,22 @@ impl Capytaine {
     }
 }
 
-/// Why a matrix is no added mass: that of water is symmetric, positive and of the size that the estimate has.
-fn unsound(mass: &Matrix6<f64>, estimate: &Matrix6<f64>) -> Option<String> {
+/// Why a matrix is no added mass: that of water is symmetric, positive and of the size that another solver finds.
+fn unsound(mass: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<String> {
     let skew = (mass - mass.transpose()).norm() / mass.norm().max(f64::MIN_POSITIVE);
     if skew > MOST_SKEW {
         return Some(format!("it is not symmetric by {:.0} %", 100.0 * skew));
     }
     let modes = ["surge", "sway", "heave", "roll", "pitch", "yaw"];
     (0..6).find_map(|mode| {
-        let times = mass[(mode, mode)] / estimate[(mode, mode)];
+        let times = mass[(mode, mode)] / other[(mode, mode)];
         let is_sound = (1.0 / FARTHEST..FARTHEST).contains(&times);
-        (!is_sound).then(|| format!("in {} it has {times:.2} times the estimate", modes[mode]))
+        (!is_sound).then(|| {
+            format!(
+                "in {} it has {times:.2} times what wade's own solver finds for the same panels",
+                modes[mode]
+            )
+        })
     })
 }
 

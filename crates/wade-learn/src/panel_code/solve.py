@@ -1,7 +1,8 @@
 """Added mass and damping of panels by capytaine: JSON in from standard input, JSON out, a line of progress a solution.
 
 In: {"cases": [{"level": m, "depth": m or null, "panels": [[[x, y, z] * 4] ...]}], "frequencies": [rad/s]}; body frame.
-Out: a line {"case": i, "mass": [[6] * 6], "damping": [[[6] * 6] a frequency]} a case, about the body origin, density 1.
+Out: a line {"case": i, "mass": [[6] * 6], "waves": [{"mass": [[6] * 6], "damping": [[6] * 6]} a frequency]} a case, the
+first mass of infinite frequency; about the body origin, density 1.
 """
 
 import json
@@ -40,8 +41,11 @@ def main():
     solver = capytaine.BEMSolver()
     for index, case in enumerate(task["cases"]):
         mass, _ = solved(solver, case, numpy.inf)
-        damping = [solved(solver, case, frequency)[1].tolist() for frequency in task["frequencies"]]
-        print(json.dumps({"case": index, "mass": mass.tolist(), "damping": damping}), flush=True)
+        waves = []
+        for frequency in task["frequencies"]:
+            own, damping = solved(solver, case, frequency)
+            waves.append({"mass": own.tolist(), "damping": damping.tolist()})
+        print(json.dumps({"case": index, "mass": mass.tolist(), "waves": waves}), flush=True)
 
 
 main()
