@@ -51,6 +51,25 @@ pub struct Drag {
     half_length: f64,
     half_width: f64,
     length: f64,
+    instructions: Instructions,
+}
+
+/// What the sums are compiled for: wider registers, the same operations in the same order and so the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Instructions {
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    Portable,
+}
+
+impl Instructions {
+    fn fastest() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            return Self::Avx2;
+        }
+        Self::Portable
+    }
 }
 
 type Lane = [f64; LANES];
@@ -117,6 +136,7 @@ impl Drag {
             half_length: 0.5 * vehicle.dimensions.length,
             half_width: 0.5 * vehicle.dimensions.width,
             length: vehicle.dimensions.length,
+            instructions: Instructions::fastest(),
         }
     }
 
@@ -140,6 +160,23 @@ impl Drag {
         out: &mut [SurfaceDrag],
     ) {
         let flow = self.flow(plane, condition);
+        match self.instructions {
+            // SAFETY: `Instructions::fastest` found that this CPU has them.
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code, reason = "a call that needs a CPU feature; the sums are plain Rust")]
+            Instructions::Avx2 => unsafe { self.sum_avx2(&flow, condition, wheel_speeds, out) },
+            Instructions::Portable => self.sum(&flow, condition, wheel_speeds, out),
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn sum_avx2(&self, flow: &Flow, condition: &Condition, wheel_speeds: &[f64], out: &mut [SurfaceDrag]) {
+        self.sum(flow, condition, wheel_speeds, out);
+    }
+
+    #[inline(always)]
+    fn sum(&self, flow: &Flow, condition: &Condition, wheel_speeds: &[f64], out: &mut [SurfaceDrag]) {
         for (surface, out) in out.iter_mut().enumerate() {
             let [from, to] = self.ranges[surface];
             let speed = wheel_speeds[surface];
@@ -152,7 +189,7 @@ impl Drag {
                 [speed, center.x, center.z, lugs]
             });
             for block in &self.blocks[from..to] {
-                block.add(&flow, rim, &mut sums);
+                block.add(flow, rim, &mut sums);
             }
             *out = sums.finish();
         }
@@ -284,6 +321,40 @@ impl Block {
             sums.moment[1][i] += z * fx - x * fz;
             sums.moment[2][i] += x * fy - y * fx;
             sums.power[i] -= fx * skin[0] + fz * skin[1];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitVector3;
+
+    use super::super::elements::{COUNT, elements};
+    use super::*;
+    use crate::vehicle::shipped;
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let vehicle = shipped::husky().expect("sound").vehicle().expect("sound");
+        let fast = Drag::new(&vehicle, &elements(&vehicle, COUNT));
+        let plain = Drag { instructions: Instructions::Portable, ..fast.clone() };
+        let mut loads = [0, 1].map(|_| vec![SurfaceDrag::default(); vehicle.surfaces.len()]);
+        let mut speeds = vec![f64::NAN; vehicle.surfaces.len()];
+        if let Some(wheel) = vehicle.surfaces.iter().position(|s| s.kind == SurfaceKind::Wheel) {
+            speeds[wheel] = 7.0;
+        }
+        for i in 0..200 {
+            let turn = f64::from(i);
+            let state = Condition {
+                angular_velocity: Vec3::new(turn.sin(), (2.0 * turn).cos(), (3.0 * turn).sin()),
+                up: UnitVector3::new_normalize(Vec3::new((0.7 * turn).sin(), (0.3 * turn).cos(), 0.4)),
+                water_level: Some(0.2 * (0.9 * turn).sin()),
+                ..Condition::level(Vec3::new(turn.cos(), (5.0 * turn).sin(), (4.0 * turn).cos()), 0.0)
+            };
+            let plane = state.water_plane(vehicle.z0);
+            fast.evaluate(&plane, &state, &speeds, &mut loads[0]);
+            plain.evaluate(&plane, &state, &speeds, &mut loads[1]);
+            assert_eq!(loads[0], loads[1]);
         }
     }
 }
