@@ -24,7 +24,7 @@ FIGURE = ROOT / "tests" / "data" / "wading.svg"
 
 SEED = 7
 TRIALS = 24
-DURATION_S = 4.0
+DURATION_S = 6.0
 STEP_S = 0.05
 DEPTHS_M = [0.11, 0.15, 0.19]
 # up the stream and down
@@ -44,7 +44,7 @@ class Motion:
         self.depth = DEPTHS_M[index % len(DEPTHS_M)]
         self.heading = HEADINGS_RAD[index % len(HEADINGS_RAD)]
         self.mean = rng.uniform(0.4, 0.6)
-        self.wave = (rng.uniform(0.07, 0.15), rng.uniform(0.5, 0.9), rng.uniform(0.0, math.tau))
+        self.wave = (rng.uniform(0.07, 0.15), rng.uniform(0.3, 0.6), rng.uniform(0.0, math.tau))
 
     def speed(self, t):
         size, rate, phase = self.wave

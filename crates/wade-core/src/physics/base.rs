@@ -53,10 +53,13 @@ pub struct Memory {
     rate: Option<Vector6<f64>>,
     /// The states are of a recording.
     recorded: bool,
+    /// Time has passed.
+    begun: bool,
 }
 
 impl Memory {
-    /// Of a recording: its accelerations are those that the body had, not those that a loop goes on from.
+    /// Of a recording: its accelerations are those that the body had, not those that a loop goes on from, and its motion was
+    /// steady before it begins.
     pub fn of_recording() -> Self {
         Self { recorded: true, ..Self::default() }
     }
@@ -426,7 +429,12 @@ struct NearBed {
 impl Memory {
     /// Moves on by a time step under a push that is constant meanwhile, exactly.
     fn advance(&mut self, poles: &[Pole; POLES], push: &[Vector6<f64>; POLES], dt: f64) {
+        let begins_in_motion = self.recorded && !self.begun;
+        self.begun = true;
         for ((pole, push), [output, integral]) in poles.iter().zip(push).zip(&mut self.waves) {
+            if begins_in_motion {
+                *integral = push / pole.frequency.powi(2);
+            }
             let decay = pole.damping * pole.frequency;
             let swing = pole.frequency * (1.0 - pole.damping * pole.damping).sqrt();
             // q'' + 2 zeta w q' + w^2 q = u about its resting place

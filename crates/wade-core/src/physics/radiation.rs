@@ -222,13 +222,14 @@ impl Radiation {
         let float_level = vehicle.z0 + afloat;
         let off = |row: &usize| (levels[*row] - float_level).abs();
         let row = (1..NODES).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(1);
-        let raised = solve(levels[row], Some(RAISED * height));
-        // what the bed adds falls as 1 / (1 + c / l)^2
+        // what the bed adds falls as 1 / (1 + c / l)^2; measured a row below afloat, where every bottom is wet. The levels that are
+        // asked for must not depend on the answers
         let heave = |solved: &Solved| solved.mass[(2, 2)];
-        let added = heave(&standing[row]) - heave(&deep[row]);
-        let left =
-            (heave(&raised) - heave(&deep[row])).clamp(0.01 * added.max(1e-12), 0.9 * added.max(1e-12));
-        let bed_reach = RAISED * height / ((added.max(1e-12) / left).sqrt() - 1.0);
+        let under = (row + 1).min(NODES - 1);
+        let raised = solve(levels[under], Some(RAISED * height));
+        let added = (heave(&standing[under]) - heave(&deep[under])).max(1e-12);
+        let left = (heave(&raised) - heave(&deep[under])).clamp(0.01 * added, 0.9 * added);
+        let bed_reach = RAISED * height / ((added / left).sqrt() - 1.0);
         let scale = unit_frequency(vehicle);
         let poles = best_poles(&deep[row], &FREQUENCIES.map(|x| x * scale), scale);
         let mut table = Self {

@@ -395,3 +395,27 @@ fn a_hull_that_is_held_across_a_current_stays_where_it_is() {
         assert!(late[1] - late[0] < 1e-3, "{speed} m/s: it heaves by itself");
     }
 }
+
+#[test]
+fn a_recording_that_begins_in_motion_was_in_motion_before() {
+    let subject = shipped("husky, trained");
+    let state = Condition::level(Vec3::new(0.8, 0.3, 0.0), 0.15);
+    let mut out = BaseLoads::default();
+    let mut loads = |memory: &mut Memory| -> Vec<Vec3> {
+        let motion = Motion {
+            wheel_speeds: &NO_WHEELS,
+            time_step: 0.01,
+            implicit_added_mass: true,
+            physics: Physics::Full,
+        };
+        let mut load = || {
+            subject.base.evaluate(&state, &motion, Some(memory), &mut out);
+            out.hull.force
+        };
+        (0..2_000).map(|_| load()).collect()
+    };
+    let [recorded, started] =
+        [Memory::of_recording(), Memory::default()].map(|mut memory| loads(&mut memory));
+    assert!((recorded[0] - recorded[1_999]).norm() < 1e-9, "{:?}", recorded[0]);
+    assert!((started[0] - started[1_999]).norm() > 0.1, "a hull that is set going makes waves");
+}

@@ -165,9 +165,12 @@ impl Capytaine {
         let task = Task { cases, frequencies: frequencies(vehicle).to_vec() };
         let solved = self.solve(&task, count, progress)?;
         for (case, solved) in task.cases.iter().zip(&solved) {
-            let basin = Basin { level: case.level, bed: case.depth.map(|depth| case.level - depth) };
-            let panels: Vec<Panel> = case.panels.iter().map(Panel::from_corners).collect();
-            if let Some(reason) = unsound(&solved.mass, &impulse(&panels, &basin).mass) {
+            // next to the bed wade's own solver is the rougher one
+            let deep = case.depth.is_none().then(|| {
+                let panels: Vec<Panel> = case.panels.iter().map(Panel::from_corners).collect();
+                impulse(&panels, &Basin { level: case.level, bed: None }).mass
+            });
+            if let Some(reason) = unsound(&solved.mass, deep.as_ref()) {
                 return Err(PanelCodeError::Unsound { level: case.level, reason });
             }
         }
@@ -224,15 +227,15 @@ impl Capytaine {
 }
 
 /// Why a matrix is no added mass: that of water is symmetric, positive and of the size that another solver finds.
-fn unsound(mass: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<String> {
+fn unsound(mass: &Matrix6<f64>, other: Option<&Matrix6<f64>>) -> Option<String> {
     let skew = (mass - mass.transpose()).norm() / mass.norm().max(f64::MIN_POSITIVE);
     if skew > MOST_SKEW {
         return Some(format!("it is not symmetric by {:.0} %", 100.0 * skew));
     }
     let modes = ["surge", "sway", "heave", "roll", "pitch", "yaw"];
     (0..6).find_map(|mode| {
-        let times = mass[(mode, mode)] / other[(mode, mode)];
-        let is_sound = (1.0 / FARTHEST..FARTHEST).contains(&times);
+        let times = other.map_or(1.0, |other| mass[(mode, mode)] / other[(mode, mode)]);
+        let is_sound = mass[(mode, mode)] > 0.0 && (1.0 / FARTHEST..FARTHEST).contains(&times);
         (!is_sound).then(|| {
             format!(
                 "in {} it has {times:.2} times what wade's own solver finds for the same panels",
