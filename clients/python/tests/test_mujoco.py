@@ -107,7 +107,7 @@ def test_a_push_dies_out(client: wade.ShmClient) -> None:
 
 
 def test_it_comes_to_the_speed_of_the_current(client: wade.ShmClient) -> None:
-    track = wading.run(client, afloat(), duration_s=6.0, current=(0.5, 0.0, 0.0))
+    track = wading.run(client, afloat(), duration_s=8.0, current=(0.5, 0.0, 0.0))
     speeds = speed(track)
     # quadratic drag: it lags behind as 1 / (1 + t / T)
     assert np.diff(speeds).min() > -0.01
