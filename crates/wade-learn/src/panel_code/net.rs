@@ -209,6 +209,8 @@ fn displaced(panels: &[Panel], level: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use std::collections::HashMap;
 
     use wade_core::geometry::mesh::Bounds;
