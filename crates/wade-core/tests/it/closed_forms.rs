@@ -18,7 +18,7 @@ use wade_core::physics::{Base, BaseLoads, Memory};
 use wade_core::vehicle::{SurfaceKind, Vehicle};
 
 use crate::bodies::{body, radiation};
-use crate::release::Release;
+use crate::release::{Release, turns};
 
 /// As in `Radiation::estimate`.
 const ELEMENTS: usize = 600;
@@ -225,9 +225,7 @@ fn half_a_sphere_that_is_let_go_heaves_as_in_theory() {
             run.height
         })
         .collect();
-    let turns: Vec<usize> = (1..swing.len() - 1)
-        .filter(|&i| (swing[i] - swing[i - 1]) * (swing[i + 1] - swing[i]) < 0.0)
-        .collect();
+    let turns: Vec<usize> = turns(&swing).collect();
     let stroke = |turn: usize| (swing[turns[turn + 1]] - swing[turns[turn]]).abs();
     let period = (turns[4] - turns[0]) as f64 * dt / 2.0;
     assert_near("period", period, TAU / (1.055 * GRAVITY).sqrt(), 0.05); // -4.7 %

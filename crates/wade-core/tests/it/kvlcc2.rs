@@ -19,7 +19,7 @@ use wade_core::physics::{Base, BaseLoads, Memory};
 use wade_core::vehicle::{SurfaceKind, Vehicle};
 
 use crate::bodies::{body, radiation};
-use crate::release::Release;
+use crate::release::{Release, turns};
 
 /// Of the model [m]; of the ship 320.0, 58.0, 20.8 and 30.0, its radii of inertia 23.2 and 80.0, KG
 /// 18.6 and GM 5.73.
@@ -146,12 +146,7 @@ fn swings(vehicle: &Vehicle, base: &Base, afloat: f64, heel: f64) -> Vec<[f64; 3
             run.attitude.scaled_axis().x
         })
         .collect();
-    let extremes: Vec<(f64, f64)> = roll
-        .windows(3)
-        .enumerate()
-        .filter(|(_, w)| (w[1] - w[0]) * (w[2] - w[1]) < 0.0)
-        .map(|(i, w)| (i as f64 * dt, w[1]))
-        .collect();
+    let extremes: Vec<(f64, f64)> = turns(&roll).map(|i| (i as f64 * dt, roll[i])).collect();
     let halves: Vec<(f64, f64)> = extremes
         .windows(2)
         .map(|pair| (0.5 * (pair[0].0 + pair[1].0), 0.5 * (pair[0].1 - pair[1].1).abs()))

@@ -16,7 +16,7 @@ use wade_core::wrench::Wrench;
 use crate::bodies::{bodies, radiation};
 use crate::common::{VEHICLES, model};
 use crate::random::Random;
-use crate::release::Release;
+use crate::release::{Release, turns};
 
 const STATES: usize = 100_000;
 
@@ -332,10 +332,7 @@ fn afloat(subject: &Subject) -> Release<'_> {
 /// Period [s] and damping ratio of a swing about its last value, by its extremes.
 fn decay(swing: &[f64], dt: f64) -> (f64, f64) {
     let rest = swing[swing.len() - 1];
-    let extremes: Vec<(f64, f64)> = (1..swing.len() - 1)
-        .filter(|&i| (swing[i] - swing[i - 1]) * (swing[i + 1] - swing[i]) < 0.0)
-        .map(|i| (i as f64 * dt, (swing[i] - rest).abs()))
-        .collect();
+    let extremes: Vec<(f64, f64)> = turns(swing).map(|i| (i as f64 * dt, (swing[i] - rest).abs())).collect();
     let (first, third) = (extremes[0], extremes[2]);
     let decrement = (first.1 / third.1).ln();
     (third.0 - first.0, decrement / decrement.hypot(TAU))

@@ -10,6 +10,11 @@ use wade_core::wrench::Wrench;
 
 use crate::random::Random;
 
+/// Indices at which a series turns back.
+pub fn turns(series: &[f64]) -> impl Iterator<Item = usize> {
+    (1..series.len() - 1).filter(|&i| (series[i] - series[i - 1]) * (series[i + 1] - series[i]) < 0.0)
+}
+
 /// A body in water whose surface is the world's z = 0.
 pub struct Release<'a> {
     pub vehicle: &'a Vehicle,
