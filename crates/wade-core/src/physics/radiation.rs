@@ -231,14 +231,15 @@ impl Radiation {
         let left = (heave(&raised) - heave(&deep[under])).clamp(0.01 * added, 0.9 * added);
         let bed_reach = RAISED * height / ((added / left).sqrt() - 1.0);
         let scale = unit_frequency(vehicle);
-        let poles = best_poles(&deep[row], &FREQUENCIES.map(|x| x * scale), scale);
+        let frequencies = frequencies(vehicle);
+        let poles = best_poles(&deep[row], &frequencies, scale);
         let mut table = Self {
             source: source.to_owned(),
             poles,
             bed_reach,
             frequency: scale,
-            deep: nodes(&deep, &poles, &FREQUENCIES.map(|x| x * scale)),
-            standing: nodes(&standing, &poles, &FREQUENCIES.map(|x| x * scale)),
+            deep: nodes(&deep, &poles, &frequencies),
+            standing: nodes(&standing, &poles, &frequencies),
         };
         let masses = [&table.deep, &table.standing].map(|rows| rows.iter().map(|row| row.mass).collect());
         let [deep, standing] = rising(masses);
