@@ -26,6 +26,11 @@ use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::model::kernel::Isa;
 use wade_core::model::network::WIDTH;
 use wade_core::model::{Model, Workspace};
+use wade_core::physics::base::{BaseLoads, Motion};
+use wade_core::physics::{Physics, STATED_NONE};
+
+/// Water levels of the base's rows, from below the hull to over its middle.
+const BASE_STATES: usize = 16;
 
 fn vehicles() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vehicles")
@@ -238,12 +243,46 @@ fn parts(vehicle: &str) -> Vec<Subject> {
         };
         subjects.push((Row::new(format!("{vehicle} submergence {name}"), 0), Box::new(work)));
     }
+    subjects.extend(base(vehicle));
     let work = move || {
         let vehicle = model.vehicle();
         black_box(hydrostatics(&vehicle.hull.mesh, black_box(&level), 1000.0, &vehicle.center_of_mass));
     };
     subjects.push((Row::new(format!("{vehicle} exact hydrostatics"), 0), Box::new(work)));
     subjects
+}
+
+/// The physical base alone, with rates and added mass, in water level and tilted by an angle [deg].
+fn base(vehicle: &str) -> impl Iterator<Item = Subject> {
+    ["level", "tilted by 5", "tilted by 10", "on its side"].into_iter().zip([0.0, 5.0, 10.0, 90.0]).map(
+        move |(name, angle): (&str, f64)| {
+            let model = model(vehicle, Isa::available()[0]);
+            let tilt = angle.to_radians() / std::f64::consts::SQRT_2;
+            let height = model.vehicle().dimensions.height;
+            let states: Vec<Condition> = (0..BASE_STATES)
+                .map(|i| Condition {
+                    angular_velocity: Vec3::new(0.1, -0.2, 0.3),
+                    up: up_from_roll_pitch(tilt, tilt),
+                    water_level: Some((i as f64 / BASE_STATES as f64 - 0.5) * height),
+                    ..Condition::level(Vec3::new(0.6, 0.2, -0.1), 0.0)
+                })
+                .collect();
+            let surfaces = model.vehicle().surfaces.len();
+            let mut loads = BaseLoads::with_capacity(surfaces);
+            let work = move || {
+                let motion = Motion {
+                    wheel_speeds: &STATED_NONE[..surfaces],
+                    time_step: 0.0,
+                    implicit_added_mass: true,
+                    physics: Physics::Full,
+                };
+                let base = model.base().expect("the shipped bundles have one");
+                states.iter().for_each(|state| base.evaluate(black_box(state), &motion, None, &mut loads));
+                black_box(&loads);
+            };
+            (Row::new(format!("{vehicle} {BASE_STATES} levels of the base {name}"), 0), Box::new(work) as _)
+        },
+    )
 }
 
 fn main() {

@@ -16,6 +16,7 @@ pub mod digest;
 pub mod domain;
 pub mod forces;
 pub mod frame;
+mod lanes;
 mod named_enum;
 pub mod wrench;
 

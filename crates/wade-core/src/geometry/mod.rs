@@ -3,9 +3,10 @@
 //! Everything here is in SI units; after `vehicle::build` it is in the body frame as well.
 //! Reading order: `mesh` and `stl` (triangles in and out), `parts`, `tidy`, `watertight` and `seal` (refuse or repair), `surfaces`
 //! (named patches), `immersion` and `hydrostatics` (clipping at the water plane, pressure), `submergence` (samples),
-//! `wetting` (pressure and wet area in the time of a query), `distance` (signed distance grid), `parametric` (closed parts by formula).
+//! `flats` and `wetting` (pressure and wet area in the time of a query), `distance` (signed distance grid), `parametric` (closed parts by formula).
 
 pub mod distance;
+mod flats;
 pub mod hydrostatics;
 pub mod immersion;
 pub mod mesh;

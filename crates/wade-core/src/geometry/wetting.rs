@@ -1,7 +1,7 @@
 //! What the water reaches on each surface, exactly and in the time of a query: pressure load, wet area and where it is.
 //!
-//! The load of a wholly wet face is linear in the water plane, so the faces that lie below the waterline for sure enter
-//! as one prefix sum; only faces that the surface may cross are clipped. On level water even that is known beforehand:
+//! The load of a wholly wet face is linear in the water plane, so a tree of boxes over the faces holds such terms for each box;
+//! only faces in boxes that the surface crosses are clipped, some in lock step. On level water even that is known beforehand:
 //! between two levels at which a vertex gets wet or soaked every quantity is a polynomial of the water level of degree four
 //! at most, so each such interval stores one.
 //!
@@ -11,19 +11,27 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::immersion::{Corner, cut, depth_moments};
+use super::flats::merged;
 use super::surfaces::Hull;
 use crate::frame::{Vec3, WaterPlane};
+use crate::lanes::{Instructions, run_for};
 use crate::wrench::Wrench;
 
-/// Room for rounding of a height [m].
-const ROOM: f64 = 1e-9;
 /// Intervals of level water that are stored for all surfaces together; a finer hull is clipped at every query.
 const MOST_INTERVALS: usize = 40_000;
 /// Heights closer than this are one [m]: a polynomial over less would be rounding.
 const LEAST_INTERVAL: f64 = 1e-6;
-/// Faces that are passed over together where the water does not reach them.
-const BLOCK: usize = 8;
+/// Faces that are clipped in lock step.
+const LANES: usize = 8;
+const THIRD: f64 = 1.0 / 3.0;
+const TWELFTH: f64 = 1.0 / 12.0;
+/// Room for rounding of a length [m].
+const ROOM: f64 = 1e-9;
+/// Weights of a box's extent along the body's axes: a vehicle mostly stands within 10 degrees of upright, where a plane reaches
+/// over 0.2 of a box's length.
+const UPRIGHT: Vec3 = Vec3::new(0.2, 0.2, 1.0);
+/// Faces of the smallest boxes, at most.
+const LEAF: usize = 4;
 /// Coefficients of a polynomial: degree four.
 const TERMS: usize = 5;
 /// Quantities of a surface: force, moment, wet area, soaked area and its first moment.
@@ -50,14 +58,6 @@ impl Wetting {
         (self.soaked_area > 0.0).then(|| self.soaked_moment / self.soaked_area)
     }
 
-    fn add(&mut self, face: &Face, wet: &Below, soaked: &Below) {
-        self.pressure.force -= face.normal * wet.depth;
-        self.pressure.moment -= wet.moment.cross(&face.normal);
-        self.area += wet.area;
-        self.soaked_area += (wet.depth - soaked.depth) * FILM.recip();
-        self.soaked_moment += (wet.moment - soaked.moment) * FILM.recip();
-    }
-
     fn values(&self) -> [f64; QUANTITIES] {
         let (f, m, s) = (self.pressure.force, self.pressure.moment, self.soaked_moment);
         [f.x, f.y, f.z, m.x, m.y, m.z, self.area, self.soaked_area, s.x, s.y, s.z]
@@ -69,24 +69,34 @@ impl Wetting {
     }
 }
 
+type Lane = [f64; LANES];
+
 /// A hull prepared for [`WettingTable::wetting_into`]; body frame.
 #[derive(Debug, Clone)]
 pub struct WettingTable {
     surfaces: Vec<SurfaceTable>,
+    instructions: Instructions,
 }
 
-/// Faces by rising top, so that the wet ones come first.
+/// A tree of boxes in the order of a walk through it, each before what it holds.
 #[derive(Debug, Clone)]
 struct SurfaceTable {
     faces: Vec<Face>,
-    tops: Vec<f64>,
-    /// One a block of faces.
-    bottoms: Vec<f64>,
-    x_range: [f64; 2],
-    y_range: [f64; 2],
-    /// Over the first k faces.
-    prefix: Vec<Terms>,
+    boxes: Vec<Node>,
+    /// Over the faces of each box.
+    terms: Vec<Terms>,
     level: Option<LevelTable>,
+}
+
+/// Box around faces that stand side by side.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    center: Vec3,
+    half: Vec3,
+    /// The box after all that this one holds.
+    next: usize,
+    /// From, to; none where smaller boxes follow.
+    faces: [usize; 2],
 }
 
 /// Polynomials over the intervals between the levels at which a surface's vertices get wet and soaked.
@@ -105,15 +115,26 @@ struct Face {
     area: f64,
 }
 
-/// What a face has below the surface, the depth being that of its corners.
-#[derive(Debug, Clone, Copy, Default)]
-struct Below {
-    area: f64,
-    /// Integral of the depth [m3].
-    depth: f64,
-    /// Integral of the depth times the position [m4].
-    moment: Vec3,
+/// Faces of which the water may reach a part, collected to be clipped in lock step.
+#[derive(Default)]
+struct Clipping {
+    count: usize,
+    surfaces: [usize; LANES],
+    faces: Faces,
+    values: [Lane; QUANTITIES],
 }
+
+/// Faces in lock step with the depths of their corners; lanes without a face have no area.
+#[derive(Default)]
+struct Faces {
+    corners: [[Lane; 3]; 3],
+    depths: [Lane; 3],
+    normal: [Lane; 3],
+    area: Lane,
+}
+
+/// Of one face below one plane: area, integrals of the depth [m3] and of depth times position [m4].
+type Below = (f64, f64, [f64; 3]);
 
 /// What a wet face contributes besides the plane `n . x = c`:
 /// force `-(c S - T n)`, moment about the origin `-(c P - U n)`.
@@ -137,102 +158,156 @@ impl WettingTable {
     /// Prepares the hull of a vehicle with `count` surfaces.
     pub fn new(hull: &Hull, count: usize) -> Self {
         let mut surfaces: Vec<SurfaceTable> = (0..count).map(|s| SurfaceTable::new(hull, s)).collect();
-        let heights: Vec<Vec<f64>> = surfaces.iter().map(SurfaceTable::heights).collect();
+        let heights: Vec<Vec<f64>> = surfaces.iter().map(SurfaceTable::levels).collect();
         if heights.iter().map(Vec::len).sum::<usize>() <= MOST_INTERVALS {
             for (surface, heights) in surfaces.iter_mut().zip(heights) {
                 surface.level = Some(LevelTable::new(surface, heights));
             }
         }
-        Self { surfaces }
+        Self { surfaces, instructions: Instructions::fastest() }
     }
 
     /// What the water reaches on each surface; `out` has one entry a surface. No allocation.
     pub fn wetting_into(&self, plane: &WaterPlane, out: &mut [Wetting]) {
-        for (table, out) in self.surfaces.iter().zip(out) {
-            *out = match &table.level {
-                Some(level) if plane.is_level() => {
-                    level.at(plane.offset).unwrap_or_else(|| table.submerged().wetting(plane))
-                }
-                _ => table.clip(plane),
-            };
+        run_for!(self.instructions, WettingTable::wet(self, plane: &WaterPlane, out: &mut [Wetting]));
+    }
+
+    #[inline(always)]
+    fn wet(&self, plane: &WaterPlane, out: &mut [Wetting]) {
+        let mut clipping = Clipping::default();
+        for (surface, table) in self.surfaces.iter().enumerate() {
+            let known = table.level.as_ref().filter(|_| plane.is_level());
+            match known.map(|level| level.at(plane.offset)) {
+                Some(Some(wetting)) => out[surface] = wetting,
+                Some(None) => out[surface] = table.terms[0].wetting(plane),
+                None => table.clip(surface, plane, &mut clipping, out),
+            }
         }
+        clipping.finish(out);
     }
 }
 
 impl SurfaceTable {
     fn new(hull: &Hull, surface: usize) -> Self {
-        let mut faces: Vec<Face> = hull.faces_of(surface).map(|f| Face::new(hull.mesh.triangle(f))).collect();
-        faces.sort_by(|a, b| a.range(2)[1].total_cmp(&b.range(2)[1]));
-        let mut prefix = vec![Terms::default()];
-        let mut sum = Terms::default();
-        for face in &faces {
-            sum.add(face);
-            prefix.push(sum);
-        }
-        let lowest = |faces: &[Face]| faces.iter().map(|face| face.range(2)[0]).fold(f64::INFINITY, f64::min);
-        let range = |axis: usize| {
-            let ranges = faces.iter().map(|face| face.range(axis));
-            ranges.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], [low, high]| [a.min(low), b.max(high)])
-        };
-        Self {
-            tops: faces.iter().map(|face| face.range(2)[1]).collect(),
-            bottoms: faces.chunks(BLOCK).map(lowest).collect(),
-            x_range: range(0),
-            y_range: range(1),
-            prefix,
-            faces,
-            level: None,
-        }
-    }
-
-    /// Sums over all faces.
-    fn submerged(&self) -> Terms {
-        self.prefix[self.faces.len()]
+        let triangles: Vec<[Vec3; 3]> = hull.faces_of(surface).map(|f| hull.mesh.triangle(f)).collect();
+        let mut faces: Vec<Face> = merged(&triangles).into_iter().map(Face::new).collect();
+        let (mut boxes, mut terms) = (Vec::new(), Vec::new());
+        grow(&mut faces, 0, &mut boxes, &mut terms);
+        Self { faces, boxes, terms, level: None }
     }
 
     /// Levels at which a vertex gets wet or soaked, rising, those that are one left out.
-    fn heights(&self) -> Vec<f64> {
+    fn levels(&self) -> Vec<f64> {
         let corners = self.faces.iter().flat_map(|face| face.corners);
-        let mut heights: Vec<f64> = corners.flat_map(|corner| [corner.z, corner.z + FILM]).collect();
-        heights.sort_by(f64::total_cmp);
-        heights.dedup_by(|next, kept| *next - *kept < LEAST_INTERVAL);
-        heights
+        let mut levels: Vec<f64> = corners.flat_map(|corner| [corner.z, corner.z + FILM]).collect();
+        levels.sort_by(f64::total_cmp);
+        levels.dedup_by(|next, kept| *next - *kept < LEAST_INTERVAL);
+        levels
     }
 
-    fn clip(&self, plane: &WaterPlane) -> Wetting {
-        // what lies below both planes is soaked
-        let film = WaterPlane { offset: plane.offset - FILM, ..*plane };
-        let (low, _) = self.waterline_heights(&film);
-        let (_, high) = self.waterline_heights(plane);
-        let soaked = self.tops.partition_point(|top| *top <= low);
-        let mut sum = self.prefix[soaked].wetting(plane);
-        for (index, bottom) in self.bottoms.iter().enumerate().skip(soaked / BLOCK) {
-            if *bottom >= high {
-                continue;
-            }
-            let block = index * BLOCK..self.faces.len().min((index + 1) * BLOCK);
-            for face in &self.faces[block.start.max(soaked)..block.end] {
-                let depths = face.corners.map(|corner| plane.depth_below(&corner));
-                if depths.iter().any(|depth| *depth > 0.0) {
-                    sum.add(face, &face.below(depths), &face.below(depths.map(|depth| depth - FILM)));
+    fn wetting(&self, plane: &WaterPlane) -> Wetting {
+        let (mut clipping, mut out) = (Clipping::default(), [Wetting::default()]);
+        self.clip(0, plane, &mut clipping, &mut out);
+        clipping.finish(&mut out);
+        out[0]
+    }
+
+    /// Sets the wetting of `surface` but for the faces that are left in `clipping`.
+    #[inline(always)]
+    fn clip(&self, surface: usize, plane: &WaterPlane, clipping: &mut Clipping, out: &mut [Wetting]) {
+        let up = plane.normal.into_inner();
+        let across = up.abs();
+        let mut soaked = Terms::default();
+        out[surface] = Wetting::default();
+        let mut index = 0;
+        while let Some(node) = self.boxes.get(index) {
+            let (depth, reach) = (plane.depth_below(&node.center), across.dot(&node.half));
+            if depth - reach >= FILM {
+                soaked += self.terms[index];
+            } else if depth + reach > 0.0 {
+                let [from, to] = node.faces;
+                if from == to {
+                    index += 1;
+                    continue;
+                }
+                for face in &self.faces[from..to] {
+                    clipping.add(surface, face, plane, out);
                 }
             }
+            index = node.next;
         }
-        sum
+        out[surface] += soaked.wetting(plane);
+    }
+}
+
+/// Axis and number of faces of the first half by which water meets the fewest faces: each half counts by its extent.
+fn best_split(faces: &mut [Face]) -> (usize, usize) {
+    let mut best = (f64::INFINITY, 2, faces.len() / 2);
+    // never so uneven that the tree gets deep
+    let least = faces.len().div_ceil(8);
+    let mut ahead = vec![0.0; faces.len()];
+    for axis in 0..3 {
+        faces.sort_by(|a, b| a.center()[axis].total_cmp(&b.center()[axis]));
+        let mut bounds = Bounds::NONE;
+        for (count, face) in faces.iter().enumerate() {
+            ahead[count] = bounds.met() * count as f64;
+            bounds.add(face);
+        }
+        let mut bounds = Bounds::NONE;
+        for (index, face) in faces.iter().enumerate().skip(1).rev() {
+            bounds.add(face);
+            let cost = ahead[index] + bounds.met() * (faces.len() - index) as f64;
+            if cost < best.0 && index >= least && index <= faces.len() - least {
+                best = (cost, axis, index);
+            }
+        }
+    }
+    (best.1, best.2)
+}
+
+struct Bounds {
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Bounds {
+    const NONE: Self = Self {
+        low: Vec3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+        high: Vec3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
+
+    fn add(&mut self, face: &Face) {
+        for corner in &face.corners {
+            (self.low, self.high) = (self.low.inf(corner), self.high.sup(corner));
+        }
     }
 
-    /// Heights between which the plane crosses this surface's footprint; all heights for a vehicle near its side.
-    fn waterline_heights(&self, plane: &WaterPlane) -> (f64, f64) {
-        let up = plane.normal;
-        if up.z < 0.1 {
-            return (f64::NEG_INFINITY, f64::INFINITY);
-        }
-        let across = |n: f64, range: [f64; 2]| range.map(|v| n * v);
-        let ([x0, x1], [y0, y1]) = (across(up.x, self.x_range), across(up.y, self.y_range));
-        let low = (plane.offset - x0.max(x1) - y0.max(y1)) / up.z;
-        let high = (plane.offset - x0.min(x1) - y0.min(y1)) / up.z;
-        (low - ROOM, high + ROOM)
+    /// Measure of how often water meets the box.
+    fn met(&self) -> f64 {
+        (self.high - self.low).dot(&UPRIGHT)
     }
+}
+
+/// Orders the faces and adds the boxes over them, of which the first is `first`.
+fn grow(faces: &mut [Face], first: usize, boxes: &mut Vec<Node>, terms: &mut Vec<Terms>) {
+    let mut bounds = Bounds::NONE;
+    faces.iter().for_each(|face| bounds.add(face));
+    let Bounds { low, high } = bounds;
+    let index = boxes.len();
+    let (half, leaf) = ((high - low) * 0.5, faces.len() <= LEAF);
+    let range = if leaf { [first, first + faces.len()] } else { [first; 2] };
+    boxes.push(Node { center: (low + high) * 0.5, half: half.add_scalar(ROOM), next: 0, faces: range });
+    let mut sum = Terms::default();
+    faces.iter().for_each(|face| sum.add(face));
+    terms.push(sum);
+    if !leaf {
+        let (axis, middle) = best_split(faces);
+        faces.sort_by(|a, b| a.center()[axis].total_cmp(&b.center()[axis]));
+        let (near, far) = faces.split_at_mut(middle);
+        grow(near, first, boxes, terms);
+        grow(far, first + middle, boxes, terms);
+    }
+    boxes[index].next = boxes.len();
 }
 
 impl LevelTable {
@@ -245,7 +320,7 @@ impl LevelTable {
         let interval = |pair: &[f64]| {
             let values = nodes.map(|share| {
                 let level = pair[0] + share * (pair[1] - pair[0]);
-                surface.clip(&WaterPlane::level(level, 0.0)).values()
+                surface.wetting(&WaterPlane::level(level, 0.0)).values()
             });
             std::array::from_fn(|term| {
                 std::array::from_fn(|quantity| {
@@ -284,56 +359,169 @@ impl Face {
         Self { corners, normal, area }
     }
 
-    fn range(&self, axis: usize) -> [f64; 2] {
-        let values = self.corners.map(|corner| corner[axis]);
-        [
-            values.into_iter().fold(f64::INFINITY, f64::min),
-            values.into_iter().fold(f64::NEG_INFINITY, f64::max),
-        ]
-    }
-
-    /// The part of which the depth is positive, with the depths of the corners. Only positive terms are added, so that the
-    /// centroid of a sliver lies on it.
-    #[inline(always)]
-    fn below(&self, depths: [f64; 3]) -> Below {
-        let [a, b, c] = [0, 1, 2].map(|i| (self.corners[i], depths[i]));
-        match depths.map(|depth| depth > 0.0) {
-            [false, false, false] => Below::default(),
-            [true, false, false] => self.tip(a, b, c),
-            [false, true, false] => self.tip(b, c, a),
-            [false, false, true] => self.tip(c, a, b),
-            [false, true, true] => self.blunt(a, b, c),
-            [true, false, true] => self.blunt(b, c, a),
-            [true, true, false] => self.blunt(c, a, b),
-            [true, true, true] => Below::over([a, b, c], self.area),
-        }
-    }
-
-    /// Of which the first corner alone is wet.
-    fn tip(&self, a: Corner, b: Corner, c: Corner) -> Below {
-        let ((ab, along_b), (ac, along_c)) = (cut(a, b), cut(a, c));
-        Below::over([a, ab, ac], self.area * along_b * along_c)
-    }
-
-    /// Of which the first corner alone is dry.
-    fn blunt(&self, a: Corner, b: Corner, c: Corner) -> Below {
-        let ((ab, from_b), (ac, from_c)) = (cut(b, a), cut(c, a));
-        let near_b = Below::over([ab, b, c], self.area * from_b);
-        let near_c = Below::over([ab, c, ac], self.area * (1.0 - from_b) * from_c);
-        Below {
-            area: near_b.area + near_c.area,
-            depth: near_b.depth + near_c.depth,
-            moment: near_b.moment + near_c.moment,
-        }
+    fn center(&self) -> Vec3 {
+        self.corners.iter().sum::<Vec3>() / 3.0
     }
 }
 
-impl Below {
-    /// Over a triangle of so much area.
+impl Clipping {
+    /// Takes a face unless it is dry; where there is no more room the faces so far are clipped.
     #[inline(always)]
-    fn over(corners: [Corner; 3], area: f64) -> Self {
-        let (depth, moment) = depth_moments(corners);
-        Self { area, depth: area * depth / 3.0, moment: moment * (area / 12.0) }
+    fn add(&mut self, surface: usize, face: &Face, plane: &WaterPlane, out: &mut [Wetting]) {
+        // with a sign of its own a zero would be cut from a zero
+        let depths = face.corners.map(|corner| plane.depth_below(&corner) + 0.0);
+        let (lane, faces) = (self.count, &mut self.faces);
+        self.surfaces[lane] = surface;
+        for axis in 0..3 {
+            for corner in 0..3 {
+                faces.corners[corner][axis][lane] = face.corners[corner][axis];
+            }
+            faces.depths[axis][lane] = depths[axis];
+            faces.normal[axis][lane] = face.normal[axis];
+        }
+        faces.area[lane] = face.area;
+        // what is dry is written over by the next: no branch that cannot be foreseen
+        self.count += usize::from((depths[0] > 0.0) | (depths[1] > 0.0) | (depths[2] > 0.0));
+        if self.count == LANES {
+            self.flush(out);
+        }
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, out: &mut [Wetting]) {
+        if self.count > 0 {
+            self.faces.area[self.count..].fill(0.0);
+            self.flush(out);
+        }
+    }
+
+    #[inline(always)]
+    fn flush(&mut self, out: &mut [Wetting]) {
+        let (faces, values) = (&self.faces, &mut self.values);
+        for i in 0..LANES {
+            let depths = [0, 1, 2].map(|corner| faces.depths[corner][i]);
+            let n = [0, 1, 2].map(|axis| faces.normal[axis][i]);
+            let (area, depth, m) = faces.below(i, depths);
+            let (_, lower_depth, lower_m) = faces.below(i, depths.map(|depth| depth - FILM));
+            for axis in 0..3 {
+                let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+                values[axis][i] = -n[axis] * depth;
+                values[3 + axis][i] = m[last] * n[next] - m[next] * n[last];
+                values[8 + axis][i] = (m[axis] - lower_m[axis]) * FILM.recip();
+            }
+            values[6][i] = area;
+            values[7][i] = (depth - lower_depth) * FILM.recip();
+        }
+        let surfaces = &self.surfaces[..self.count];
+        if surfaces.iter().all(|surface| *surface == surfaces[0]) {
+            // lanes without a face hold nothing
+            out[surfaces[0]] += Wetting::from_values(&values.each_ref().map(sum));
+        } else {
+            for (lane, surface) in surfaces.iter().enumerate() {
+                out[*surface] += Wetting::from_values(&values.each_ref().map(|value| value[lane]));
+            }
+        }
+        self.count = 0;
+    }
+}
+
+/// In one order whatever the instruction set.
+#[inline(always)]
+fn sum(lane: &Lane) -> f64 {
+    let [a, b, c, d, e, f, g, h] = *lane;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
+impl Faces {
+    /// Of a face, the part of which the depth is positive: at most two triangles. Only positive terms are added, so that
+    /// the centroid of a sliver lies on it. Without a branch, so that all lanes go the same way.
+    #[inline(always)]
+    fn below(&self, i: usize, depths: [f64; 3]) -> Below {
+        let dry = depths.map(negative);
+        // the corner that is alone on its side of the surface comes first
+        let second = (dry[1] ^ dry[0]) & (dry[1] ^ dry[2]);
+        let third = (dry[2] ^ dry[0]) & (dry[2] ^ dry[1]);
+        let turned = |[u, v, w]: [f64; 3]| {
+            [
+                select(third, w, select(second, v, u)),
+                select(third, u, select(second, w, v)),
+                select(third, v, select(second, u, w)),
+            ]
+        };
+        let [da, db, dc] = turned(depths);
+        let [x, y, z] = [0, 1, 2].map(|axis| turned([0, 1, 2].map(|corner| self.corners[corner][axis][i])));
+        let [a, b, c] = [0, 1, 2].map(|corner| [x[corner], y[corner], z[corner]]);
+        let (first_dry, others_dry) = (negative(da), negative(db));
+        let (tip, blunt) = (!first_dry & others_dry, first_dry & !others_dry);
+        // where an edge meets the surface, from its wet end, so that the two faces of an edge agree; the share that is wet
+        let cut = |other: [f64; 3], depth: f64| {
+            let (under, over) = (select(tip, da, depth), select(tip, depth, da));
+            let share = under / (under - over);
+            let point: [f64; 3] = std::array::from_fn(|axis| {
+                let (from, to) = (select(tip, a[axis], other[axis]), select(tip, other[axis], a[axis]));
+                from + (to - from) * share
+            });
+            (point, share)
+        };
+        let ((p, to_p), (q, to_q)) = (cut(b, db), cut(c, dc));
+        let choose = |condition: u64, yes: [f64; 3], no: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|axis| select(condition, yes[axis], no[axis]))
+        };
+        let corners = [choose(blunt, p, a), choose(tip, p, b), choose(tip, q, c)];
+        let (depth, moment) =
+            weighted(corners, [select(blunt, 0.0, da), select(tip, 0.0, db), select(tip, 0.0, dc)]);
+        let area = self.area[i];
+        let whole = select(first_dry | others_dry, 0.0, area);
+        let near = select(tip, area * to_p * to_q, select(blunt, area * to_p, whole));
+        // the other triangle of a quadrilateral, of which one corner is under water
+        let far = select(blunt, area * (1.0 - to_p) * to_q, 0.0);
+        let beyond: [f64; 3] =
+            std::array::from_fn(|axis| select(blunt, dc * (p[axis] + 2.0 * c[axis] + q[axis]), 0.0));
+        (
+            near + far,
+            (near * depth + far * dc) * THIRD,
+            std::array::from_fn(|axis| (near * moment[axis] + far * beyond[axis]) * TWELFTH),
+        )
+    }
+}
+
+/// All bits where the sign is set: unlike a choice between two values it is never turned into a choice of where to read.
+#[inline(always)]
+fn negative(value: f64) -> u64 {
+    (value.to_bits().cast_signed() >> 63).cast_unsigned()
+}
+
+#[inline(always)]
+fn select(mask: u64, yes: f64, no: f64) -> f64 {
+    f64::from_bits((mask & yes.to_bits()) | (!mask & no.to_bits()))
+}
+
+/// Sums over a triangle by which it weighs the depth: `int delta dA = A / 3` of the first, `int delta x dA = A / 12` of the
+/// second.
+#[inline(always)]
+fn weighted([a, b, c]: [[f64; 3]; 3], [da, db, dc]: [f64; 3]) -> (f64, [f64; 3]) {
+    let sum = da + db + dc;
+    let moment = |axis: usize| a[axis] * (sum + da) + b[axis] * (sum + db) + c[axis] * (sum + dc);
+    (sum, [moment(0), moment(1), moment(2)])
+}
+
+impl std::ops::AddAssign for Wetting {
+    fn add_assign(&mut self, other: Self) {
+        self.pressure += other.pressure;
+        self.area += other.area;
+        self.soaked_area += other.soaked_area;
+        self.soaked_moment += other.soaked_moment;
+    }
+}
+
+impl std::ops::AddAssign for Terms {
+    fn add_assign(&mut self, other: Self) {
+        self.area_vector += other.area_vector;
+        self.first += other.first;
+        self.moment += other.moment;
+        self.second += other.second;
+        self.area += other.area;
+        self.area_moment += other.area_moment;
     }
 }
 
@@ -352,6 +540,7 @@ impl Terms {
         self.area_moment += centroid * face.area;
     }
 
+    #[inline(always)]
     fn wetting(&self, plane: &WaterPlane) -> Wetting {
         let (n, c) = (plane.normal.into_inner(), plane.offset);
         let force = self.first * n - self.area_vector * c;
@@ -418,6 +607,20 @@ mod tests {
     fn tilted_water_is_exact() {
         let worst = worst(tilted());
         assert!(worst < 1e-9, "{worst:e}");
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let vehicle = shipped::warthog().unwrap().vehicle().unwrap();
+        let count = vehicle.surfaces.len();
+        let fast = WettingTable::new(&vehicle.hull, count);
+        let plain = WettingTable { instructions: Instructions::Portable, ..fast.clone() };
+        let mut wetting = [0, 1].map(|_| vec![Wetting::default(); count]);
+        for plane in tilted().chain([WaterPlane::level(-0.2, 0.0)]) {
+            fast.wetting_into(&plane, &mut wetting[0]);
+            plain.wetting_into(&plane, &mut wetting[1]);
+            assert_eq!(wetting[0], wetting[1]);
+        }
     }
 
     #[test]

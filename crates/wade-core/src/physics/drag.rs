@@ -19,6 +19,7 @@
 use super::elements::{Element, LANES};
 use crate::condition::Condition;
 use crate::frame::{VISCOSITY, Vec3, WaterPlane};
+use crate::lanes::{Instructions, run_for};
 use crate::vehicle::{SurfaceKind, Vehicle};
 use crate::wrench::Wrench;
 
@@ -52,24 +53,6 @@ pub struct Drag {
     half_width: f64,
     length: f64,
     instructions: Instructions,
-}
-
-/// What the sums are compiled for: wider registers, the same operations in the same order and so the same bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Instructions {
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    Portable,
-}
-
-impl Instructions {
-    fn fastest() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            return Self::Avx2;
-        }
-        Self::Portable
-    }
 }
 
 type Lane = [f64; LANES];
@@ -160,19 +143,11 @@ impl Drag {
         out: &mut [SurfaceDrag],
     ) {
         let flow = self.flow(plane, condition);
-        match self.instructions {
-            // SAFETY: `Instructions::fastest` found that this CPU has them.
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code, reason = "a call that needs a CPU feature; the sums are plain Rust")]
-            Instructions::Avx2 => unsafe { self.sum_avx2(&flow, condition, wheel_speeds, out) },
-            Instructions::Portable => self.sum(&flow, condition, wheel_speeds, out),
-        }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn sum_avx2(&self, flow: &Flow, condition: &Condition, wheel_speeds: &[f64], out: &mut [SurfaceDrag]) {
-        self.sum(flow, condition, wheel_speeds, out);
+        let flow = &flow;
+        run_for!(
+            self.instructions,
+            Drag::sum(self, flow: &Flow, condition: &Condition, wheel_speeds: &[f64], out: &mut [SurfaceDrag])
+        );
     }
 
     #[inline(always)]
