@@ -13,6 +13,7 @@ use wade_import::{Imported, Options, Shapes};
 
 use super::emit;
 use super::vehicle::summary;
+use wade::config::Config;
 
 /// Make a bundle from a robot description or meshes: URDF, SDF, MJCF, STL, OBJ, glTF
 ///
@@ -128,6 +129,7 @@ impl ImportVehicle {
             imported.vehicle.surfaces.iter().map(|surface| surface.name.as_str()).collect();
         println!("surfaces: {}", surfaces.join(", "));
         println!("{}: version {version}", folder.display());
+        print!("{}", next_step(&folder, &imported));
         Ok(())
     }
 
@@ -152,6 +154,18 @@ fn write_bundle(folder: &Path, vehicle: Vehicle) -> Result<u32> {
     let bundle =
         Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance: None, spec: None };
     Ok(bundle::succeed(folder, bundle)?)
+}
+
+/// How to look at the vehicle and ask for its forces.
+fn next_step(folder: &Path, imported: &Imported) -> String {
+    let vehicles = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (name, height) = (&imported.vehicle.name, imported.vehicle.dimensions.height);
+    let depth = imported.floating.depth.unwrap_or(0.5 * height);
+    format!(
+        "look at it: wade serve --vehicles {}, then http://{}/#vehicle={name}&depth={depth:.3}&color=surface\n",
+        vehicles.display(),
+        Config::default().http.listen
+    )
 }
 
 fn document(imported: &Imported, folder: &Path, version: u32) -> serde_json::Value {

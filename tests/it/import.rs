@@ -26,6 +26,15 @@ fn car() -> String {
     CAR.replace("WHEELS", &wheels.map(wheel).concat())
 }
 
+/// Imports a car with four wheels; the folder of the vehicles.
+pub fn imported_car(folder: &Path) -> std::path::PathBuf {
+    let output = import(folder, &car(), &[]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("#vehicle=car&depth=0.0") && said.contains("&color=surface"), "{said}");
+    folder.join("vehicles")
+}
+
 fn import(folder: &Path, text: &str, further: &[&str]) -> Output {
     let file = folder.join("car.urdf");
     std::fs::write(&file, text).unwrap();
@@ -63,6 +72,10 @@ fn a_robot_becomes_a_bundle_with_the_names_of_the_json() {
         "a box with equal wheels"
     );
     assert_eq!(json["version"], bundle.version);
+    // the Warthog's patch by radius and width of the wheel
+    let patch = 0.155 / 0.305 * 0.05 * 0.06;
+    let contacts = &bundle.vehicle.contacts;
+    assert!(contacts.len() == 4 && contacts.iter().all(|contact| (contact.area / patch - 1.0).abs() < 1e-9));
 }
 
 #[test]

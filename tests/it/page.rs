@@ -93,6 +93,22 @@ fn the_numbers_of_the_page_are_those_of_the_query() {
 }
 
 #[test]
+fn the_surfaces_of_an_imported_robot_have_colors_of_their_own() {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let vehicles = crate::import::imported_car(folder.path());
+    let served = Served::with(|config| config.vehicles = vehicles);
+    let url = format!("http://{}/#vehicle=car&depth=0.05&color=surface", address(&served));
+    let Some(output) = browse(&["--dump-dom".into(), url]) else { return };
+    let page = String::from_utf8(output.stdout).expect("text");
+    let table = &page[page.find("<table id=\"surfaces\"").expect("a table")..];
+    let table = &table[..table.find("</table>").expect("an end")];
+    let colors: BTreeSet<&str> =
+        table.split("background").skip(1).map(|rest| rest.split(';').next().unwrap_or(rest)).collect();
+    assert_eq!(colors.len(), 9, "one a surface: {colors:?}");
+    assert!(page.contains("physical base alone") && !page.contains("training domain"), "{page}");
+}
+
+#[test]
 fn the_colors_hold_the_surfaces_share_of_the_effects() {
     let vehicles = crate::common::copy_with_every_effect();
     let served = Served::with(|config| config.vehicles = vehicles.path().into());

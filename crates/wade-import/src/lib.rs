@@ -30,13 +30,14 @@ use wade_core::frame::Vec3;
 use wade_core::vehicle::Vehicle;
 use wade_core::vehicle::build::{AssignedHull, BuildError, build_from_hull};
 use wade_core::vehicle::plausible::{Floating, questions};
-use wade_core::vehicle::spec::{Axis, BodyFromStl, VehicleSpec};
+use wade_core::vehicle::spec::{Axis, BodyFromStl, ContactSpec, VehicleSpec};
 
 use limits::{ASSUMED_DENSITY, MOST_FACES};
 use place::Placement;
 use read::Wanted;
 use scene::{Role, Scene};
 use solid::Piece;
+use surfaces::Assigned;
 use watch::Watch;
 
 /// Which shapes of a link make its hull.
@@ -177,7 +178,8 @@ pub fn import(files: &[PathBuf], options: &Options) -> Result<Imported, ImportEr
     let wheels = wheels::find(&scene, &mut pieces, &mut notes, &mut warnings);
     let united = halve::halve(unite::unite(&pieces, &watch, &mut notes, &mut warnings)?);
     let assigned = surfaces::assign(&united, &pieces, &wheels);
-    let vehicle = build(&scene, options, assigned, &mut warnings)?;
+    let contacts = contacts(&wheels, &assigned);
+    let vehicle = build(&scene, options, assigned, contacts, &mut warnings)?;
     let floating = Floating::of(&vehicle);
     warnings.extend(questions(&vehicle, &floating));
     let is_open = !scene.convention.is_metric && options.forward.is_none() && wheels.is_empty();
@@ -191,7 +193,8 @@ pub fn import(files: &[PathBuf], options: &Options) -> Result<Imported, ImportEr
 fn build(
     scene: &Scene,
     options: &Options,
-    assigned: surfaces::Assigned,
+    assigned: Assigned,
+    contacts: Vec<ContactSpec>,
     warnings: &mut Vec<String>,
 ) -> Result<Vehicle, ImportError> {
     let volume = assigned.mesh.volume();
@@ -235,10 +238,26 @@ fn build(
         body_from_stl: BodyFromStl::default(),
         patch: assigned.patches,
         rule: Vec::new(),
-        contact: Vec::new(),
+        contact: contacts,
     };
     let hull = AssignedHull { mesh: assigned.mesh, face_surface: assigned.face_surface };
     Ok(build_from_hull(&spec, hull)?)
+}
+
+/// Where wheels stand on the ground, for the convention without water under the tires.
+fn contacts(wheels: &[Wheel], assigned: &Assigned) -> Vec<ContactSpec> {
+    let lowest = |vertices: &[Vec3]| vertices.iter().map(|vertex| vertex.z).fold(f64::INFINITY, f64::min);
+    let ground = lowest(&assigned.mesh.vertices);
+    let stands = |wheel: &&Wheel| {
+        wheel.center.z - wheel.radius - ground <= limits::WHEEL_GROUND_SHARE * 2.0 * wheel.radius
+            && assigned.patches.iter().any(|patch| patch.name == wheel.name)
+    };
+    let contact = |wheel: &Wheel| ContactSpec {
+        patch: wheel.name.clone(),
+        area_m2: limits::CONTACT_SHARE * wheel.radius * wheel.width,
+        center_xy_m: None,
+    };
+    wheels.iter().filter(stands).map(contact).collect()
 }
 
 /// A place in words [m], without the sign of a rounded zero.

@@ -47,6 +47,9 @@ pub const LEAST_ROUNDNESS_UNNAMED: f64 = 0.98;
 /// Height of the lowest point of a wheel above the ground, over its diameter, up to which it stands on the ground.
 pub const WHEEL_GROUND_SHARE: f64 = 0.1;
 
+/// Length of a tire's contact with the ground over its radius: 0.155 m of 0.305 m, the Warthog's of the paper.
+pub const CONTACT_SHARE: f64 = 0.155 / 0.305;
+
 /// Angle from straight down within which a face belongs to the bottom, and from straight up to the deck [degrees].
 pub const LEVEL_DEGREES: f64 = 45.0;
 

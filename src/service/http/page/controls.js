@@ -1,12 +1,16 @@
 // The state that is asked for: sliders, the address of the page, and the query made of them.
 
 const RAD = Math.PI / 180;
+
+/** The provenance of a vehicle without trained weights. */
+export const PHYSICS = "physics";
 const FIRST = { vehicle: "", speed: 0, direction: 0, depth: 0, roll: 0, pitch: 0, density: 1000, dry: 0, color: "force" };
 
-/** What can be set by a slider, for a vehicle as the server describes it. Bands are where the weights were learnt. */
+/** What can be set by a slider, for a vehicle as the server describes it. Bands are where the weights were trained. */
 export function sliders(vehicle) {
   const range = (quantity) => vehicle.domain.find((r) => r.quantity === `QUANTITY_${quantity}`);
-  const band = (quantity) => [range(quantity)].filter(Boolean).map((r) => [r.minimum, r.maximum]);
+  const trained = vehicle.summary.provenance !== PHYSICS;
+  const band = (quantity) => [range(quantity)].filter(Boolean).filter(() => trained).map((r) => [r.minimum, r.maximum]);
   const speed = range("SPEED")?.maximum ?? 2;
   const tilt = (range("TILT")?.maximum ?? 0) / RAD;
   const side = 90 - (range("ANGLE")?.minimum ?? 0) / RAD;
@@ -14,18 +18,18 @@ export function sliders(vehicle) {
     { key: "speed", label: "speed", unit: "m/s", min: 0, max: tidy(2 * speed), step: 0.01, bands: band("SPEED") },
     {
       key: "direction", label: "direction of travel", unit: "°", min: -180, max: 180, step: 1,
-      bands: [[-180, side - 180], [-side, side], [180 - side, 180]],
+      bands: trained ? [[-180, side - 180], [-side, side], [180 - side, 180]] : [],
     },
     { key: "depth", label: "water depth", unit: "m", min: 0, max: tidy(1.2 * vehicle.height_m), step: 0.005, bands: band("DEPTH") },
-    { key: "roll", label: "roll", unit: "°", min: -30, max: 30, step: 0.5, bands: [[-tilt, tilt]] },
-    { key: "pitch", label: "pitch", unit: "°", min: -30, max: 30, step: 0.5, bands: [[-tilt, tilt]] },
+    { key: "roll", label: "roll", unit: "°", min: -30, max: 30, step: 0.5, bands: trained ? [[-tilt, tilt]] : [] },
+    { key: "pitch", label: "pitch", unit: "°", min: -30, max: 30, step: 0.5, bands: trained ? [[-tilt, tilt]] : [] },
     { key: "density", label: "density", unit: "kg/m³", min: 950, max: 2000, step: 5, bands: band("DENSITY") },
   ];
 }
 
 const tidy = (value) => Math.ceil(value * 20 - 1e-9) / 20;
 
-/** Where a vehicle is shown at first: driving ahead in the middle of what was learnt. */
+/** Where a vehicle is shown at first: driving ahead in the middle of the training data. */
 export function firstState(vehicle) {
   const middle = (quantity, share) => {
     const r = vehicle.domain.find((entry) => entry.quantity === `QUANTITY_${quantity}`);

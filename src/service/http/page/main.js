@@ -2,7 +2,7 @@
 
 import { attitude, buildControls, firstState, fromAddress, request, sliders, toAddress } from "./controls.js";
 import { add, scale, transform, worldFromBody } from "./matrix.js";
-import { DRY, QUANTITIES, colorOf, gradient, roundUp, short, ticks, topOf } from "./scale.js";
+import { DRY, QUANTITIES, colorOf, colorOfIndex, gradient, roundUp, short, ticks, topOf } from "./scale.js";
 import { Scene } from "./scene.js";
 import { surfaceAt } from "./shapes.js";
 import { markSurface, showCurl, showFlags, showLatency, showRemarks, showSurfaces, showWrench } from "./tables.js";
@@ -77,13 +77,14 @@ function show(body) {
   surfaces = loadsOf(answer);
   const quantity = QUANTITIES[state.color] ?? QUANTITIES.force;
   const top = topOf(quantity, surfaces);
-  for (const surface of surfaces) {
-    surface.color = surface.wet > 0 ? colorOf(quantity, quantity.of(surface), top) : DRY;
-  }
-  element("gradient").style.background = gradient(quantity);
-  const labels = ticks(quantity, top);
+  surfaces.forEach((surface, index) => {
+    const wet = () => (surface.wet > 0 ? colorOf(quantity, quantity.of(surface), top) : DRY);
+    surface.color = quantity.apart ? colorOfIndex(index) : wet();
+  });
+  element("gradient").style.background = quantity.apart ? "none" : gradient(quantity);
+  const labels = quantity.apart ? ["each surface as in the table of surfaces"] : ticks(quantity, top);
   element("ticks").replaceChildren(...labels.map((tick, at) => {
-    const unit = at === labels.length - 1 ? ` ${quantity.unit}` : "";
+    const unit = at === labels.length - 1 && !quantity.apart ? ` ${quantity.unit}` : "";
     return Object.assign(document.createElement("span"), { textContent: tick + unit });
   }));
   showWrench(answer, vehicle);

@@ -9,7 +9,7 @@ const DIVERGING = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a
 
 const size = (v) => Math.hypot(...v);
 
-/** Each quantity: its name, its unit, whether it has a sign, and its value on a surface. */
+/** Each quantity: its name, its unit, whether it has a sign, and its value on a surface; `surface` tells the surfaces apart. */
 export const QUANTITIES = {
   force: { label: "force |F|", unit: "N", of: (s) => size(s.force) },
   fx: { label: "force along x", unit: "N", signed: true, of: (s) => s.force[0] },
@@ -17,6 +17,7 @@ export const QUANTITIES = {
   fz: { label: "force along z", unit: "N", signed: true, of: (s) => s.force[2] },
   stress: { label: "|F| over area of the surface", unit: "Pa", of: (s) => size(s.force) / s.area },
   wet: { label: "wetted fraction", unit: "", top: 1, of: (s) => s.wet },
+  surface: { label: "which surface", unit: "", apart: true, of: () => 0 },
 };
 
 const stops = (quantity) => (quantity.signed ? DIVERGING : SEQUENTIAL);
@@ -43,6 +44,16 @@ export function colorOf(quantity, value, top) {
   const channel = (color, k) => parseInt(color.slice(1 + 2 * k, 3 + 2 * k), 16) / 255;
   const mix = (k) => channel(colors[low], k) * (low + 1 - at) + channel(colors[low + 1], k) * (at - low);
   return [mix(0), mix(1), mix(2)];
+}
+
+/** A color of its own for each of many: hues a golden angle apart, light and dark in turn for eyes that see few hues. */
+export function colorOfIndex(index) {
+  const [hue, light] = [(137.5 * index) % 360, [0.62, 0.45, 0.75][index % 3]];
+  const channel = (shift) => {
+    const k = (shift + hue / 30) % 12;
+    return light - 0.6 * Math.min(light, 1 - light) * Math.max(-1, Math.min(k - 3, 9 - k, 1));
+  };
+  return [channel(0), channel(8), channel(4)];
 }
 
 export const css = ([r, g, b]) => `rgb(${[r, g, b].map((x) => Math.round(255 * x)).join(",")})`;

@@ -1,5 +1,6 @@
 // Everything in words and numbers.
 
+import { PHYSICS } from "./controls.js";
 import { css, short } from "./scale.js";
 
 /** Quantities of the training domain and of the effects' box: in words, and their unit. */
@@ -58,7 +59,8 @@ export function showFlags(answer) {
   };
   const flag = (text, className) => cell("span", text, `flag ${className}`);
   const outside = answer.outside.map(excess).join(", ");
-  const flags = [answer.in_domain ? flag("inside the training domain", "pass") : flag(`outside the training domain: ${outside}`, "notice")];
+  const inside = answer.provenance === PHYSICS ? "physical base alone, without training data" : "inside the training domain";
+  const flags = [answer.in_domain ? flag(inside, answer.provenance === PHYSICS ? "" : "pass") : flag(`outside the training domain: ${outside}`, "notice")];
   if (answer.effects.length > 0) flags.push(flag(`${answer.effects.length} effects added`, ""));
   const far = answer.effects_outside.map(excess).join(", ");
   if (far) flags.push(flag(`outside what the effects were seen in: ${far}`, "notice"));
