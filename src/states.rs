@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use wade_core::frame::up_from_roll_pitch;
+use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_wire::State;
 use wade_wire::single;
 
@@ -103,6 +103,12 @@ impl Row {
             let column = field.and_then(|field| at(headers, field)).unwrap_or_else(|| error.to_string());
             BadValue { column, value: field.and_then(|field| at(record, field)).unwrap_or_default() }
         })
+    }
+
+    /// Velocity [m/s] and angular velocity [rad/s].
+    pub fn motion(&self) -> [Vec3; 2] {
+        let angular = [self.wx, self.wy, self.wz].map(|value| value.unwrap_or(0.0));
+        [Vec3::new(self.vx, self.vy, self.vz), angular.into()]
     }
 
     fn wheel_speeds(&self) -> Option<[f32; 4]> {

@@ -1,6 +1,6 @@
 //! `wade predict`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -11,6 +11,7 @@ use wade_core::frame::Vec3;
 use wade_core::model::Model;
 use wade_core::served::Session;
 use wade_learn::files::StagedFile;
+use wade_learn::trials::{acceleration, derivative};
 use wade_wire::State;
 use wade_wire::{Evaluated, Evaluator};
 
@@ -22,7 +23,8 @@ use super::{Vehicles, outside};
 /// Columns: vx vy vz and depth, or water_level in its place; optionally bed_clearance, bed, cx cy cz (current), wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho,
 /// wheel_fl wheel_fr wheel_rl wheel_rr, in SI units and radians. Other columns are kept. Adds fx fy fz mx my mz about the
 /// center of mass; their predicted standard deviations sfx sfy sfz smx smy smz; in_domain (1 or 0); and outside, the quantities outside the training domain with `;` between them. Where there
-/// is a column t, the rows are one run in time, along which effects remember waves and flooding.
+/// is a column t, the rows are one run in time, along which waves and flooding are remembered; accelerations that have no column
+/// are then the derivatives of the velocities.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   wade predict --vehicle warthog --states in.csv --out out.csv --per-surface")]
@@ -70,15 +72,20 @@ impl Predict {
         writer.write_record(headers.iter().map(str::to_owned).chain(self.names(vehicle.model())))?;
         let mut evaluator = Evaluator::default();
         let mut session = headers.iter().any(|header| header == "t").then(Session::of_recording);
+        let accelerations = match session {
+            Some(_) => Accelerations::of(&self.states, &headers)?,
+            None => Accelerations::default(),
+        };
         let mut before: Option<f64> = None;
         let mut far = Far::default();
-        for (row, record) in reader.records().enumerate() {
-            let at = || format!("{states}, row {}", row + 2);
+        for (index, record) in reader.records().enumerate() {
+            let at = || format!("{states}, row {}", index + 2);
             let record = record.with_context(at)?;
             let row = Row::read(&record, &headers).with_context(at)?;
             let time_step = time_step(row.t, before, session.is_some()).with_context(at)?;
             before = row.t;
             let state = State { time_step, physics: Some(self.physics.into()), ..row.state() };
+            let state = accelerations.of_row(index, state);
             let state = state.check().with_context(at)?;
             let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut());
             far.count(&evaluated.forces.outside);
@@ -125,6 +132,68 @@ fn number(value: &f64) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// Accelerations of the rows of a run whose table has none: the derivatives of the velocities, as in `wade gap`.
+#[derive(Default)]
+struct Accelerations {
+    linear: Option<Vec<Vec3>>,
+    angular: Option<Vec<Vec3>>,
+    /// Place of each row among the stamps; two rows may have one.
+    place: Vec<usize>,
+}
+
+impl Accelerations {
+    /// None where a row cannot be read or holds no number: it is reported where it is evaluated.
+    fn of(path: &Path, headers: &csv::StringRecord) -> Result<Self> {
+        let is_stated =
+            |names: [&str; 3]| names.iter().any(|name| headers.iter().any(|header| header == *name));
+        let stated = [["ax", "ay", "az"], ["alx", "aly", "alz"]].map(is_stated);
+        if stated == [true; 2] {
+            return Ok(Self::default());
+        }
+        if !path.metadata().with_context(|| path.display().to_string())?.is_file() {
+            bail!("{} is no file, and is read twice: give it ax ay az and alx aly alz", path.display());
+        }
+        let (mut times, mut velocity, mut angular, mut place) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for record in csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path)?.records() {
+            let Some((t, [v, omega])) = record.ok().and_then(|record| {
+                let row = Row::read(&record, headers).ok()?;
+                Some((row.t?, row.motion()))
+            }) else {
+                return Ok(Self::default());
+            };
+            let later = times.last().is_none_or(|last| t > *last);
+            if !later && times.last() != Some(&t) || !(t + v.sum() + omega.sum()).is_finite() {
+                return Ok(Self::default());
+            }
+            if later {
+                times.push(t);
+                velocity.push(v);
+                angular.push(omega);
+            }
+            place.push(times.len() - 1);
+        }
+        let [has_linear, has_angular] = stated;
+        Ok(Self {
+            linear: (!has_linear).then(|| acceleration(&times, &velocity, &angular)),
+            angular: (!has_angular).then(|| derivative(&times, &angular)),
+            place,
+        })
+    }
+
+    fn of_row(&self, row: usize, state: State) -> State {
+        let of = |values: &Option<Vec<Vec3>>| -> Option<[f32; 3]> {
+            let value = values.as_ref()?.get(*self.place.get(row)?)?;
+            Some([value.x, value.y, value.z].map(|x| x as f32))
+        };
+        State {
+            acceleration: of(&self.linear).unwrap_or(state.acceleration),
+            angular_acceleration: of(&self.angular).unwrap_or(state.angular_acceleration),
+            ..state
+        }
+    }
 }
 
 /// How many rows are outside the training domain, and the farthest of each quantity.

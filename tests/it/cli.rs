@@ -211,6 +211,31 @@ fn a_vehicle_is_built_from_an_stl_and_a_vehicle_file() {
 }
 
 #[test]
+fn a_recording_without_accelerations_accelerates_as_its_velocity_says() {
+    let folder = TempDir::new().expect("a folder");
+    let fx = |name: &str, header: &str, row: &dyn Fn(f64) -> String| -> Vec<f64> {
+        let path = |end: &str| folder.path().join(format!("{name}{end}")).to_string_lossy().into_owned();
+        let rows: String = (0..60).map(|i| row(0.02 * f64::from(i)) + "\n").collect();
+        std::fs::write(path(".csv"), format!("{header}\n{rows}")).expect("written");
+        let (states, out) = (path(".csv"), path("-out.csv"));
+        let output = wade(&["predict", "--vehicle", "warthog", "--states", &states, "--out", &out]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let mut reader = csv::Reader::from_path(out).expect("a table");
+        let at = reader.headers().expect("headers").iter().position(|header| header == "fx").expect("fx");
+        reader.records().map(|record| record.expect("a row")[at].parse().expect("a number")).collect()
+    };
+    let speed = |t: f64| 0.5 + 0.7 * t;
+    let told = fx("told", "t,vx,vy,vz,depth,ax,ay,az", &|t| format!("{t},{},0,0,0.3,0.7,0,0", speed(t)));
+    let derived = fx("derived", "t,vx,vy,vz,depth", &|t| format!("{t},{},0,0,0.3", speed(t)));
+    let single = fx("single", "vx,vy,vz,depth", &|t| format!("{},0,0,0.3", speed(t)));
+    for ((told, derived), single) in told.iter().zip(&derived).zip(&single).skip(5) {
+        assert!((told - derived).abs() < 1e-3, "{told} {derived}");
+        // some 40 kg of water accelerate along
+        assert!(derived < &(single - 10.0), "{derived} {single}");
+    }
+}
+
+#[test]
 fn a_table_of_states_gets_its_forces() {
     let folder = TempDir::new().expect("a folder");
     let (states, out) = (folder.path().join("in.csv"), folder.path().join("out.csv"));

@@ -8,7 +8,7 @@ const WINDOW: usize = 9;
 const ORDER: usize = 2;
 
 /// Acceleration in an inertial frame, in the axes of the body: `dv/dt + omega x v` [m/s2].
-pub(super) fn acceleration(times: &[f64], velocity: &[Vec3], angular_velocity: &[Vec3]) -> Vec<Vec3> {
+pub fn acceleration(times: &[f64], velocity: &[Vec3], angular_velocity: &[Vec3]) -> Vec<Vec3> {
     let rates = derivative(times, velocity).into_iter();
     rates.zip(angular_velocity.iter().zip(velocity)).map(|(rate, (omega, v))| rate + omega.cross(v)).collect()
 }
@@ -16,7 +16,7 @@ pub(super) fn acceleration(times: &[f64], velocity: &[Vec3], angular_velocity: &
 /// Time derivative of each component, by a Savitzky-Golay filter (9 samples, order 2) on a uniform grid at the median
 /// rate. Pieces between holes in time are differentiated apart; a shorter piece has a shorter window, and a lone sample,
 /// of which nothing is known, has 0.
-pub(super) fn derivative(times: &[f64], values: &[Vec3]) -> Vec<Vec3> {
+pub fn derivative(times: &[f64], values: &[Vec3]) -> Vec<Vec3> {
     let step = median_step(times).unwrap_or(1.0);
     let of_piece = |piece: std::ops::Range<usize>| {
         let (times, values) = (&times[piece.clone()], &values[piece]);

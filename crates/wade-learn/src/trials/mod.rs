@@ -15,6 +15,7 @@ mod trial;
 mod units;
 mod write;
 
+pub use acceleration::{acceleration, derivative};
 pub use fault::Fault;
 use std::collections::BTreeSet;
 use std::fs;
