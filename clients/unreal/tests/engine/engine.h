@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 
 using int32 = std::int32_t;
 using uint32 = std::uint32_t;
@@ -111,7 +112,10 @@ struct FColor {
 template <typename T>
 class TArray {
  public:
+  TArray();
+  TArray(std::initializer_list<T> items);
   int32 Num() const;
+  void Reset();
   int32 Add(const T& item);
   const T& operator[](int32 index) const;
 };

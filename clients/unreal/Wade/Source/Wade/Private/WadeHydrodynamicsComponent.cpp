@@ -201,9 +201,10 @@ void UWadeHydrodynamicsComponent::GiveInput()
 	Scene.Surroundings.dry_contact = bDryContact;
 	Scene.Surroundings.session = 1 + Beginnings;
 	Scene.Surroundings.bed = bBedShareStated ? std::optional<double>(BedShare) : std::nullopt;
-	if (bWheelSpeedsKnown)
+	Scene.Surroundings.wheel_speeds.count = static_cast<std::uint32_t>(WheelSpeeds.Num());
+	for (int32 Index = 0; Index < WheelSpeeds.Num(); ++Index)
 	{
-		Scene.Surroundings.wheel_speeds = {{WheelSpeeds[0], WheelSpeeds[1], WheelSpeeds[2], WheelSpeeds[3]}};
+		Scene.Surroundings.wheel_speeds.speeds[static_cast<std::size_t>(Index)] = WheelSpeeds[Index];
 	}
 	const FVector Location = Body->GetComponentLocation();
 	FWadeWaterSample Sample;
@@ -247,11 +248,18 @@ void UWadeHydrodynamicsComponent::SetWaterCallback(FWadeSampleWater Sampler)
 
 void UWadeHydrodynamicsComponent::SetWheelSpeeds(double FrontLeft, double FrontRight, double RearLeft, double RearRight)
 {
-	WheelSpeeds[0] = FrontLeft;
-	WheelSpeeds[1] = FrontRight;
-	WheelSpeeds[2] = RearLeft;
-	WheelSpeeds[3] = RearRight;
-	bWheelSpeedsKnown = true;
+	WheelSpeeds = {FrontLeft, FrontRight, RearLeft, RearRight};
+}
+
+void UWadeHydrodynamicsComponent::SetAllWheelSpeeds(const TArray<double>& Speeds)
+{
+	if (Speeds.Num() > WADE_MAX_WHEELS)
+	{
+		UE_LOG(LogWade, Warning, TEXT("%d wheel speeds were set; %d are taken at most, and none of these is"), Speeds.Num(), WADE_MAX_WHEELS);
+		WheelSpeeds.Reset();
+		return;
+	}
+	WheelSpeeds = Speeds;
 }
 
 void UWadeHydrodynamicsComponent::BeginAnew()

@@ -135,6 +135,11 @@ public:
 	UFUNCTION(BlueprintCallable, Category = "Wade")
 	void SetWheelSpeeds(double FrontLeft, double FrontRight, double RearLeft, double RearRight);
 
+	/** Speeds of the wheels of a vehicle with other wheels than four, by axle from the front, left before right [rad/s], positive
+	 * when driving forward. Empty: not known. */
+	UFUNCTION(BlueprintCallable, Category = "Wade")
+	void SetAllWheelSpeeds(const TArray<double>& Speeds);
+
 	/** To be called after a teleport or a velocity that was set: else it is taken for a force. */
 	UFUNCTION(BlueprintCallable, Category = "Wade")
 	void BeginAnew();
@@ -191,7 +196,6 @@ private:
 	FWadeSimCallback* Callback = nullptr;
 	EWadeLinkState LinkState = EWadeLinkState::Disconnected;
 	FWadeSampleWater WaterCallback;
-	double WheelSpeeds[4] = {};
-	bool bWheelSpeedsKnown = false;
+	TArray<double> WheelSpeeds;
 	uint32 Beginnings = 0;
 };

@@ -102,11 +102,11 @@ bool Hydrodynamics::answered(Step& step, const Motion& motion, const Immersion& 
     state.flags |= WADE_HAS_BED;
     state.bed = static_cast<float>(std::clamp(*step.surroundings.bed, 0.0, 1.0));
   }
-  if (step.surroundings.wheel_speeds) {
+  const auto& [speeds, count] = step.surroundings.wheel_speeds;
+  if (count > 0) {
     state.flags |= WADE_HAS_WHEEL_SPEEDS;
-    for (std::size_t i = 0; i < 4; ++i) {
-      state.wheel_speed_radps[i] = static_cast<float>((*step.surroundings.wheel_speeds)[i]);
-    }
+    state.wheel_count = count;
+    for (std::size_t i = 0; i < count; ++i) state.wheel_speed_radps[i] = static_cast<float>(speeds[i]);
   }
   const std::uint64_t now = clock_();
   const std::uint64_t budget = now < step.deadline ? step.deadline - now : 0;

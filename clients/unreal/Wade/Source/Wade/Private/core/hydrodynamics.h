@@ -39,6 +39,15 @@ struct Pacing {
   std::uint64_t budget_ns = 300000;
 };
 
+// One a wheel of the vehicle, by axle from the front, left before right; of four wheels front left, front right, rear left, rear
+// right.
+struct WheelSpeeds {
+  // [rad/s]
+  std::array<double, WADE_MAX_WHEELS> speeds{};
+  // 0: not known.
+  std::uint32_t count = 0;
+};
+
 // What the caller knows beside body, motion and water.
 struct Surroundings {
   // z of the ground-contact plane in the hull frame [m].
@@ -47,8 +56,7 @@ struct Surroundings {
   double radius = std::numeric_limits<double>::infinity();
   // What pulls at the body before anything is known of the forces on it, world [m/s2].
   Vec3 gravity{0.0, 0.0, -9.81};
-  // Front left, front right, rear left, rear right [rad/s].
-  std::optional<std::array<double, 4>> wheel_speeds;
+  WheelSpeeds wheel_speeds;
   // No water pressure under the contact patches.
   bool dry_contact = false;
   // Share of the motion through the water that is motion over the bed, 0 parked to 1 driving; not given: from the velocities.
