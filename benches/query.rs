@@ -204,7 +204,7 @@ fn effects(vehicle: &str) -> Vec<Subject> {
     let told = Circumstances {
         heading: Some(0.4),
         depth_rate: Some(0.1),
-        wheel_speeds: Some([3.0; 4]),
+        wheel_speeds: Some([3.0; 4].into()),
         time_step: 0.001,
         implicit_added_mass: false,
         ..Circumstances::default()

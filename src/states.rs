@@ -3,11 +3,13 @@
 use serde::Deserialize;
 
 use wade_core::frame::{Vec3, up_from_roll_pitch};
+use wade_core::model::Model;
+use wade_core::vehicle::PerWheel;
 use wade_wire::State;
 use wade_wire::single;
 
 /// Columns that describe a state.
-const STATE: [&str; 28] = [
+const STATE: [&str; 24] = [
     "t",
     "vx",
     "vy",
@@ -29,10 +31,6 @@ const STATE: [&str; 28] = [
     "aly",
     "alz",
     "rho",
-    "wheel_fl",
-    "wheel_fr",
-    "wheel_rl",
-    "wheel_rr",
     "water_level",
     "bed_clearance",
     "bed",
@@ -41,9 +39,56 @@ const STATE: [&str; 28] = [
 const NOT_STATE: [&str; 12] =
     ["fx", "fy", "fz", "mx", "my", "mz", "sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"];
 
+/// Columns of the speeds of four wheels.
+const FOUR_WHEELS: [&str; 4] = ["wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"];
+
+/// The columns of a table that have the speeds of a vehicle's wheels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WheelColumns {
+    /// In the order of the wheels.
+    names: Vec<String>,
+}
+
+impl WheelColumns {
+    /// Of any vehicle with four wheels.
+    pub fn of_four() -> Self {
+        Self { names: FOUR_WHEELS.map(str::to_owned).into() }
+    }
+
+    /// Of a vehicle: the names of its wheels; of four wheels `wheel_fl`, `wheel_fr`, `wheel_rl` and `wheel_rr`, unless the table has
+    /// the names of the vehicle.
+    pub fn of_model(model: &Model, headers: &csv::StringRecord) -> Self {
+        let name = |&wheel: &usize| model.vehicle().surfaces[wheel].name.clone();
+        let names: Vec<String> = model.wheels().iter().map(name).collect();
+        let has_none = !headers.iter().any(|header| names.iter().any(|name| name == header.trim()));
+        if names.len() == FOUR_WHEELS.len() && has_none { Self::of_four() } else { Self { names } }
+    }
+
+    /// The speeds in a row, where it has that of each wheel.
+    fn read(
+        &self,
+        record: &csv::StringRecord,
+        headers: &csv::StringRecord,
+    ) -> Result<Option<PerWheel<f32>>, BadValue> {
+        let mut speeds = Vec::with_capacity(self.names.len());
+        for column in &self.names {
+            let place = headers.iter().position(|header| header.trim() == column);
+            let Some(value) = place.and_then(|place| record.get(place)).map(str::trim) else { continue };
+            if !value.is_empty() {
+                let speed: Result<f64, _> = value.parse();
+                let bad = |_| BadValue { column: column.clone(), value: value.to_owned() };
+                speeds.push(speed.map_err(bad)? as f32);
+            }
+        }
+        let are_all = speeds.len() == self.names.len() && !speeds.is_empty();
+        Ok(if are_all { PerWheel::new(&speeds) } else { None })
+    }
+}
+
 /// Columns that no trial has: to be reported, and ignored.
-pub fn unknown_columns(headers: &csv::StringRecord) -> Vec<String> {
-    let known = |name: &str| STATE.contains(&name) || NOT_STATE.contains(&name);
+pub fn unknown_columns(headers: &csv::StringRecord, wheels: &WheelColumns) -> Vec<String> {
+    let is_wheel = |name: &str| wheels.names.iter().any(|wheel| wheel == name);
+    let known = |name: &str| STATE.contains(&name) || NOT_STATE.contains(&name) || is_wheel(name);
     headers.iter().map(str::trim).filter(|header| !known(header)).map(str::to_owned).collect()
 }
 
@@ -75,10 +120,8 @@ pub struct Row {
     alz: Option<f64>,
     rho: Option<f64>,
     yaw: Option<f64>,
-    wheel_fl: Option<f64>,
-    wheel_fr: Option<f64>,
-    wheel_rl: Option<f64>,
-    wheel_rr: Option<f64>,
+    #[serde(skip)]
+    wheel_speeds: Option<PerWheel<f32>>,
 }
 
 /// A row that holds no state.
@@ -93,8 +136,13 @@ pub struct BadValue {
 
 impl Row {
     /// Reads a record under these headers.
-    pub fn read(record: &csv::StringRecord, headers: &csv::StringRecord) -> Result<Self, BadValue> {
-        record.deserialize(Some(headers)).map_err(|error| {
+    pub fn read(
+        record: &csv::StringRecord,
+        headers: &csv::StringRecord,
+        wheels: &WheelColumns,
+    ) -> Result<Self, BadValue> {
+        let row: Result<Self, csv::Error> = record.deserialize(Some(headers));
+        let row = row.map_err(|error| {
             let field = match error.kind() {
                 csv::ErrorKind::Deserialize { err, .. } => err.field(),
                 _ => None,
@@ -102,17 +150,14 @@ impl Row {
             let at = |record: &csv::StringRecord, field: u64| record.get(field as usize).map(str::to_owned);
             let column = field.and_then(|field| at(headers, field)).unwrap_or_else(|| error.to_string());
             BadValue { column, value: field.and_then(|field| at(record, field)).unwrap_or_default() }
-        })
+        })?;
+        Ok(Self { wheel_speeds: wheels.read(record, headers)?, ..row })
     }
 
     /// Velocity [m/s] and angular velocity [rad/s].
     pub fn motion(&self) -> [Vec3; 2] {
         let angular = [self.wx, self.wy, self.wz].map(|value| value.unwrap_or(0.0));
         [Vec3::new(self.vx, self.vy, self.vz), angular.into()]
-    }
-
-    fn wheel_speeds(&self) -> Option<[f32; 4]> {
-        Some([self.wheel_fl?, self.wheel_fr?, self.wheel_rl?, self.wheel_rr?].map(|speed| speed as f32))
     }
 
     /// The state of the row.
@@ -133,7 +178,7 @@ impl Row {
             bed: self.bed.map(|bed| bed as f32),
             density: self.rho.map_or(level.density, |rho| rho as f32),
             heading: self.yaw.map(|yaw| yaw as f32),
-            wheel_speeds: self.wheel_speeds(),
+            wheel_speeds: self.wheel_speeds,
             ..level
         }
     }

@@ -486,7 +486,7 @@ fn parameters(report: &Report) -> String {
 mod tests {
     use super::*;
 
-    use wade::states::Row;
+    use wade::states::{Row, WheelColumns};
     use wade_core::served::{ServedVehicle, Session};
     use wade_core::wrench::Wrench;
     use wade_wire::{Evaluator, State};
@@ -502,10 +502,11 @@ mod tests {
     fn by_predict(served: &ServedVehicle, table: &str) -> Vec<Wrench> {
         let mut reader = csv::Reader::from_reader(table.as_bytes());
         let headers = reader.headers().expect("a header").clone();
+        let wheels = WheelColumns::of_model(served.model(), &headers);
         let (mut evaluator, mut session) = (Evaluator::default(), Session::of_recording());
         let mut before = None;
         let mut answer = |record: csv::Result<csv::StringRecord>| {
-            let row = Row::read(&record.expect("a row"), &headers).expect("numbers");
+            let row = Row::read(&record.expect("a row"), &headers, &wheels).expect("numbers");
             let t = row.t.expect("a time");
             let time_step = before.map_or(0.0, |before| t - before) as f32;
             before = Some(t);

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use wade::states::{Row, unknown_columns};
+use wade::states::{Row, WheelColumns, unknown_columns};
 use wade_core::domain::{Domain, Outside};
 use wade_core::frame::Vec3;
 use wade_core::model::Model;
@@ -21,7 +21,7 @@ use super::{Vehicles, outside};
 /// Forces for every row of a table of states
 ///
 /// Columns: vx vy vz and depth, or water_level in its place; optionally bed_clearance, bed, cx cy cz (current), wx wy wz, roll pitch yaw, ax ay az, alx aly alz, rho,
-/// wheel_fl wheel_fr wheel_rl wheel_rr, in SI units and radians. Other columns are kept. Adds fx fy fz mx my mz about the
+/// wheel_fl wheel_fr wheel_rl wheel_rr (of a vehicle with other wheels the names of its wheel surfaces), in SI units and radians. Other columns are kept. Adds fx fy fz mx my mz about the
 /// center of mass; their predicted standard deviations sfx sfy sfz smx smy smz; in_domain (1 or 0); and outside, the quantities outside the training domain with `;` between them. Where there
 /// is a column t, the rows are one run in time, along which waves and flooding are remembered; accelerations that have no column
 /// are then the derivatives of the velocities.
@@ -65,7 +65,8 @@ impl Predict {
             .from_path(&self.states)
             .with_context(|| states.to_string())?;
         let headers = reader.headers().with_context(|| states.to_string())?.clone();
-        check_columns(&headers).with_context(|| states.to_string())?;
+        let wheels = WheelColumns::of_model(vehicle.model(), &headers);
+        check_columns(&headers, &wheels).with_context(|| states.to_string())?;
         let out = || self.out.display().to_string();
         let mut staged = StagedFile::new(&self.out).with_context(out)?;
         let mut writer = csv::Writer::from_writer(&mut staged);
@@ -73,7 +74,7 @@ impl Predict {
         let mut evaluator = Evaluator::default();
         let mut session = headers.iter().any(|header| header == "t").then(Session::of_recording);
         let accelerations = match session {
-            Some(_) => Accelerations::of(&self.states, &headers)?,
+            Some(_) => Accelerations::of(&self.states, &headers, &wheels)?,
             None => Accelerations::default(),
         };
         let mut before: Option<f64> = None;
@@ -81,12 +82,12 @@ impl Predict {
         for (index, record) in reader.records().enumerate() {
             let at = || format!("{states}, row {}", index + 2);
             let record = record.with_context(at)?;
-            let row = Row::read(&record, &headers).with_context(at)?;
+            let row = Row::read(&record, &headers, &wheels).with_context(at)?;
             let time_step = time_step(row.t, before, session.is_some()).with_context(at)?;
             before = row.t;
             let state = State { time_step, physics: Some(self.physics.into()), ..row.state() };
             let state = accelerations.of_row(index, state);
-            let state = state.check().with_context(at)?;
+            let state = state.check_for(&vehicle).with_context(at)?;
             let evaluated = evaluator.evaluate(&vehicle, &state, session.as_mut());
             far.count(&evaluated.forces.outside);
             let added = self.values(&evaluated);
@@ -145,7 +146,7 @@ struct Accelerations {
 
 impl Accelerations {
     /// None where a row cannot be read or holds no number: it is reported where it is evaluated.
-    fn of(path: &Path, headers: &csv::StringRecord) -> Result<Self> {
+    fn of(path: &Path, headers: &csv::StringRecord, wheels: &WheelColumns) -> Result<Self> {
         let is_stated =
             |names: [&str; 3]| names.iter().any(|name| headers.iter().any(|header| header == *name));
         let stated = [["ax", "ay", "az"], ["alx", "aly", "alz"]].map(is_stated);
@@ -159,7 +160,7 @@ impl Accelerations {
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for record in csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path)?.records() {
             let Some((t, [v, omega])) = record.ok().and_then(|record| {
-                let row = Row::read(&record, headers).ok()?;
+                let row = Row::read(&record, headers, wheels).ok()?;
                 Some((row.t?, row.motion()))
             }) else {
                 return Ok(Self::default());
@@ -241,7 +242,7 @@ fn time_step(t: Option<f64>, before: Option<f64>, is_run: bool) -> Result<f32> {
 }
 
 /// Refuses a table without a state or with forces already, and names the unused columns.
-fn check_columns(headers: &csv::StringRecord) -> Result<()> {
+fn check_columns(headers: &csv::StringRecord, wheels: &WheelColumns) -> Result<()> {
     let has = |name: &str| headers.iter().any(|header| header.trim() == name);
     let there = || headers.iter().collect::<Vec<_>>().join(", ");
     if let Some(missing) = ["vx", "vy", "vz"].into_iter().find(|name| !has(name)) {
@@ -253,6 +254,8 @@ fn check_columns(headers: &csv::StringRecord) -> Result<()> {
     if let Some(taken) = ADDED.into_iter().find(|name| has(name)) {
         bail!("column {taken} is there already: wade predict adds it; rename or remove yours");
     }
-    unknown_columns(headers).iter().for_each(|column| eprintln!("column {column} is kept and not used"));
+    unknown_columns(headers, wheels)
+        .iter()
+        .for_each(|column| eprintln!("column {column} is kept and not used"));
     Ok(())
 }

@@ -4,6 +4,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use wade_core::frame::up_from_roll_pitch;
 use wade_core::physics::Physics;
+use wade_core::vehicle::{MAX_WHEELS, PerWheel};
 use wade_wire::State;
 use wade_wire::single;
 
@@ -61,9 +62,9 @@ pub struct StateArgs {
     /// Rate at which the water rises [m/s], for the blow of entering it
     #[arg(long, allow_negative_numbers = true)]
     depth_rate: Option<f32>,
-    /// Wheel speeds [rad/s], for the thrust of wheels
-    #[arg(long, value_name = "FL,FR,RL,RR", value_parser = numbers::<4>, allow_hyphen_values = true)]
-    wheel_speeds: Option<[f32; 4]>,
+    /// Speed of each wheel [rad/s] by axle from the front, left before right: of four wheels FL,FR,RL,RR
+    #[arg(long, value_name = "W,W,...", value_parser = wheel_speeds, allow_hyphen_values = true)]
+    wheel_speeds: Option<PerWheel<f32>>,
     /// Leave the force of added mass out, for a caller who integrates with the matrix
     #[arg(long)]
     implicit_added_mass: bool,
@@ -148,9 +149,20 @@ fn gravity(roll: f64, pitch: f64) -> [f32; 3] {
     single(&-up_from_roll_pitch(roll, pitch).into_inner())
 }
 
+/// One number a wheel with commas between.
+fn wheel_speeds(text: &str) -> Result<PerWheel<f32>, String> {
+    let values =
+        list(text).map_err(|error| format!("{error}: one number a wheel is needed, such as 3,3.5"))?;
+    PerWheel::new(&values).ok_or_else(|| format!("{} numbers, {MAX_WHEELS} wheels at most", values.len()))
+}
+
+fn list(text: &str) -> Result<Vec<f32>, std::num::ParseFloatError> {
+    text.split(',').map(|number| number.trim().parse()).collect()
+}
+
 /// So many numbers with commas between.
 fn numbers<const COUNT: usize>(text: &str) -> Result<[f32; COUNT], String> {
-    let values: Result<Vec<f32>, _> = text.split(',').map(|number| number.trim().parse()).collect();
+    let values = list(text);
     let values = values.map_err(|error| format!("{error}: {COUNT} numbers such as 0.5,0,-0.1 are needed"))?;
     <[f32; COUNT]>::try_from(values).map_err(|values| format!("{} numbers, {COUNT} are needed", values.len()))
 }

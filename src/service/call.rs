@@ -44,7 +44,7 @@ pub(super) fn answer_state(
     state: Option<&proto::State>,
     session: Option<&mut Session>,
 ) -> Result<(proto::EvaluateResponse, Answered), Refusal> {
-    let state = wade_wire::state(state.ok_or(Refusal::MissingState)?)?.check()?;
+    let state = wade_wire::state(state.ok_or(Refusal::MissingState)?, vehicle)?.check_for(vehicle)?;
     EVALUATOR.with_borrow_mut(|evaluator| {
         let evaluated = evaluator.evaluate(vehicle, &state, session);
         let response = wade_wire::response(vehicle, &evaluated);

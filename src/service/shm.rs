@@ -372,15 +372,15 @@ impl Desk {
         answer: &mut Answer,
     ) -> Result<(), InvalidState> {
         let run = Run { client, ports: at.ports, session: query.session };
-        let outcome = query.state().and_then(|state| state.check()).map(|state| {
+        let outcome = query.state().and_then(|state| state.check_for(at.vehicle)).map(|state| {
             // a query that was refused has begun no session
             let known = (query.session != 0).then(|| self.sessions.get(run));
             let (session, begins) = known.map_or((None, false), |(session, begins)| (Some(session), begins));
             answer.fill(at.vehicle, &self.evaluator.evaluate(at.vehicle, &state, session));
             answer.flags |= if begins { SESSION_BEGINS } else { 0 };
         });
-        if let Err(invalid) = outcome {
-            answer.refuse(invalid);
+        if let Err(invalid) = &outcome {
+            answer.refuse(invalid, at.vehicle);
         }
         answer.sequence = query.sequence;
         answer.flags |= self.flags;

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::states::{BadValue, Row, unknown_columns};
+use crate::states::{BadValue, Row, WheelColumns, unknown_columns};
 use wade_wire::{InvalidState, State};
 
 /// Why a trace cannot be played.
@@ -58,13 +58,16 @@ impl Trace {
         let mut reader =
             csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(reader);
         let headers = reader.headers()?.clone();
-        let mut trace =
-            Self { times: Vec::new(), states: Vec::new(), unknown_columns: unknown_columns(&headers) };
+        // which vehicle is asked is the server's affair
+        let wheels = WheelColumns::of_four();
+        let unknown_columns = unknown_columns(&headers, &wheels);
+        let mut trace = Self { times: Vec::new(), states: Vec::new(), unknown_columns };
         for (index, record) in reader.records().enumerate() {
             let row = index + 1;
             trace.push(
                 row,
-                &Row::read(&record?, &headers).map_err(|source| TraceError::Value { row, source })?,
+                &Row::read(&record?, &headers, &wheels)
+                    .map_err(|source| TraceError::Value { row, source })?,
             )?;
         }
         if trace.states.len() < 2 {

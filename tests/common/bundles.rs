@@ -19,6 +19,7 @@ use wade_core::model::kernel::Isa;
 use wade_core::model::{Model, Workspace};
 use wade_core::physics::{Memory, Motion, Physics};
 use wade_core::served::ServedVehicle;
+use wade_core::vehicle::PerWheel;
 use wade_core::wrench::Wrench;
 
 pub const VEHICLES: [&str; 2] = ["husky", "warthog"];
@@ -60,7 +61,7 @@ impl<'a> Recording<'a> {
     pub fn wrench(
         &mut self,
         condition: &Condition,
-        wheel_speeds: Option<&[f64; 4]>,
+        wheel_speeds: Option<&PerWheel<f64>>,
         time_step: f64,
     ) -> Wrench {
         let speeds = self.model.wheel_speeds(wheel_speeds);
@@ -272,7 +273,7 @@ impl Drawn {
         Circumstances {
             heading: Some(self.heading.into()),
             depth_rate: Some(self.depth_rate.into()),
-            wheel_speeds: Some(self.wheel_speeds.map(f64::from)),
+            wheel_speeds: Some(self.wheel_speeds.map(f64::from).into()),
             time_step: self.time_step.into(),
             implicit_added_mass: false,
             physics: None,

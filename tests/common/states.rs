@@ -19,7 +19,7 @@ impl From<Drawn> for State {
             dry_contact: drawn.dry_contact,
             heading: Some(drawn.heading),
             depth_rate: Some(drawn.depth_rate),
-            wheel_speeds: Some(drawn.wheel_speeds),
+            wheel_speeds: Some(drawn.wheel_speeds.into()),
             time_step: drawn.time_step,
             implicit_added_mass: false,
             ..Self::default()

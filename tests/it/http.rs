@@ -121,7 +121,7 @@ fn query(vehicle: &str, state: &State) -> Value {
         "ground_contact": if state.dry_contact { "GROUND_CONTACT_DRY" } else { "GROUND_CONTACT_WETTED" },
         "heading_rad": state.heading,
         "depth_rate_mps": state.depth_rate,
-        "wheel_speed_radps": state.wheel_speeds,
+        "wheel_speed_radps": state.wheel_speeds.as_deref(),
         "time_step_s": state.time_step,
         "implicit_added_mass": state.implicit_added_mass,
     }})

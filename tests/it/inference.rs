@@ -56,7 +56,11 @@ fn request(vehicle: &str, states: &[State]) -> ModelInferRequest {
         tensor("density_kgpm3", 1, rows(&|s| vec![s.density])),
         tensor("heading_rad", 1, rows(&|s| s.heading.into_iter().collect())),
         tensor("depth_rate_mps", 1, rows(&|s| s.depth_rate.into_iter().collect())),
-        tensor("wheel_speed_radps", 4, rows(&|s| s.wheel_speeds.into_iter().flatten().collect())),
+        tensor(
+            "wheel_speed_radps",
+            4,
+            rows(&|s| s.wheel_speeds.iter().flat_map(|speeds| speeds.to_vec()).collect()),
+        ),
     ];
     ModelInferRequest { model_name: vehicle.into(), id: "seven".into(), inputs, ..Default::default() }
 }
@@ -160,7 +164,7 @@ fn the_tensors_have_the_bits_of_single_queries_in_both_forms_with_every_effect()
 fn the_physics_of_the_server_answers_tensors() {
     let served = Served::with(|config| config.physics = Physics::Hydrostatic);
     let state = State { acceleration: [1.0, 0.0, 0.0], heading: Some(0.0), ..State::still(0.2) };
-    let state = State { depth_rate: Some(0.0), wheel_speeds: Some([0.0; 4]), ..state };
+    let state = State { depth_rate: Some(0.0), wheel_speeds: Some([0.0; 4].into()), ..state };
     let mut client = Client::Grpc(Box::new(served.tcp("husky", Method::Unary)));
     let mut force = |physics: Physics| {
         let reply = client.evaluate(&State { physics: Some(physics), ..state }).expect("answered");

@@ -31,3 +31,4 @@ mod soak_transports;
 mod start_log;
 mod training;
 mod validate;
+mod wheels;

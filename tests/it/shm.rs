@@ -12,8 +12,8 @@ use wade_client::{ClientError, ShmClient};
 use wade_wire::shm::Wait;
 use wade_wire::shm::layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_HEADING,
-    HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, MAX_BATCH, MAX_WHEELS, Names,
-    QUASI_STEADY, Query, SERVER_POLLS, Status, SurfaceAnswer,
+    HAS_WATER_LEVEL, HAS_WHEEL_COUNT, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, MAX_BATCH, MAX_WHEELS,
+    Names, QUASI_STEADY, Query, SERVER_POLLS, Status, SurfaceAnswer,
 };
 use wade_wire::{Field, InvalidState, Problem};
 
@@ -199,7 +199,7 @@ fn what_is_set_and_cannot_be_used_is_refused_by_name() {
     ];
     for (query, field, problem) in cases {
         let answer = asked(&raw, query);
-        assert_eq!(answer.refusal(), Some(InvalidState { field, problem }));
+        assert_eq!(answer.refusal(), Some(InvalidState::new(field, problem)));
         assert!(answer.force_n.iter().all(|force| force.is_nan()) && answer.surface_count == 0);
     }
     assert_eq!(asked(&raw, good).status, Status::Ok as u32);
@@ -215,7 +215,8 @@ fn what_no_model_answers_yet_is_unset_and_never_zero() {
         config.vehicles = folder.path().to_owned();
     });
     let answer = asked(&Raw::new(&served), Query::from(&state()));
-    assert_eq!((answer.status, answer.flags), (Status::Ok as u32, SERVER_POLLS));
+    assert_eq!((answer.status, answer.flags), (Status::Ok as u32, SERVER_POLLS | HAS_WHEEL_COUNT));
+    assert_eq!(answer.wheel_count, 4);
     let surfaces = answer.surfaces();
     assert!(!surfaces.is_empty() && answer.effects().is_empty());
     let answered = |load: &SurfaceAnswer| [load.force_n, load.point_m].concat().iter().all(|x| x.is_finite());

@@ -66,8 +66,7 @@ pub enum WadeStatus {
     UnknownVehicle = 3,
     /// The server is of another version: shared memory of another layout, or another service. The forces are the last ones.
     LayoutMismatch = 4,
-    /// A field of the state is wrong, which `invalid_field` and `invalid_problem` name. Nothing was asked; the forces are the
-    /// last ones.
+    /// A field of the state is wrong, which `invalid_field` and `invalid_problem` name. The forces are the last ones.
     InvalidState = 5,
     /// The server is at a limit. The forces are the last ones.
     ResourceExhausted = 6,
@@ -143,7 +142,7 @@ pub struct WadeState {
     pub session: u64,
     /// WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, those named WADE_HAS_ and one of those named WADE_PHYSICS_
     pub flags: u32,
-    /// Entries of `wheel_speed_radps` that hold a value, where the flags say so; 0 for four.
+    /// Entries of `wheel_speed_radps` that hold a value, where the flags say so: one for each wheel of the vehicle; 0 for four.
     pub wheel_count: u32,
     /// Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
     pub depth_m: f32,
@@ -173,7 +172,7 @@ pub struct WadeState {
     pub heading_rad: f32,
     /// Rate at which the water rises at the body origin [m/s].
     pub depth_rate_mps: f32,
-    /// By axle from the front, left before right [rad/s]: front left, front right, rear left, rear right.
+    /// By axle from the front, left before right [rad/s]; of four wheels front left, front right, rear left, rear right.
     pub wheel_speed_radps: [f32; WADE_MAX_WHEELS],
     /// Time since the state before it in the session [s]. The steps of states that could not be asked for want of time are added
     /// to the next one that is.

@@ -65,7 +65,7 @@ impl WadeClient {
             Ok(valid) => valid,
             Err(invalid) => {
                 self.known.last.get(forces);
-                forces.blame(invalid);
+                forces.blame(&invalid);
                 return WadeStatus::InvalidState;
             }
         };
@@ -91,9 +91,9 @@ impl WadeClient {
         let invalid =
             states.iter().enumerate().find_map(|(index, state)| Some((index, checked(state).err()?)));
         let status = match (invalid, &self.transport) {
-            (Some((index, invalid)), _) => batch.blame(index, invalid),
-            (None, Transport::Shm(client)) => client.evaluate_batch(states, budget, forces),
-            (None, Transport::Grpc(client)) => client.evaluate_batch(states, budget, forces),
+            (Some((index, invalid)), _) => batch.blame(index, &invalid),
+            (None, Transport::Shm(client)) => client.evaluate_batch(states, budget, (forces, batch)),
+            (None, Transport::Grpc(client)) => client.evaluate_batch(states, budget, (forces, batch)),
         };
         if let Some(mut asked) = crate::bounded::lock_until(&self.batch_asked, budget.deadline) {
             if status == WadeStatus::Ok {
@@ -126,7 +126,8 @@ impl Default for WadeBatch {
 }
 
 impl WadeBatch {
-    fn blame(&mut self, index: usize, invalid: InvalidState) -> WadeStatus {
+    /// Names what is wrong with which state.
+    pub fn blame(&mut self, index: usize, invalid: &InvalidState) -> WadeStatus {
         self.invalid_index = index as u32;
         (self.invalid_field, self.invalid_problem) = (invalid.field as u32, invalid.problem as u32);
         WadeStatus::InvalidState

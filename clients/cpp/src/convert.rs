@@ -5,20 +5,21 @@ use std::time::Instant;
 
 use wade_client::Reply;
 use wade_core::physics::Physics;
+use wade_core::vehicle::PerWheel;
 use wade_wire::shm::layout::{self, Answer, Status};
 use wade_wire::{Field, InvalidState, Problem, State};
 
 use crate::abi::{
     WADE_DRY_CONTACT, WADE_HAS_ADDED_MASS, WADE_HAS_BASE, WADE_HAS_BED, WADE_HAS_BED_CLEARANCE,
     WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WATER_LEVEL, WADE_HAS_WHEEL_SPEEDS,
-    WADE_IMPLICIT_ADDED_MASS, WADE_IN_DOMAIN, WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE,
-    WADE_NEVER, WADE_PHYSICS_FULL, WADE_PHYSICS_HYDROSTATIC, WADE_PHYSICS_QUASI_STEADY, WADE_SESSION_BEGINS,
-    WadeEffectLoad, WadeForces, WadeState, WadeStatus,
+    WADE_IMPLICIT_ADDED_MASS, WADE_IN_DOMAIN, WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_MAX_WHEELS,
+    WADE_NAME_SIZE, WADE_NEVER, WADE_PHYSICS_FULL, WADE_PHYSICS_HYDROSTATIC, WADE_PHYSICS_QUASI_STEADY,
+    WADE_SESSION_BEGINS, WadeEffectLoad, WadeForces, WadeState, WadeStatus,
 };
 use crate::last::nanoseconds_since;
 
-/// Wheels whose speed effects and base take.
-const WHEELS: u32 = 4;
+/// Wheels of a state that does not say how many it has.
+const WHEELS: usize = 4;
 
 /// Flags of a state that are known.
 const STATE_FLAGS: u32 = WADE_DRY_CONTACT
@@ -43,8 +44,8 @@ const PHYSICS: [(u32, Physics); 3] = [
 impl From<&WadeState> for State {
     fn from(state: &WadeState) -> Self {
         let has = |flag: u32| state.flags & flag != 0;
-        let [front_left, front_right, rear_left, rear_right, ..] = state.wheel_speed_radps;
-        let wheel_speeds = [front_left, front_right, rear_left, rear_right];
+        let count = if state.wheel_count == 0 { WHEELS } else { state.wheel_count as usize };
+        let wheel_speeds = state.wheel_speed_radps.get(..count).and_then(PerWheel::new);
         Self {
             velocity: state.velocity_mps,
             current: state.current_mps,
@@ -60,7 +61,7 @@ impl From<&WadeState> for State {
             dry_contact: has(WADE_DRY_CONTACT),
             heading: has(WADE_HAS_HEADING).then_some(state.heading_rad),
             depth_rate: has(WADE_HAS_DEPTH_RATE).then_some(state.depth_rate_mps),
-            wheel_speeds: has(WADE_HAS_WHEEL_SPEEDS).then_some(wheel_speeds),
+            wheel_speeds: wheel_speeds.filter(|_| has(WADE_HAS_WHEEL_SPEEDS)),
             time_step: state.time_step_s,
             implicit_added_mass: has(WADE_IMPLICIT_ADDED_MASS),
             physics: PHYSICS.into_iter().find(|(flag, _)| has(*flag)).map(|(_, physics)| physics),
@@ -70,7 +71,7 @@ impl From<&WadeState> for State {
 
 /// A state as it travels, or what the server would refuse in it.
 pub fn checked(state: &WadeState) -> Result<State, InvalidState> {
-    let wrong = |field, problem| Err(InvalidState { field, problem });
+    let wrong = |field, problem| Err(InvalidState::new(field, problem));
     let has = |flags: u32| state.flags & flags == flags;
     if state.flags & !STATE_FLAGS != 0 {
         return wrong(Field::Flags, Problem::Unsupported);
@@ -78,7 +79,7 @@ pub fn checked(state: &WadeState) -> Result<State, InvalidState> {
     if PHYSICS.into_iter().filter(|(flag, _)| has(*flag)).count() > 1 {
         return wrong(Field::Physics, Problem::Unknown);
     }
-    if has(WADE_HAS_WHEEL_SPEEDS) && !matches!(state.wheel_count, 0 | WHEELS) {
+    if has(WADE_HAS_WHEEL_SPEEDS) && state.wheel_count as usize > WADE_MAX_WHEELS {
         return wrong(Field::WheelSpeed, Problem::Count);
     }
     let state = State::from(state);
@@ -132,29 +133,37 @@ impl WadeForces {
     }
 
     /// Names what is wrong with the state that was asked about.
-    pub fn blame(&mut self, invalid: InvalidState) {
+    pub fn blame(&mut self, invalid: &InvalidState) {
         (self.invalid_field, self.invalid_problem) = (invalid.field as u32, invalid.problem as u32);
     }
 }
 
+/// Why there are no forces, and what was wrong with the state where something was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refused {
+    pub status: WadeStatus,
+    pub invalid: Option<InvalidState>,
+}
+
 /// What an answer over shared memory says: the forces, or why there are none.
-pub fn answered(answer: &Answer) -> Result<WadeForces, WadeStatus> {
+pub fn answered(answer: &Answer) -> Result<WadeForces, Refused> {
     if answer.status == Status::Ok as u32 {
         return Ok(answer.into());
     }
-    Err(refused(answer.status, answer.refusal().is_some()))
+    Err(refused(answer.status, answer.refusal()))
 }
 
 /// Why there are no forces, for the status of an answer. A state was checked before it was sent: a server that refuses it has
-/// other limits.
-pub fn refused(status: u32, names_a_field: bool) -> WadeStatus {
-    if status == Status::NotServed as u32 {
+/// other limits, or the vehicle has other wheels.
+pub fn refused(status: u32, invalid: Option<InvalidState>) -> Refused {
+    let status = if status == Status::NotServed as u32 {
         WadeStatus::UnknownVehicle
-    } else if names_a_field {
+    } else if invalid.is_some() {
         WadeStatus::InvalidState
     } else {
         WadeStatus::Refused
-    }
+    };
+    Refused { status, invalid }
 }
 
 impl From<&Answer> for WadeForces {

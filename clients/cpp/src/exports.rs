@@ -296,6 +296,7 @@ pub extern "C" fn wade_problem_message(problem: u32) -> *const c_char {
         3 => c"must not be negative",
         4 => c"must be greater than zero",
         5 => c"must have length 1",
+        7 => c"must have one value for each wheel of the vehicle",
         8 => c"is set, which the server does not support yet",
         9 => c"has a value, but its flag is not set",
         _ => c"is wrong",

@@ -1,13 +1,14 @@
 //! Over gRPC a thread of the client's own has the connection: the caller hands it the question and waits for the answer.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
 use wade_client::{ClientError, GrpcLink, Reply, replies};
-use wade_wire::State;
+use wade_wire::{Field, InvalidState, Problem, State, proto};
 
-use crate::abi::{WADE_SESSION_BEGINS, WadeForces, WadeState, WadeStatus};
+use crate::abi::{WADE_SESSION_BEGINS, WadeBatch, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{Budget, lock, lock_until};
 use crate::connection::{RETRY, status_of};
 use crate::event::Event;
@@ -36,6 +37,8 @@ struct Shared {
     done: Mutex<Done>,
     answered: Event,
     batch: Mutex<Batch>,
+    /// How many wheels the vehicle had when the connection was made.
+    wheels: AtomicUsize,
 }
 
 /// What belongs to the one thread whose call it is.
@@ -90,6 +93,7 @@ impl Grpc {
             done: Mutex::new(Done { number: 0, status: WadeStatus::Ok }),
             answered: Event::new()?,
             batch: Mutex::new(batch),
+            wheels: AtomicUsize::new(0),
         });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let worked = Arc::clone(&shared);
@@ -120,13 +124,23 @@ impl Grpc {
     ) -> WadeStatus {
         let shared = &*self.shared;
         let mut turn = lock_until(&shared.turn, budget.deadline);
+        let mut invalid = None;
         let status = match &mut turn {
             None => WadeStatus::Timeout,
-            Some(turn) => shared.evaluate(turn, state, session, budget),
+            Some(turn) => {
+                invalid = shared.other_wheels(state);
+                match invalid {
+                    Some(_) => WadeStatus::InvalidState,
+                    None => shared.evaluate(turn, state, session, budget),
+                }
+            }
         };
         // while it is still this thread's turn, so that no other's answer comes between
         shared.known.last.get(forces);
         drop(turn);
+        if let Some(invalid) = invalid {
+            forces.blame(&invalid);
+        }
         status
     }
 
@@ -135,7 +149,7 @@ impl Grpc {
         &self,
         states: &[WadeState],
         budget: Budget,
-        forces: &mut [WadeForces],
+        (forces, blamed): (&mut [WadeForces], &mut WadeBatch),
     ) -> WadeStatus {
         let shared = &*self.shared;
         let Some(mut turn) = lock_until(&shared.turn, budget.deadline) else { return WadeStatus::Timeout };
@@ -150,6 +164,10 @@ impl Grpc {
         let Some(mut batch) = lock_until(&shared.batch, budget.deadline) else { return WadeStatus::Timeout };
         batch.states.clear();
         batch.states.extend(states.iter().map(State::from));
+        let other = |(index, state)| Some((index, shared.other_wheels(state)?));
+        if let Some((index, invalid)) = batch.states.iter().enumerate().find_map(other) {
+            return blamed.blame(index, &invalid);
+        }
         drop(batch);
         let status = shared.ask(&mut turn, What::Batch, budget);
         if status != WadeStatus::Ok {
@@ -169,6 +187,15 @@ impl Grpc {
 }
 
 impl Shared {
+    /// What is wrong with a state that has speeds of other wheels than those of the vehicle; over gRPC the server would say it in
+    /// words alone.
+    fn other_wheels(&self, state: &State) -> Option<InvalidState> {
+        let wheels = self.wheels.load(Ordering::Acquire);
+        let is_connected = self.known.connection.status() == WadeStatus::Ok;
+        let other = state.wheel_speeds.filter(|speeds| is_connected && speeds.len() != wheels);
+        other.map(|_| InvalidState::new(Field::WheelSpeed, Problem::Count))
+    }
+
     fn evaluate(&self, turn: &mut Turn, state: &State, session: u64, budget: Budget) -> WadeStatus {
         let status = self.known.connection.status();
         if status != WadeStatus::Ok {
@@ -265,7 +292,9 @@ impl Shared {
     /// Connects, and sees that the server has the vehicle.
     async fn connect(&self) -> Result<GrpcLink, ClientError> {
         let mut link = GrpcLink::connect(&self.url, &self.vehicle, LOST_AFTER).await?;
-        link.vehicle().await?;
+        let vehicle = link.vehicle().await?;
+        let turns = |surface: &&proto::Surface| matches!(surface.kind.as_str(), "wheel" | "track");
+        self.wheels.store(vehicle.surfaces.iter().filter(turns).count(), Ordering::Release);
         Ok(link)
     }
 

@@ -6,14 +6,14 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use wade_client::{Asked, ShmLink};
-use wade_wire::State;
 use wade_wire::shm::Wait;
 use wade_wire::shm::layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
+use wade_wire::{InvalidState, State};
 
-use crate::abi::{WadeForces, WadeState, WadeStatus};
+use crate::abi::{WadeBatch, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{Budget, lock, lock_until};
 use crate::connection::RETRY;
-use crate::convert::{answered, refused};
+use crate::convert::{Refused, answered, refused};
 use crate::known::Known;
 use crate::skipped::Skipped;
 use crate::worker::Worker;
@@ -46,6 +46,8 @@ struct Turn {
     batch: Vec<WadeForces>,
     /// When the first of the batches was asked that have had no answer since.
     batch_asked: Option<Instant>,
+    /// What the server refused of the last question, and of which state of a batch.
+    invalid: Option<(usize, InvalidState)>,
 }
 
 struct Open {
@@ -69,6 +71,7 @@ impl Shm {
             skipped: Skipped::default(),
             batch: Vec::with_capacity(max_batch),
             batch_asked: None,
+            invalid: None,
         };
         let shared = Arc::new(Shared {
             names: Names::new(namespace),
@@ -100,6 +103,9 @@ impl Shm {
         self.wake_keeper(&turn);
         // while it is still this thread's turn, so that no other's answer comes between
         self.shared.known.last.get(forces);
+        if let Some((_, invalid)) = turn.invalid.take() {
+            forces.blame(&invalid);
+        }
         status
     }
 
@@ -108,13 +114,16 @@ impl Shm {
         &self,
         states: &[WadeState],
         budget: Budget,
-        forces: &mut [WadeForces],
+        (forces, batch): (&mut [WadeForces], &mut WadeBatch),
     ) -> WadeStatus {
         let Some(mut turn) = lock_until(&self.shared.turn, budget.deadline) else {
             return WadeStatus::Timeout;
         };
         let status = turn.evaluate_batch(&self.shared, states, budget.deadline);
         self.wake_keeper(&turn);
+        if let Some((index, invalid)) = turn.invalid.take() {
+            batch.blame(index, &invalid);
+        }
         if status == WadeStatus::Ok {
             WadeForces::copy_batch(&turn.batch, budget.start, forces);
         }
@@ -160,7 +169,10 @@ impl Turn {
                 shared.known.last.put(forces, start);
                 WadeStatus::Ok
             }
-            Ok(Some(Err(refused))) => refused,
+            Ok(Some(Err(Refused { status, invalid }))) => {
+                self.invalid = invalid.map(|invalid| (0, invalid));
+                status
+            }
             Ok(None) => {
                 self.open = Some(Open { asked, at: start });
                 WadeStatus::Timeout
@@ -170,7 +182,7 @@ impl Turn {
     }
 
     fn evaluate_batch(&mut self, shared: &Shared, states: &[WadeState], deadline: Instant) -> WadeStatus {
-        let Self { link, batch, batch_asked, .. } = self;
+        let Self { link, batch, batch_asked, invalid, .. } = self;
         let Some(link) = link else { return shared.why_not() };
         batch.clear();
         while batch.len() < states.len() {
@@ -180,15 +192,20 @@ impl Turn {
                 .iter()
                 .map(|state| Query { session: state.session, ..Query::from(&State::from(state)) });
             let since = *batch_asked.get_or_insert_with(Instant::now);
+            let start = batch.len();
             let taken = link.ask_batch(queries).and_then(|asked| {
-                link.answer_batch(&asked, deadline, |answer| take(answer, chunk.len(), batch))
+                let taken = |answer: &BatchAnswer| (answer.index, take(answer, chunk.len(), batch));
+                link.answer_batch(&asked, deadline, taken)
             });
             if let Ok(Some(_)) = taken {
                 *batch_asked = None;
             }
             match taken {
-                Ok(Some(WadeStatus::Ok)) => {}
-                Ok(Some(refused)) => return refused,
+                Ok(Some((_, Ok(())))) => {}
+                Ok(Some((index, Err(refused)))) => {
+                    *invalid = refused.invalid.map(|invalid| (start + index as usize, invalid));
+                    return refused.status;
+                }
                 Ok(None) if since.elapsed() < LOST_AFTER => return WadeStatus::Timeout,
                 Ok(None) => return self.give_up(shared, WadeStatus::Timeout),
                 Err(_) => return self.give_up(shared, WadeStatus::NoServer),
@@ -208,9 +225,9 @@ impl Turn {
 
 /// Adds the answers to a part of a batch to those before it. A bundle that was exchanged on the way would mix two versions in
 /// one answer: then it is begun again.
-fn take(answer: &BatchAnswer, count: usize, batch: &mut Vec<WadeForces>) -> WadeStatus {
+fn take(answer: &BatchAnswer, count: usize, batch: &mut Vec<WadeForces>) -> Result<(), Refused> {
     if answer.status != Status::Ok as u32 {
-        return refused(answer.status, answer.refusal().is_some());
+        return Err(refused(answer.status, answer.answers[answer.index as usize % MAX_BATCH].refusal()));
     }
     let answers = &answer.answers[..count];
     let version = answers.first().map(|answer| answer.bundle_version);
@@ -219,7 +236,7 @@ fn take(answer: &BatchAnswer, count: usize, batch: &mut Vec<WadeForces>) -> Wade
     } else {
         batch.extend(answers.iter().map(WadeForces::from));
     }
-    WadeStatus::Ok
+    Ok(())
 }
 
 impl Shared {

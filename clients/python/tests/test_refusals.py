@@ -32,6 +32,9 @@ REFUSED = [
     ("heading_rad", NAN, "finite"),
     ("depth_rate_mps", -INFINITY, "finite"),
     ("wheel_speed_radps", (0, 0, NAN, 0), "finite"),
+    ("wheel_speed_radps", (0, 0, 0, NAN), "finite"),
+    ("wheel_speed_radps", (1, 2), "has 2 values, and the vehicle has 4 wheels"),
+    ("wheel_speed_radps", (1, 2, 3, 4, 5, 6), "has 6 values, and the vehicle has 4 wheels"),
     ("time_step_s", -0.001, "negative"),
 ]
 
@@ -50,6 +53,7 @@ MISSHAPEN = [
     ("heading_rad", (0.1, 0.2), np.zeros(3)),
     ("depth_rate_mps", "fast", "fast"),
     ("wheel_speed_radps", (1.0, 2.0, 3.0), np.zeros((2, 3))),
+    ("wheel_speed_radps", (), np.zeros((2, 9))),
     ("wheel_speed_radps", 1.0, [1.0, 1.0]),
     ("time_step_s", None, [0.1, 0.1, 0.1]),
     ("session", -1, [1, 2, 3]),

@@ -139,7 +139,7 @@ pub(super) fn message(state: &State) -> proto::State {
         ground_contact: ground_contact(state).into(),
         heading_rad: state.heading,
         depth_rate_mps: state.depth_rate,
-        wheel_speed_radps: state.wheel_speeds.map_or_else(Vec::new, Vec::from),
+        wheel_speed_radps: state.wheel_speeds.map_or_else(Vec::new, |speeds| speeds.to_vec()),
         time_step_s: state.time_step,
         implicit_added_mass: state.implicit_added_mass,
         physics: state.physics.map_or(0, |physics| physics as i32),
@@ -153,7 +153,7 @@ fn ground_contact(state: &State) -> proto::GroundContact {
 /// What the states of a batch have in common: the message carries it once, or not at all.
 pub(super) fn shared(state: &State) -> impl PartialEq + use<> {
     let State { heading, depth_rate, wheel_speeds, physics, .. } = state;
-    let given = [heading.is_some(), depth_rate.is_some(), wheel_speeds.is_some()];
+    let given = (heading.is_some(), depth_rate.is_some(), wheel_speeds.map(|speeds| speeds.len()));
     (state.dry_contact, state.implicit_added_mass, *physics, given)
 }
 
@@ -176,7 +176,12 @@ pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateB
         omit_surfaces: false,
         heading_rad: states.iter().filter_map(|s| s.heading).collect(),
         depth_rate_mps: states.iter().filter_map(|s| s.depth_rate).collect(),
-        wheel_speed_radps: states.iter().filter_map(|s| s.wheel_speeds).flatten().collect(),
+        wheel_speed_radps: states
+            .iter()
+            .filter_map(|s| s.wheel_speeds.as_deref())
+            .flatten()
+            .copied()
+            .collect(),
         implicit_added_mass: states.first().is_some_and(|s| s.implicit_added_mass),
         physics: states.first().and_then(|s| s.physics).map_or(0, |physics| physics as i32),
     }

@@ -176,14 +176,15 @@ impl InProcess {
 
     /// The forces in one state.
     pub fn evaluate(&mut self, state: &State) -> Result<Reply, ClientError> {
-        let evaluated = self.evaluator.evaluate(&self.vehicle, &state.check()?, self.session.as_mut());
+        let state = state.check_for(&self.vehicle)?;
+        let evaluated = self.evaluator.evaluate(&self.vehicle, &state, self.session.as_mut());
         Ok(Reply::new(&self.vehicle, &evaluated))
     }
 
     fn compute(&mut self, states: &[State]) -> Result<u64, ClientError> {
         let Self { vehicle, evaluator, session } = self;
         states.iter().try_fold(0, |ns, state| {
-            Ok(ns + evaluator.evaluate(vehicle, &state.check()?, session.as_mut()).compute_ns)
+            Ok(ns + evaluator.evaluate(vehicle, &state.check_for(vehicle)?, session.as_mut()).compute_ns)
         })
     }
 }

@@ -49,7 +49,7 @@ impl ShmClient {
             let asked = link.ask(query)?;
             link.answer(&asked, deadline, Answer::copied)
         })?;
-        match answer.refusal() {
+        match answer.refusal_of(state) {
             Some(invalid) => Err(invalid.into()),
             None if answer.status == Status::Ok as u32 => Ok(answer),
             None => Err(self.refused(answer.status)),
@@ -81,7 +81,9 @@ impl ShmClient {
         let queries = states.iter().map(|state| Query { session, ..Query::from(state) });
         let (status, refusal, taken) = self.exchange(|link, deadline| {
             let asked = link.ask_batch(queries)?;
-            link.answer_batch(&asked, deadline, |answer| (answer.status, answer.refusal(), take(answer)))
+            link.answer_batch(&asked, deadline, |answer| {
+                (answer.status, answer.refusal_of(states), take(answer))
+            })
         })?;
         match refusal {
             _ if status == Status::Ok as u32 => Ok(taken),

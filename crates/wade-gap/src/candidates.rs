@@ -65,7 +65,7 @@ pub(super) fn unavailable(
         }
         Quantity::ChannelWidth if !setting.in_channel => Some("trials.toml states no channel_width"),
         Quantity::WheelSpeeds if !has_wheels() => {
-            Some("no wheel speeds were recorded (wheel_fl, wheel_fr, wheel_rl, wheel_rr)")
+            Some("no speeds of four wheels were recorded (wheel_fl, wheel_fr, wheel_rl, wheel_rr)")
         }
         Quantity::InferredWrench if !setting.inferred => {
             Some("the wrench was measured, not inferred from mass and drive")

@@ -68,6 +68,7 @@ pub use run::{body_of, run};
 
 use wade_core::condition::Condition;
 use wade_core::effects::{Effect, Shape};
+use wade_core::vehicle::PerWheel;
 use wade_core::wrench::Wrench;
 
 /// A sample of a trial, as a model is asked about it.
@@ -76,7 +77,7 @@ pub struct Asked<'a> {
     /// State.
     pub condition: &'a Condition,
     /// Wheel speeds [rad/s], where all were recorded.
-    pub wheel_speeds: Option<[f64; 4]>,
+    pub wheel_speeds: Option<PerWheel<f64>>,
     /// Time since the sample before [s]; 0 where a run begins.
     pub time_step: f64,
 }

@@ -10,7 +10,7 @@ use wade_core::effects::{Body, Immersion, Input};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::wrench::Wrench;
 use wade_learn::signal::pieces;
-use wade_learn::trials::{SimIs, Trial, Trials, WRENCH};
+use wade_learn::trials::{SimIs, Trial, Trials, WHEELS, WRENCH};
 
 /// Nothing wades where the water is as many times as deep as its hull is high.
 const DEEPEST: f64 = 4.0;
@@ -72,7 +72,7 @@ impl Series {
             yaw: self.yaw[sample],
             wetting_rate: self.wetting_rate[sample],
             channel_width: self.channel_width,
-            wheel_speeds: self.wheels[sample],
+            wheel_speeds: self.wheels[sample].into(),
         }
     }
 
@@ -209,9 +209,11 @@ fn of_trial(
     if !exact {
         smooth_rates(&trial.t, &pieces, &mut conditions);
     }
-    let wheels: Vec<[Option<f64>; 4]> = (0..count)
-        .map(|i| std::array::from_fn(|w| trial.wheel_speeds[w].as_ref().map(|column| column[i])))
-        .collect();
+    // the four columns say nothing of a vehicle with other wheels
+    let has_four = body.wheels() == WHEELS.len();
+    let speeds = trial.wheel_speeds.each_ref().map(|column| column.as_ref().filter(|_| has_four));
+    let wheels: Vec<[Option<f64>; 4]> =
+        (0..count).map(|i| speeds.map(|column| column.map(|column| column[i]))).collect();
     let mut predicted = Vec::with_capacity(count);
     let mut uncertainty = vec![[0.0; 6]; count];
     let mut outside = vec![false; count];
@@ -223,7 +225,7 @@ fn of_trial(
             let [fl, fr, rl, rr] = wheels[sample];
             let answer = predict(&Asked {
                 condition: &conditions[sample],
-                wheel_speeds: fl.zip(fr).zip(rl.zip(rr)).map(|((fl, fr), (rl, rr))| [fl, fr, rl, rr]),
+                wheel_speeds: fl.zip(fr).zip(rl.zip(rr)).map(|((fl, fr), (rl, rr))| [fl, fr, rl, rr].into()),
                 time_step: if begins { 0.0 } else { trial.t[sample] - trial.t[sample - 1] },
             });
             uncertainty[sample] = answer.uncertainty;

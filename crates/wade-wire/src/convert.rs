@@ -8,15 +8,15 @@ use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
 use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
-use wade_core::vehicle::{Surface, SurfaceKind};
+use wade_core::vehicle::{MAX_WHEELS, PerWheel, Surface, SurfaceKind};
 
 use super::evaluator::Evaluated;
 use super::proto::{self, state::Attitude};
 use super::refusal::Refusal;
 use super::state::{Field, InvalidState, Problem, State, UNIT_TOLERANCE, scalar};
 
-/// The state of a single request.
-pub fn state(message: &proto::State) -> Result<State, InvalidState> {
+/// The state of a single request to a vehicle.
+pub fn state(message: &proto::State, vehicle: &ServedVehicle) -> Result<State, InvalidState> {
     let default = State::default();
     let vector = |v: &Option<proto::Vector3>| v.as_ref().map_or([0.0; 3], |v| [v.x, v.y, v.z]);
     Ok(State {
@@ -36,8 +36,13 @@ pub fn state(message: &proto::State) -> Result<State, InvalidState> {
         depth_rate: message.depth_rate_mps,
         wheel_speeds: match message.wheel_speed_radps.as_slice() {
             [] => None,
-            &[fl, fr, rl, rr] => Some([fl, fr, rl, rr]),
-            _ => return Err(InvalidState { field: Field::WheelSpeed, problem: Problem::Count }),
+            speeds => {
+                let speeds = PerWheel::new(speeds);
+                Some(
+                    speeds
+                        .ok_or_else(|| InvalidState::wheel_count(message.wheel_speed_radps.len(), vehicle))?,
+                )
+            }
         },
         time_step: message.time_step_s,
         implicit_added_mass: message.implicit_added_mass,
@@ -52,7 +57,7 @@ fn physics(code: i32) -> Result<Option<Physics>, InvalidState> {
             .into_iter()
             .find(|physics| *physics as i32 == code)
             .map(Some)
-            .ok_or(InvalidState { field: Field::Physics, problem: Problem::Unknown }),
+            .ok_or(InvalidState::new(Field::Physics, Problem::Unknown)),
     }
 }
 
@@ -67,7 +72,7 @@ fn quaternion(q: &proto::Quaternion) -> Result<UnitQuaternion<f64>, InvalidState
     let [w, x, y, z] = [q.w, q.x, q.y, q.z].map(|part| scalar(Field::Quaternion, part));
     let q = Quaternion::new(w?, x?, y?, z?);
     if (q.norm() - 1.0).abs() > UNIT_TOLERANCE {
-        return Err(InvalidState { field: Field::Quaternion, problem: Problem::NotUnit });
+        return Err(InvalidState::new(Field::Quaternion, Problem::NotUnit));
     }
     Ok(UnitQuaternion::from_quaternion(q))
 }
@@ -76,7 +81,7 @@ fn is_dry(ground_contact: i32) -> Result<bool, InvalidState> {
     let known = proto::GroundContact::try_from(ground_contact);
     known
         .map(|contact| contact == proto::GroundContact::Dry)
-        .map_err(|_| InvalidState { field: Field::GroundContact, problem: Problem::Unknown })
+        .map_err(|_| InvalidState::new(Field::GroundContact, Problem::Unknown))
 }
 
 fn gravity(attitude: &Attitude) -> Result<[f32; 3], InvalidState> {
@@ -92,8 +97,13 @@ fn gravity(attitude: &Attitude) -> Result<[f32; 3], InvalidState> {
     Ok(single(&-up.into_inner()))
 }
 
-/// The states of a batch; every array is checked against the length of `depth_m`, or of `water_level_m` where that is empty.
-pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<State>, Refusal> {
+/// The states of a batch for a vehicle; every array is checked against the length of `depth_m`, or of `water_level_m` where that is
+/// empty.
+pub fn batch(
+    message: &proto::EvaluateBatchRequest,
+    vehicle: &ServedVehicle,
+    max: usize,
+) -> Result<Vec<State>, Refusal> {
     let levels = if message.depth_m.is_empty() { &message.water_level_m } else { &message.depth_m };
     let len = levels.len();
     if len == 0 {
@@ -121,7 +131,7 @@ pub fn batch(message: &proto::EvaluateBatchRequest, max: usize) -> Result<Vec<St
     let dry_contact = is_dry(message.ground_contact)?;
     let heading = optional_rows::<1>(Field::Heading, &message.heading_rad, len)?;
     let depth_rate = optional_rows::<1>(Field::DepthRate, &message.depth_rate_mps, len)?;
-    let wheel_speeds = optional_rows::<4>(Field::WheelSpeed, &message.wheel_speed_radps, len)?;
+    let wheel_speeds = wheel_rows(&message.wheel_speed_radps, len, vehicle)?;
     let state = |i: usize| State {
         velocity: velocity(i),
         current: current(i),
@@ -173,6 +183,28 @@ fn optional_rows<const WIDTH: usize>(
         });
     }
     Ok(move |i| rows.get(i).copied())
+}
+
+/// The wheel speeds of state `i`, or none where the array is empty.
+fn wheel_rows(
+    values: &[f32],
+    len: usize,
+    vehicle: &ServedVehicle,
+) -> Result<impl Fn(usize) -> Option<PerWheel<f32>>, Refusal> {
+    let name = Field::WheelSpeed.name();
+    let (given, wheels) = (values.len() / len, vehicle.model().wheels().len());
+    if !values.len().is_multiple_of(len) {
+        return Err(Refusal::UnequalLength {
+            name,
+            len: values.len(),
+            expected: len * wheels,
+            width: wheels,
+        });
+    }
+    if !values.is_empty() && (given != wheels || given > MAX_WHEELS) {
+        return Err(InvalidState::wheel_count(given, vehicle).into());
+    }
+    Ok(move |i| values.get(i * given..(i + 1) * given).filter(|row| !row.is_empty()).and_then(PerWheel::new))
 }
 
 /// A vector in the wire's precision.
@@ -438,6 +470,11 @@ mod tests {
     use super::*;
     use wade_core::effects::{Effect, Kind, LeftOut};
 
+    fn husky() -> ServedVehicle {
+        let bundle = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles/husky");
+        wade_core::bundle::load_served(&bundle, wade_core::model::kernel::Isa::available()[0]).expect("sound")
+    }
+
     #[test]
     fn the_numbers_of_the_wire_are_those_of_the_library() {
         for effect in Effect::ALL {
@@ -470,7 +507,7 @@ mod tests {
         let [w, x, y, z] = [q.w, q.i, q.j, q.k].map(|part| part as f32);
         let of = |attitude| {
             let message = proto::State { depth_m: Some(0.1), attitude: Some(attitude), ..Default::default() };
-            state(&message).expect("valid").heading
+            state(&message, &husky()).expect("valid").heading
         };
         let heading = of(Attitude::WorldFromBody(proto::Quaternion { w, x, y, z })).expect("known");
         assert!((heading - 2.0).abs() < 1e-6);
@@ -484,8 +521,20 @@ mod tests {
             velocity_mps: vec![0.0; 5],
             ..Default::default()
         };
-        let refusal = batch(&message, 10).expect_err("five values for two states");
+        let refusal = batch(&message, &husky(), 10).expect_err("five values for two states");
         let expected = Refusal::UnequalLength { name: "velocity_mps", len: 5, expected: 6, width: 3 };
         assert_eq!(refusal, expected);
+        let refusal = |wheel_speed_radps: Vec<f32>| {
+            let message = proto::EvaluateBatchRequest {
+                depth_m: vec![0.1, 0.2],
+                wheel_speed_radps,
+                ..Default::default()
+            };
+            batch(&message, &husky(), 10).expect_err("other wheels").to_string()
+        };
+        assert!(refusal(vec![0.0; 7]).contains("has 7 values, expected 8 (4 a state)"));
+        let names = "wheel_fl, wheel_fr, wheel_rl, wheel_rr";
+        let expected = format!("wheel_speed_radps has 6 values, and the vehicle has 4 wheels ({names})");
+        assert_eq!(refusal(vec![0.0; 12]), expected);
     }
 }

@@ -6,6 +6,8 @@ use wade_core::condition::{Condition, FRESH_WATER, GroundContact, LEAST_UPRIGHT}
 use wade_core::effects::Circumstances;
 use wade_core::frame::Vec3;
 use wade_core::physics::Physics;
+use wade_core::served::ServedVehicle;
+use wade_core::vehicle::{MAX_WHEELS, PerWheel};
 
 /// A state as it travels: single precision, body frame, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,8 +40,8 @@ pub struct State {
     pub heading: Option<f32>,
     /// Rate at which the water rises at the body origin [m/s].
     pub depth_rate: Option<f32>,
-    /// Wheel speeds front left, front right, rear left, rear right [rad/s].
-    pub wheel_speeds: Option<[f32; 4]>,
+    /// Speed of each wheel [rad/s], in the order of [`Vehicle::wheels`](wade_core::vehicle::Vehicle::wheels).
+    pub wheel_speeds: Option<PerWheel<f32>>,
     /// Time since the state before it in the session [s].
     pub time_step: f32,
     /// The caller integrates added mass himself.
@@ -186,12 +188,53 @@ impl Problem {
 }
 
 /// A field that no answer can be given for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InvalidState {
     /// The field.
     pub field: Field,
     /// What is wrong with it.
     pub problem: Problem,
+    /// The same in words, where the two alone say too little.
+    words: Option<Box<str>>,
+}
+
+impl InvalidState {
+    /// This is wrong with that field.
+    pub const fn new(field: Field, problem: Problem) -> Self {
+        Self { field, problem, words: None }
+    }
+
+    /// So many wheel speeds for a vehicle that has another number of wheels.
+    pub fn wheel_count(given: usize, vehicle: &ServedVehicle) -> Self {
+        let wheels = vehicle.model().wheels();
+        let name = |&wheel: &usize| vehicle.model().vehicle().surfaces[wheel].name.as_str();
+        let names: Vec<&str> = wheels.iter().map(name).collect();
+        Self::wheels(given, wheels.len(), &names.join(", "))
+    }
+
+    /// The same where the names of the wheels are not known; empty names are none.
+    pub(crate) fn wheels(given: usize, wheels: usize, names: &str) -> Self {
+        let field = Field::WheelSpeed;
+        let given = match given {
+            1 => "1 value".to_owned(),
+            given => format!("{given} values"),
+        };
+        let expected = match wheels {
+            0 => "no wheels".to_owned(),
+            1 => "1 wheel".to_owned(),
+            wheels => format!("{wheels} wheels"),
+        };
+        let expected = match names {
+            "" => expected,
+            names => format!("{expected} ({names})"),
+        };
+        let limit = match wheels {
+            0..=MAX_WHEELS => String::new(),
+            _ => format!(": speeds of {MAX_WHEELS} wheels can be stated at most"),
+        };
+        let words = format!("{} has {given}, and the vehicle has {expected}{limit}", field.name());
+        Self { words: Some(words.into()), ..Self::new(field, Problem::Count) }
+    }
 }
 
 impl std::error::Error for InvalidState {}
@@ -199,13 +242,16 @@ impl std::error::Error for InvalidState {}
 impl std::fmt::Display for InvalidState {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let name = self.field.name();
+        if let Some(words) = &self.words {
+            return f.write_str(words);
+        }
         match self.problem {
             Problem::NotFinite => write!(f, "{name} must be finite"),
             Problem::TooLarge => write!(f, "{name} must not exceed {} in magnitude", limit(self.field)),
             Problem::Negative => write!(f, "{name} must not be negative"),
             Problem::NotPositive => write!(f, "{name} must be greater than zero"),
             Problem::Unknown => write!(f, "{name} must be one of the values of its enumeration"),
-            Problem::Count => write!(f, "{name} must have four values, or none"),
+            Problem::Count => write!(f, "{name} must have one value for each wheel of the vehicle, or none"),
             Problem::Unsupported => write!(f, "{name} is set, which this server does not support yet"),
             Problem::WithoutFlag => write!(f, "{name} has a value, but its flag is not set"),
             Problem::NoLevel => write!(f, "{name} must be given, or water_level_m in its place"),
@@ -266,7 +312,21 @@ impl State {
         Self { depth, ..Self::default() }
     }
 
-    /// The state with every field checked, or the first field that is wrong.
+    /// The state with every field checked for a vehicle, or the first field that is wrong.
+    pub fn check_for(&self, vehicle: &ServedVehicle) -> Result<CheckedState, InvalidState> {
+        match &self.wheel_speeds {
+            Some(speeds)
+                if speeds.len() != vehicle.model().wheels().len()
+                    && speeds.iter().all(|speed| speed.is_finite()) =>
+            {
+                Err(InvalidState::wheel_count(speeds.len(), vehicle))
+            }
+            _ => self.check(),
+        }
+    }
+
+    /// The same for a vehicle that is not known here: it may have another number of wheels than speeds are stated. Speeds that do
+    /// not fit the vehicle that is evaluated are as if none were stated.
     pub fn check(&self) -> Result<CheckedState, InvalidState> {
         Ok(CheckedState { condition: self.condition()?, circumstances: self.circumstances()? })
     }
@@ -275,12 +335,10 @@ impl State {
         let optional = |field: Field, value: Option<f32>| value.map(|value| scalar(field, value)).transpose();
         let time_step = scalar(Field::TimeStep, self.time_step)?;
         if time_step < 0.0 {
-            return Err(InvalidState { field: Field::TimeStep, problem: Problem::Negative });
+            return Err(InvalidState::new(Field::TimeStep, Problem::Negative));
         }
-        let wheel_speeds = self.wheel_speeds.map(|speeds| {
-            let [a, b, c, d] = speeds.map(|speed| scalar(Field::WheelSpeed, speed));
-            Ok([a?, b?, c?, d?])
-        });
+        let wheel_speeds =
+            self.wheel_speeds.map(|speeds| speeds.try_map(|speed| scalar(Field::WheelSpeed, speed)));
         Ok(Circumstances {
             heading: optional(Field::Heading, self.heading)?,
             depth_rate: optional(Field::DepthRate, self.depth_rate)?,
@@ -293,7 +351,7 @@ impl State {
 
     /// Depth and water level, of which one is given.
     fn levels(&self, up: &UnitVector3<f64>) -> Result<(f64, Option<f64>), InvalidState> {
-        let wrong = |field: Field, problem: Problem| Err(InvalidState { field, problem });
+        let wrong = |field: Field, problem: Problem| Err(InvalidState::new(field, problem));
         match (self.depth.is_nan(), self.water_level) {
             (true, Some(level)) => Ok((0.0, Some(scalar(Field::WaterLevel, level)?))),
             (true, None) => wrong(Field::Depth, Problem::NoLevel),
@@ -310,18 +368,18 @@ impl State {
         let current = vector(Field::Current, &self.current)?;
         let density = scalar(Field::Density, self.density)?;
         if density <= 0.0 {
-            return Err(InvalidState { field: Field::Density, problem: Problem::NotPositive });
+            return Err(InvalidState::new(Field::Density, Problem::NotPositive));
         }
         let up = -direction(&self.gravity)?;
         let (depth, water_level) = self.levels(&up)?;
         let optional = |field: Field, value: Option<f32>| value.map(|value| scalar(field, value)).transpose();
         let bed_clearance = optional(Field::BedClearance, self.bed_clearance)?;
         if bed_clearance.is_some_and(|clearance| clearance < 0.0) {
-            return Err(InvalidState { field: Field::BedClearance, problem: Problem::Negative });
+            return Err(InvalidState::new(Field::BedClearance, Problem::Negative));
         }
         let stated_bed = optional(Field::Bed, self.bed)?;
         if stated_bed.is_some_and(|bed| !(0.0..=1.0).contains(&bed)) {
-            return Err(InvalidState { field: Field::Bed, problem: Problem::NoShare });
+            return Err(InvalidState::new(Field::Bed, Problem::NoShare));
         }
         Ok(Condition {
             velocity: velocity - current,
@@ -349,9 +407,9 @@ fn vector(field: Field, values: &[f32; 3]) -> Result<Vec3, InvalidState> {
 pub(crate) fn scalar(field: Field, value: f32) -> Result<f64, InvalidState> {
     let value = f64::from(value);
     if !value.is_finite() {
-        Err(InvalidState { field, problem: Problem::NotFinite })
+        Err(InvalidState::new(field, Problem::NotFinite))
     } else if value.abs() > limit(field) {
-        Err(InvalidState { field, problem: Problem::TooLarge })
+        Err(InvalidState::new(field, Problem::TooLarge))
     } else {
         Ok(value)
     }
@@ -360,10 +418,10 @@ pub(crate) fn scalar(field: Field, value: f32) -> Result<f64, InvalidState> {
 fn direction(gravity: &[f32; 3]) -> Result<UnitVector3<f64>, InvalidState> {
     let gravity = Vec3::from(gravity.map(f64::from));
     if !gravity.iter().all(|x| x.is_finite()) {
-        return Err(InvalidState { field: Field::Gravity, problem: Problem::NotFinite });
+        return Err(InvalidState::new(Field::Gravity, Problem::NotFinite));
     }
     if (gravity.norm() - 1.0).abs() > UNIT_TOLERANCE {
-        return Err(InvalidState { field: Field::Gravity, problem: Problem::NotUnit });
+        return Err(InvalidState::new(Field::Gravity, Problem::NotUnit));
     }
     Ok(UnitVector3::new_normalize(gravity))
 }
@@ -399,7 +457,11 @@ mod tests {
             (State { gravity: [f32::NAN; 3], ..good }, Field::Gravity, Problem::NotFinite),
             (State { heading: Some(f32::NAN), ..good }, Field::Heading, Problem::NotFinite),
             (State { depth_rate: Some(1e9), ..good }, Field::DepthRate, Problem::TooLarge),
-            (State { wheel_speeds: Some([f32::INFINITY; 4]), ..good }, Field::WheelSpeed, Problem::NotFinite),
+            (
+                State { wheel_speeds: Some([f32::INFINITY; 4].into()), ..good },
+                Field::WheelSpeed,
+                Problem::NotFinite,
+            ),
             (State { time_step: -0.001, ..good }, Field::TimeStep, Problem::Negative),
         ];
         for (state, field, expected) in cases {

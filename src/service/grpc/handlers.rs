@@ -133,7 +133,7 @@ impl Handlers {
         vehicle: Arc<ServedVehicle>,
         request: &proto::EvaluateBatchRequest,
     ) -> Result<(proto::EvaluateBatchResponse, Answered), Refusal> {
-        let states = wade_wire::batch(request, self.max_batch)?;
+        let states = wade_wire::batch(request, &vehicle, self.max_batch)?;
         let with_surfaces = !request.omit_surfaces;
         let mut response = wade_wire::batch_response(&vehicle, states.len(), with_surfaces);
         for (turn, states) in states.chunks(STATES_PER_TURN).enumerate() {
@@ -144,7 +144,7 @@ impl Handlers {
                 for (i, state) in states.iter().enumerate() {
                     let index = turn * STATES_PER_TURN + i;
                     call.check_deadline(Some(index))?;
-                    let checked = state.check();
+                    let checked = state.check_for(&vehicle);
                     let checked =
                         checked.map_err(|invalid| Refusal::Invalid { invalid, index: Some(index) })?;
                     let evaluated = evaluator.evaluate(&vehicle, &checked, None);

@@ -14,7 +14,7 @@ use super::handlers::Handlers;
 use crate::metrics::Transport;
 use crate::service::admin::{Job, Jobs};
 use crate::service::call::{Answered, Call};
-use inputs::{INPUTS, shape, short};
+use inputs::{shape, short};
 use wade_core::served::ServedVehicle;
 use wade_wire::proto::Reloaded;
 use wade_wire::proto::inference::grpc_inference_service_server::GrpcInferenceService;
@@ -229,7 +229,7 @@ impl InferenceHandlers {
         request: ModelInferRequest,
     ) -> Result<(ModelInferResponse, Answered), Refusal> {
         let vehicle = self.model(&request.model_name, &request.model_version)?;
-        let mut batch = inputs::batch(&request, self.handlers.max_batch)?;
+        let mut batch = inputs::batch(&request, &vehicle, self.handlers.max_batch)?;
         // a state has one of the two
         let rows = batch.depth_m.len().max(batch.water_level_m.len());
         let outputs = outputs::requested(&vehicle, &request.outputs, rows as i64)?;
@@ -286,7 +286,9 @@ fn metadata(vehicle: &ServedVehicle) -> ModelMetadataResponse {
         name: vehicle.model().vehicle().name.clone(),
         versions: vec![vehicle.model().version().to_string()],
         platform: env!("CARGO_PKG_NAME").into(),
-        inputs: INPUTS.iter().map(|&(field, width)| tensor(field.name(), "FP32", shape(-1, width))).collect(),
+        inputs: inputs::of_vehicle(vehicle)
+            .map(|(field, width)| tensor(field.name(), "FP32", shape(-1, width)))
+            .collect(),
         outputs: outputs.map(|(output, shape)| tensor(output.name(), output.datatype(), shape)).collect(),
     }
 }

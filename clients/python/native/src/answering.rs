@@ -46,7 +46,7 @@ impl Answering {
     ) -> Result<&[u8], InvalidState> {
         let Self { evaluator, sessions, row } = self;
         // a state that is refused begins no session
-        let state = state.check()?;
+        let state = state.check_for(vehicle)?;
         let (session, begins) = found(sessions, (session != 0).then_some(Run::Single(session)));
         row.clear();
         push(row, &evaluator.evaluate(vehicle, &state, session), begins, true);
@@ -62,8 +62,9 @@ impl Answering {
         with_surfaces: bool,
     ) -> Result<Vec<u8>, Invalid> {
         let Self { evaluator, sessions, .. } = self;
-        let check =
-            |(index, state): (usize, &State)| state.check().map_err(|invalid| Invalid { invalid, index });
+        let check = |(index, state): (usize, &State)| {
+            state.check_for(vehicle).map_err(|invalid| Invalid { invalid, index })
+        };
         let states = states.iter().enumerate().map(check).collect::<Result<Vec<_>, _>>()?;
         let mut rows = Vec::new();
         for (index, state) in states.iter().enumerate() {

@@ -144,6 +144,7 @@ impl Vehicle {
 
 /// Field, description and index, in the words of the server.
 fn refused(invalid: wade_wire::InvalidState, index: Option<usize>) -> PyErr {
+    let field = invalid.field.name();
     let description = Refusal::Invalid { invalid, index }.to_string();
-    InvalidState::new_err((invalid.field.name(), description, index))
+    InvalidState::new_err((field, description, index))
 }

@@ -1,6 +1,7 @@
 //! States as the client passes them: single-precision numbers in the order of `State.floats`, and flags.
 
 use wade_core::physics::Physics;
+use wade_core::vehicle::{MAX_WHEELS, PerWheel};
 use wade_wire::State;
 use wade_wire::shm::layout::{
     DRY_CONTACT, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL,
@@ -8,7 +9,7 @@ use wade_wire::shm::layout::{
 };
 
 /// Numbers of a state.
-pub const NUMBERS: usize = 30;
+pub const NUMBERS: usize = 26 + MAX_WHEELS;
 
 /// Bytes that are no rows of states.
 #[derive(Debug, thiserror::Error)]
@@ -21,22 +22,11 @@ pub struct Misshapen {
 
 /// A state of its numbers and of the flags of shared memory.
 pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
-    let &[
-        depth,
-        density,
-        ref vectors @ ..,
-        heading,
-        depth_rate,
-        front_left,
-        front_right,
-        rear_left,
-        rear_right,
-        water_level,
-        bed_clearance,
-        bed,
-        time_step,
-    ] = numbers;
-    let vector = |i: usize| [vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]];
+    let &[depth, density, ref middle @ .., water_level, bed_clearance, bed, time_step] = numbers;
+    let vector = |i: usize| [middle[3 * i], middle[3 * i + 1], middle[3 * i + 2]];
+    let (heading, depth_rate, wheels) = (middle[18], middle[19], &middle[20..]);
+    // places behind the last wheel are NaN
+    let count = wheels.iter().rposition(|speed| !speed.is_nan()).map_or(1, |last| last + 1);
     let has = |flag: u64| flags & flag != 0;
     State {
         velocity: vector(0),
@@ -50,7 +40,7 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
         dry_contact: has(DRY_CONTACT),
         heading: has(HAS_HEADING).then_some(heading),
         depth_rate: has(HAS_DEPTH_RATE).then_some(depth_rate),
-        wheel_speeds: has(HAS_WHEEL_SPEEDS).then_some([front_left, front_right, rear_left, rear_right]),
+        wheel_speeds: PerWheel::new(&wheels[..count]).filter(|_| has(HAS_WHEEL_SPEEDS)),
         time_step,
         implicit_added_mass: has(IMPLICIT_ADDED_MASS),
         water_level: has(HAS_WATER_LEVEL).then_some(water_level),

@@ -72,7 +72,8 @@ class InProcess:
         start = 0
         for name, width in _WIDTHS.items():
             if name in rows:
-                numbers[:, start : start + width] = rows[name].reshape(length, width)
+                row = rows[name].reshape(length, -1)
+                numbers[:, start : start + row.shape[1]] = row
             start += width
         sessions = b""
         if not states.is_default("session"):

@@ -7,6 +7,7 @@ were generated, with each such array declared as bytes: numpy reads and writes t
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import grpc
@@ -107,8 +108,9 @@ def evaluate_request(vehicle: str, state: State) -> Message:
     if state.depth_rate_mps is not None:
         message.depth_rate_mps = rate
     if state.wheel_speed_radps is not None:
+        speeds = [speed for speed in wheels if not math.isnan(speed)]
         with np.errstate(over="ignore"):
-            message.wheel_speed_radps = np.array(wheels, "<f4").tobytes()
+            message.wheel_speed_radps = np.array(speeds, "<f4").tobytes()
     if values[TIME_STEP_AT] != 0.0:
         message.time_step_s = values[TIME_STEP_AT]
     if state.implicit_added_mass:

@@ -21,7 +21,7 @@ from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, 
 from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
 from .local import SessionStream, flags, session_numbers
 from .shm_link import Link, Lost, memory, vehicles
-from .state import TOLD, TOLD_AT, State
+from .state import TOLD_AT, State
 
 _T = TypeVar("_T")
 
@@ -64,7 +64,7 @@ class ShmClient:
 
         with self._lock:
             answer = self._exchange(vehicle, False, write, _read, end, timeout_s)
-        _check(answer["status"], answer, None)
+        _check(answer["status"], answer, None, _wheels(floats) if state.wheel_speed_radps is not None else 0)
         return _forces(answer)
 
     def evaluate_batch(
@@ -75,6 +75,7 @@ class ShmClient:
         rows, flagged = states.rows(), flags(states)
         length = states.length(rows)
         sessions = np.broadcast_to(states.sessions(length), length)
+        wheels = rows["wheel_speed_radps"].shape[1] if "wheel_speed_radps" in rows else 0
         with self._lock:
             forces: Forces | None = None
             start = 0
@@ -85,7 +86,7 @@ class ShmClient:
                     _write_batch(address, (self._sequence, wake_key), flagged, sessions, rows, chunk)
 
                 def read(address: int, forces: Forces | None = forces, chunk: slice = chunk) -> Forces:
-                    return _read_batch(address, forces, length, chunk, surfaces)
+                    return _read_batch(address, forces, length, chunk, surfaces, wheels)
 
                 answered = self._exchange(vehicle, True, write, read, end, timeout_s)
                 if forces is not None and answered is not forces:
@@ -157,20 +158,18 @@ class ShmClient:
         return self._link
 
 
-_NAN = (math.nan,)
+_NO_LEVELS = (math.nan,) * layout.MAX_WHEELS
 _PER_ROW = {
     "water_level_m": layout.HAS_WATER_LEVEL,
     "bed_clearance_m": layout.HAS_BED_CLEARANCE,
     "bed": layout.HAS_BED,
 }
-_WHEELS = TOLD["wheel_speed_radps"]
 
 
 def _query(sequence: int, wake_key: int, session: int, flags: int, floats: list[float]) -> bytes:
-    # in the order of the layout; further wheels and the wheels' levels are not set
+    # in the order of the layout; the wheels' levels are not set
     stated, (heading, depth_rate, *wheels, level, clearance, bed, time_step) = floats[:TOLD_AT], floats[TOLD_AT:]
-    beyond = _NAN * (2 * layout.MAX_WHEELS - _WHEELS)
-    values = (*stated, time_step, heading, depth_rate, level, clearance, bed, *wheels, *beyond)
+    values = (*stated, time_step, heading, depth_rate, level, clearance, bed, *wheels, *_NO_LEVELS)
     try:
         return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *values)
     except OverflowError:
@@ -202,7 +201,7 @@ def _write_batch(
             # of a row of a batch NaN says that it states none
             queries["flags"] &= ~np.where(np.isnan(rows[name][chunk]), flag, 0).astype(np.uint64)
     for name, array in rows.items():
-        place = queries[name][:, :_WHEELS] if name == "wheel_speed_radps" else queries[name]
+        place = queries[name][:, : array.shape[1]] if name == "wheel_speed_radps" else queries[name]
         place[...] = array[chunk]
 
 
@@ -255,11 +254,13 @@ def _effects(answer: np.void, surfaces: Any) -> tuple[Any, ...]:
     return _named(effects), effects["force_n"], effects["moment_nm"], left_out, surfaces["effect_force_n"], box
 
 
-def _read_batch(address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool) -> Forces:
+def _read_batch(
+    address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool, wheels: int
+) -> Forces:
     """Adds the answers to a chunk to those before it, or to new forces where there are none of this bundle."""
     batch = np.frombuffer(memory(address, layout.BATCH_ANSWER.itemsize), layout.BATCH_ANSWER)[0]
     index = int(batch["index"]) % layout.MAX_BATCH
-    _check(batch["status"], batch["answers"][index], chunk.start + index)
+    _check(batch["status"], batch["answers"][index], chunk.start + index, wheels)
     answers = batch["answers"][: chunk.stop - chunk.start]
     if forces is None or forces.bundle_version != answers[0]["bundle_version"]:
         forces = _empty(answers[0], length, _surface_count(answers[0]) if with_surfaces else 0)
@@ -345,11 +346,23 @@ def _surface_count(answer: np.void) -> int:
     return min(int(answer["surface_count"]), layout.MAX_SURFACES)
 
 
-def _check(status: int, answer: np.void, index: int | None) -> None:
+def _wheels(floats: list[float]) -> int:
+    """How many wheel speeds a state has."""
+    wheels = floats[TOLD_AT + 2 : TOLD_AT + 2 + layout.MAX_WHEELS]
+    return sum(not math.isnan(speed) for speed in wheels)
+
+
+def _check(status: int, answer: np.void, index: int | None, wheels: int) -> None:
     if status == layout.STATUS_OK:
         return
     field = layout.FIELDS.get(int(answer["field"]))
     problem = layout.PROBLEMS.get(int(answer["problem"]))
+    counts = answer["problem"] == layout.PROBLEM_COUNT and answer["flags"] & layout.HAS_WHEEL_COUNT
+    if field == "wheel_speed_radps" and counts:
+        # the names of the wheels are not in shared memory
+        given = "1 value" if wheels == 1 else f"{wheels} values"
+        there = {0: "no wheels", 1: "1 wheel"}.get(int(answer["wheel_count"]), f"{answer['wheel_count']} wheels")
+        problem = f"has {given}, and the vehicle has {there}"
     if status == layout.STATUS_INVALID_STATE and field and problem:
         at = "" if index is None else f" (state {index} of the batch)"
         raise InvalidState([Violation(field, f"{field} {problem}{at}", index)])

@@ -21,6 +21,7 @@ MAX_QUANTITIES = 16
 MAX_WHEELS = 8
 PROVENANCE_LEN = 64
 RESERVED_LEN = 128
+ANSWER_RESERVED_LEN = 124
 
 #: Attributes of the service of `served_name`: the version of the layout, and lists of the vehicles that are served.
 SERVED_LAYOUT = "layout"
@@ -48,6 +49,8 @@ SESSION_BEGINS = 2
 #: Flags of an answer: it holds these matrices.
 HAS_ADDED_MASS = 4
 HAS_DAMPING = 8
+#: Flag of an answer: `wheel_count` is set.
+HAS_WHEEL_COUNT = 16
 
 STATUS_OK = 0
 STATUS_INVALID_STATE = 1
@@ -119,7 +122,8 @@ ANSWER = np.dtype(
         ("surfaces", SURFACE_ANSWER, MAX_SURFACES),
         ("added_mass", "<f4", 36),
         ("damping", "<f4", 36),
-        _RESERVED,
+        ("wheel_count", "<u4"),
+        ("reserved", "u1", ANSWER_RESERVED_LEN),
     ]
 )
 
@@ -168,6 +172,9 @@ FIELDS = {
     21: "physics",
 }
 
+#: The code of a number of values that does not fit the vehicle.
+PROBLEM_COUNT = 7
+
 #: What is wrong with them, by code.
 PROBLEMS = {
     1: "must be finite",
@@ -176,7 +183,7 @@ PROBLEMS = {
     4: "must be greater than zero",
     5: "must have length 1",
     6: "must be one of the values of its enumeration",
-    7: "must have four values, or none",
+    7: "must have one value for each wheel of the vehicle, or none",
     8: "is set, which this server does not support yet",
     9: "has a value, but its flag is not set",
     10: "must be given, or water_level_m in its place",

@@ -48,11 +48,13 @@ VECTORS = (
     "angular_acceleration_radps2",
     "gravity_direction",
 )
-#: Fields that may be None, which is not the same as 0: how many numbers each has.
+#: Most wheels whose speeds can be stated.
+MAX_WHEELS = 8
+#: Fields that may be None, which is not the same as 0: how many numbers each has in `State.floats`.
 TOLD = {
     "heading_rad": 1,
     "depth_rate_mps": 1,
-    "wheel_speed_radps": 4,
+    "wheel_speed_radps": MAX_WHEELS,
     "water_level_m": 1,
     "bed_clearance_m": 1,
     "bed": 1,
@@ -97,8 +99,8 @@ class State:
     #: Rate at which the water rises at the body origin [m/s]. None: in a run of states that of the depth, else effects
     #: that need it are left out.
     depth_rate_mps: ArrayLike | None = None
-    #: Front left, front right, rear left, rear right [rad/s], `[4]` or `[N, 4]`. None: effects that need them are left
-    #: out.
+    #: Speed of each of the vehicle's wheels by axle from the front, left before right [rad/s]: of four wheels front left,
+    #: front right, rear left, rear right. `[W]` or `[N, W]` for W wheels. None: effects that need them are left out.
     wheel_speed_radps: ArrayLike | None = None
     #: Signed height of the still-water plane above the body origin along up [m], in the place of `depth_m`.
     water_level_m: ArrayLike | None = None
@@ -125,6 +127,8 @@ class State:
     def floats(self) -> list[float]:
         """The numbers of a single state: the scalars, three a vector, what is told or NaN, the time step.
 
+        Behind the last wheel there is NaN.
+
         Raises `InvalidState` for a wrong shape.
         """
         values = []
@@ -144,11 +148,13 @@ class State:
                 values += _UNTOLD
             else:
                 for name, count in TOLD.items():
-                    values += _told(getattr(self, name), count)
+                    values += _told(name, getattr(self, name), count)
             name = "time_step_s"
             values.append(float(getattr(self, name)))
+        except InvalidState:
+            raise
         except (TypeError, ValueError):
-            expected = "three numbers" if name in VECTORS else "four numbers" if TOLD.get(name) == 4 else "one number"
+            expected = "three numbers" if name in VECTORS else _NUMBERS_TOLD.get(name, "one number")
             raise _wrong(name, f"must be {expected}, got {_describe(getattr(self, name))}") from None
         return values
 
@@ -167,12 +173,17 @@ class State:
         rows = {first: depth}
         told = [name for name in TOLD if getattr(self, name) is not None and name != first]
         for name in (*SCALARS[1:], *VECTORS, *told, "time_step_s"):
-            count = 3 if name in VECTORS else TOLD.get(name, 1)
-            shape = (depth.size,) if count == 1 else (depth.size, count)
             array = _array(name, getattr(self, name))
+            shape = (depth.size, 3) if name in VECTORS else (depth.size,)
+            if name == "wheel_speed_radps":
+                shape = (depth.size, _wheels(array.shape))
             if array.shape not in (shape, shape[1:]):
                 raise _wrong(name, f"must have shape {shape} or {shape[1:]}, got {_describe(getattr(self, name))}")
             rows[name] = np.broadcast_to(array, shape)
+            if name == "wheel_speed_radps" and np.isnan(array).any():
+                index = int(np.isnan(rows[name]).any(axis=1).argmax())
+                description = f"{name} must be finite (state {index} of the batch)"
+                raise InvalidState([Violation(name, description, index)])
         return rows
 
     @staticmethod
@@ -195,13 +206,30 @@ class State:
 _DEFAULTS: dict[str, Any] = {name: field.default for name, field in State.__dataclass_fields__.items()}
 
 
-def _told(value: Any, count: int) -> tuple[float, ...]:
+_NUMBERS_TOLD = {"wheel_speed_radps": f"1 to {MAX_WHEELS} numbers, one a wheel"}
+
+
+def _told(name: str, value: Any, count: int) -> tuple[float, ...]:
     if value is None:
         return (math.nan,) * count
     if count == 1:
         return (float(value),)
-    a, b, c, d = value
-    return (float(a), float(b), float(c), float(d))
+    numbers = tuple(float(number) for number in value)
+    if not 1 <= len(numbers) <= count:
+        raise ValueError
+    # which is what stands behind the last wheel
+    if any(math.isnan(number) for number in numbers):
+        raise _wrong(name, "must be finite")
+    return numbers + (math.nan,) * (count - len(numbers))
+
+
+def _wheels(shape: tuple[int, ...]) -> int:
+    """How many wheels the speeds of a batch are for."""
+    wheels = shape[-1] if len(shape) in (1, 2) else 0
+    if not 1 <= wheels <= MAX_WHEELS:
+        expected = f"[N, W] or [W] with W from 1 to {MAX_WHEELS}"
+        raise _wrong("wheel_speed_radps", f"must have one value a wheel, {expected}, got shape {shape}")
+    return wheels
 
 
 def _array(name: str, value: ArrayLike) -> NDArray[np.float32]:

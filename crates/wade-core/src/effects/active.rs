@@ -16,7 +16,7 @@ use crate::condition::Condition;
 use crate::forces::Forces;
 use crate::frame::Vec3;
 use crate::physics::Physics;
-use crate::vehicle::{MAX_SURFACES, Vehicle};
+use crate::vehicle::{MAX_SURFACES, PerWheel, Vehicle};
 use crate::wrench::Wrench;
 
 /// What effects need to know beside the state; absent where the caller did not say.
@@ -26,8 +26,8 @@ pub struct Circumstances {
     pub heading: Option<f64>,
     /// Rate at which the water rises at the body origin [m/s]; in a session, by default, that of the depth.
     pub depth_rate: Option<f64>,
-    /// Wheel speeds front left, front right, rear left, rear right [rad/s].
-    pub wheel_speeds: Option<[f64; 4]>,
+    /// Speed of each wheel, in the order of the vehicle's wheels [rad/s].
+    pub wheel_speeds: Option<PerWheel<f64>>,
     /// Time since the state before it in the session [s]; 0 leaves the session's memory as it is.
     pub time_step: f64,
     /// The caller integrates added mass himself with the matrix: forces leave `-M_A nu_dot` out.
@@ -236,7 +236,7 @@ impl ActiveEffects {
             yaw: circumstances.heading.unwrap_or(0.0),
             wetting_rate: rate.unwrap_or(0.0),
             channel_width: None,
-            wheel_speeds: circumstances.wheel_speeds.map_or([None; 4], |speeds| speeds.map(Some)),
+            wheel_speeds: circumstances.wheel_speeds.map_or_else(PerWheel::none, |speeds| speeds.map(Some)),
         };
         for entry in &self.entries {
             let implicit = entry.effect == Effect::AddedMass && circumstances.implicit_added_mass;

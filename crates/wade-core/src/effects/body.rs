@@ -20,7 +20,7 @@ pub struct Panel {
     pub facing_plus: Vec3,
     /// Area seen from -x, -y, -z [m2].
     pub facing_minus: Vec3,
-    /// Wheel speed that turns it: 0 to 3 for front left, front right, rear left, rear right.
+    /// Number of the wheel speed that turns it, in the order of the vehicle's wheels.
     pub wheel: Option<usize>,
 }
 
@@ -112,8 +112,12 @@ const BOX_WHEELS: [f64; 3] = [0.2, 0.32, 0.42];
 impl Body {
     /// A vehicle with its mesh. Tabulates the hydrostatics over level and tilt, which takes a tenth of a second.
     pub fn of_vehicle(vehicle: &Vehicle) -> Self {
-        let panels = vehicle.surfaces.iter().enumerate();
-        let panels: Vec<Panel> = panels.map(|(index, _)| mesh_panel(vehicle, index)).collect();
+        let wheels = vehicle.wheels();
+        let panel = |index: usize| Panel {
+            wheel: wheels.iter().position(|&wheel| wheel == index),
+            ..mesh_panel(vehicle, index)
+        };
+        let panels: Vec<Panel> = (0..vehicle.surfaces.len()).map(panel).collect();
         let radius = |panel: &Panel| panel.wheel.map(|_| panel.centroid.z - vehicle.z0);
         let wheel_radius =
             panels.iter().find_map(radius).unwrap_or(BOX_WHEELS[0] * vehicle.dimensions.length);
@@ -183,6 +187,11 @@ impl Body {
         table.immerse(&condition.water_plane(self.z0), out);
     }
 
+    /// Number of wheels.
+    pub fn wheels(&self) -> usize {
+        self.panels.iter().filter(|panel| panel.wheel.is_some()).count()
+    }
+
     /// True where the wheels' places and sizes are known, not assumed.
     pub fn has_wheels(&self) -> bool {
         matches!(self.hull, Hull::Mesh { .. }) && self.panels.iter().any(|panel| panel.wheel.is_some())
@@ -207,7 +216,7 @@ fn mesh_panel(vehicle: &Vehicle, index: usize) -> Panel {
         spread,
         facing_plus: plus,
         facing_minus: minus,
-        wheel: surface.wheel(),
+        wheel: None,
     }
 }
 

@@ -4,6 +4,7 @@ use super::body::Body;
 use super::immersion::Immersion;
 use crate::condition::Condition;
 use crate::frame::Vec3;
+use crate::vehicle::PerWheel;
 use crate::wrench::Wrench;
 
 /// Drag of the model that an effect is added to, as coefficients on windward wet areas [-] along x, y, z: effects that
@@ -44,8 +45,8 @@ pub struct Input<'a> {
     pub wetting_rate: f64,
     /// Width of the channel [m].
     pub channel_width: Option<f64>,
-    /// Wheel speeds front left, front right, rear left, rear right [rad/s].
-    pub wheel_speeds: [Option<f64>; 4],
+    /// Speed of each wheel, in the order of the vehicle's wheels [rad/s]; none of one that is not known.
+    pub wheel_speeds: PerWheel<Option<f64>>,
 }
 
 impl Input<'_> {

@@ -179,7 +179,7 @@ mod tests {
             yaw: 0.6 + more(Quantity::Heading),
             wetting_rate: 0.2 + more(Quantity::DepthRate),
             channel_width: Some(3.5 + more(Quantity::ChannelWidth)),
-            wheel_speeds: [Some(3.0 + more(Quantity::WheelSpeeds)); 4],
+            wheel_speeds: [Some(3.0 + more(Quantity::WheelSpeeds)); 4].into(),
         };
         let mut memory = Memory::default();
         [0.0, 0.1].iter().for_each(|dt| shape.advance(&mut memory, &input, *dt));

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
     use crate::condition::Condition;
     use crate::effects::{Body, Immersion};
-    use crate::vehicle::shipped;
+    use crate::vehicle::{PerWheel, shipped};
 
     #[test]
     fn second_moments_give_what_four_points_give() {
@@ -81,7 +81,7 @@ mod tests {
             yaw: 0.0,
             wetting_rate: 0.0,
             channel_width: None,
-            wheel_speeds: [None; 4],
+            wheel_speeds: PerWheel::none(),
         };
         let mut found = [Wrench::default(); 3];
         LinearDamping.basis(&Memory::default(), &input, &mut |axis, _, load| found[axis] += load);

@@ -107,7 +107,7 @@ mod tests {
     use crate::condition::Condition;
     use crate::effects::{Body, Immersion};
     use crate::frame::up_from_roll_pitch;
-    use crate::vehicle::shipped;
+    use crate::vehicle::{PerWheel, shipped};
 
     /// Sum of a coefficient.
     fn load(wet_at: f64, state: &Condition, wetting_rate: f64, coefficient: usize) -> (Body, Wrench) {
@@ -123,7 +123,7 @@ mod tests {
             yaw: 0.0,
             wetting_rate,
             channel_width: None,
-            wheel_speeds: [None; 4],
+            wheel_speeds: PerWheel::none(),
         };
         let mut sum = Wrench::default();
         let law = WaterEntrySlamming::Wedge { wet_at_m: wet_at };

@@ -62,7 +62,7 @@ impl Law for WheelPaddleThrust {
         let radius = input.body.wheel_radius;
         let scale = input.half_density() * radius * radius;
         for (index, panel) in input.body.panels.iter().enumerate() {
-            let Some(speed) = panel.wheel.and_then(|wheel| input.wheel_speeds[wheel]) else { continue };
+            let Some(speed) = panel.wheel.and_then(|wheel| *input.wheel_speeds.get(wheel)?) else { continue };
             let wet = input.immersion.panels[index].fraction;
             if wet <= 0.0 {
                 continue;

@@ -20,7 +20,7 @@ use crate::forces::{Forces, SurfaceForce};
 use crate::frame::Vec3;
 use crate::physics::drag::SurfaceDrag;
 use crate::physics::{Base, BaseLoads, Memory, Motion, Physics, STATED_NONE};
-use crate::vehicle::{Dimensions, MAX_SURFACES, Vehicle};
+use crate::vehicle::{Dimensions, MAX_SURFACES, PerWheel, Vehicle};
 use blend::Blend;
 use kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, MAX_OUTPUTS, StaticRows, WetSurface};
 
@@ -60,6 +60,8 @@ pub const PHYSICS: &str = "physics";
 #[derive(Debug)]
 pub struct Model {
     vehicle: Vehicle,
+    /// Surfaces of the wheels in the order of their speeds.
+    wheels: Vec<usize>,
     version: u32,
     domain: Domain,
     learned: Option<Learned>,
@@ -120,12 +122,13 @@ impl Model {
     /// Packs the weights for an instruction set and precomputes what the vehicle contributes to layer 1.
     pub fn new(vehicle: Vehicle, version: u32, domain: Domain, weights: Weights, isa: Isa) -> Self {
         let learned = Some(Learned::new(&vehicle, weights, isa));
-        Self { vehicle, version, domain, learned, base: None }
+        Self { wheels: vehicle.wheels(), vehicle, version, domain, learned, base: None }
     }
 
     /// A vehicle of which nothing was learned.
     pub fn of_physics(vehicle: Vehicle, version: u32, base: Base) -> Self {
-        Self { vehicle, version, domain: Domain::EVERYWHERE, learned: None, base: Some(base) }
+        let (wheels, domain) = (vehicle.wheels(), Domain::EVERYWHERE);
+        Self { vehicle, wheels, version, domain, learned: None, base: Some(base) }
     }
 
     /// The same weights on the physical base.
@@ -172,15 +175,16 @@ impl Model {
         self.weights().map_or(PHYSICS, |weights| &weights.provenance)
     }
 
-    /// Speed of each surface that is a wheel, NaN where none is stated [rad/s].
-    pub fn wheel_speeds(&self, stated: Option<&[f64; 4]>) -> [f64; MAX_SURFACES] {
+    /// Surfaces of the wheels in the order in which their speeds are stated, see [`Vehicle::wheels`].
+    pub fn wheels(&self) -> &[usize] {
+        &self.wheels
+    }
+
+    /// Speed of each surface that is a wheel, NaN where none is stated [rad/s]. Speeds of another number of wheels are not stated.
+    pub fn wheel_speeds(&self, stated: Option<&PerWheel<f64>>) -> [f64; MAX_SURFACES] {
         let mut speeds = STATED_NONE;
-        if let Some(stated) = stated {
-            for (speed, surface) in speeds.iter_mut().zip(&self.vehicle.surfaces) {
-                if let Some(wheel) = surface.wheel() {
-                    *speed = stated[wheel];
-                }
-            }
+        if let Some(stated) = stated.filter(|stated| stated.len() == self.wheels.len()) {
+            self.wheels.iter().zip(stated.iter()).for_each(|(&surface, &speed)| speeds[surface] = speed);
         }
         speeds
     }

@@ -12,6 +12,7 @@ pub mod plausible;
 pub mod shipped;
 pub mod spec;
 mod validate;
+mod wheels;
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::geometry::submergence::Samples;
 pub use crate::geometry::surfaces::Hull;
 pub use validate::VehicleError;
+pub use wheels::{MAX_WHEELS, PerWheel};
 
 use crate::condition::{Condition, GroundContact};
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
@@ -64,15 +66,6 @@ pub struct Surface {
     pub mirror_left_right: usize,
     /// Index of the counterpart across x = 0, itself when it lies on that plane; `None` when it has none.
     pub mirror_front_rear: Option<usize>,
-}
-
-impl Surface {
-    /// Number of the wheel speed that turns it: 0 to 3 for front left, front right, rear left, rear right; none of what is no
-    /// wheel.
-    pub fn wheel(&self) -> Option<usize> {
-        let place = 2 * usize::from(self.centroid.x < 0.0) + usize::from(self.centroid.y < 0.0);
-        (self.kind == SurfaceKind::Wheel).then_some(place)
-    }
 }
 
 /// Size of the bounding box or as stated [m].

@@ -46,7 +46,7 @@ fn told() -> Circumstances {
     Circumstances {
         heading: Some(0.6),
         depth_rate: Some(0.2),
-        wheel_speeds: Some([3.0, 4.0, 5.0, 6.0]),
+        wheel_speeds: Some([3.0, 4.0, 5.0, 6.0].into()),
         ..Circumstances::default()
     }
 }

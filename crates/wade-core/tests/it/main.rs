@@ -24,3 +24,4 @@ mod release;
 mod shipped;
 mod submergence;
 mod symmetry;
+mod wheels;

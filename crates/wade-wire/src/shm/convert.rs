@@ -2,16 +2,16 @@
 
 use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, FULL, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE,
-    HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS,
-    HYDROSTATIC, IMPLICIT_ADDED_MASS, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY,
-    Query, Status, SurfaceAnswer,
+    HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_COUNT, HAS_WHEEL_LEVELS,
+    HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN,
+    QUASI_STEADY, Query, Status, SurfaceAnswer,
 };
 use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, by_rows, single};
 use wade_core::domain::{Outside, Quantity};
 use wade_core::effects::{BoxQuantity, OutsideBox};
 use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
-use wade_core::vehicle::MAX_SURFACES;
+use wade_core::vehicle::{MAX_SURFACES, PerWheel};
 
 /// Flags of a query that are known.
 const QUERY_FLAGS: u64 = DRY_CONTACT
@@ -27,17 +27,14 @@ const QUERY_FLAGS: u64 = DRY_CONTACT
     | QUASI_STEADY
     | FULL;
 
-/// Wheels that effects know of.
-const WHEELS: usize = 4;
-
 impl Query {
     /// The state, or what it sets that cannot be used. Its values are not checked yet.
     pub fn state(&self) -> Result<State, InvalidState> {
         if self.flags & !QUERY_FLAGS != 0 {
-            return Err(InvalidState { field: Field::Flags, problem: Problem::Unsupported });
+            return Err(InvalidState::new(Field::Flags, Problem::Unsupported));
         }
         if self.has(HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m)? {
-            return Err(InvalidState { field: Field::WheelWaterLevel, problem: Problem::Unsupported });
+            return Err(InvalidState::new(Field::WheelWaterLevel, Problem::Unsupported));
         }
         let optional = |flag: u64, field: Field, value: f32| {
             Ok::<_, InvalidState>(self.has(flag, field, &[value])?.then_some(value))
@@ -48,10 +45,6 @@ impl Query {
         let heading = self.has(HAS_HEADING, Field::Heading, &[self.heading_rad])?;
         let depth_rate = self.has(HAS_DEPTH_RATE, Field::DepthRate, &[self.depth_rate_mps])?;
         let wheel_speeds = self.has(HAS_WHEEL_SPEEDS, Field::WheelSpeed, &self.wheel_speed_radps)?;
-        let [a, b, c, d, beyond @ ..] = self.wheel_speed_radps;
-        if beyond.iter().any(|speed| !speed.is_nan()) {
-            return Err(InvalidState { field: Field::WheelSpeed, problem: Problem::Count });
-        }
         Ok(State {
             velocity: self.velocity_mps,
             current: self.current_mps,
@@ -67,7 +60,7 @@ impl Query {
             dry_contact: self.flags & DRY_CONTACT != 0,
             heading: heading.then_some(self.heading_rad),
             depth_rate: depth_rate.then_some(self.depth_rate_mps),
-            wheel_speeds: wheel_speeds.then_some([a, b, c, d]),
+            wheel_speeds: wheel_speeds.then(|| self.wheel_speeds()),
             time_step: self.time_step_s,
             implicit_added_mass: self.flags & IMPLICIT_ADDED_MASS != 0,
             physics: match self.flags & (HYDROSTATIC | QUASI_STEADY | FULL) {
@@ -75,16 +68,23 @@ impl Query {
                 HYDROSTATIC => Some(Physics::Hydrostatic),
                 QUASI_STEADY => Some(Physics::QuasiSteady),
                 FULL => Some(Physics::Full),
-                _ => return Err(InvalidState { field: Field::Physics, problem: Problem::Unknown }),
+                _ => return Err(InvalidState::new(Field::Physics, Problem::Unknown)),
             },
         })
+    }
+
+    /// The wheel speeds up to the last that is a number. Whether they are those of all wheels is checked where the vehicle is known.
+    fn wheel_speeds(&self) -> PerWheel<f32> {
+        let speeds = &self.wheel_speed_radps;
+        let count = speeds.iter().rposition(|speed| !speed.is_nan()).map_or(1, |last| last + 1);
+        PerWheel::new(&speeds[..count]).unwrap_or_else(PerWheel::none)
     }
 
     /// Whether the flag of an input is set. A value without its flag is a client's mistake, not a value to pass over.
     fn has(&self, flag: u64, field: Field, values: &[f32]) -> Result<bool, InvalidState> {
         let has = self.flags & flag != 0;
         if !has && values.iter().any(|value| !value.is_nan()) {
-            return Err(InvalidState { field, problem: Problem::WithoutFlag });
+            return Err(InvalidState::new(field, Problem::WithoutFlag));
         }
         Ok(has)
     }
@@ -95,7 +95,7 @@ impl From<&State> for Query {
         let flag = |set: bool, flag: u64| if set { flag } else { 0 };
         let mut wheel_speed_radps = [f32::NAN; MAX_WHEELS];
         if let Some(speeds) = state.wheel_speeds {
-            wheel_speed_radps[..WHEELS].copy_from_slice(&speeds);
+            wheel_speed_radps[..speeds.len()].copy_from_slice(&speeds);
         }
         Self {
             flags: flag(state.dry_contact, DRY_CONTACT)
@@ -136,6 +136,7 @@ impl Answer {
     pub fn fill(&mut self, vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) {
         let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
         *self = Self::UNSET;
+        self.count_wheels(vehicle);
         self.compute_ns = *compute_ns;
         self.bundle_version = model.version();
         self.surface_count = forces.surfaces.len() as u32;
@@ -189,14 +190,20 @@ impl Answer {
         }
     }
 
-    /// Becomes a refusal that says which field is wrong.
-    pub fn refuse(&mut self, invalid: InvalidState) {
+    fn count_wheels(&mut self, vehicle: &ServedVehicle) {
+        self.wheel_count = vehicle.model().wheels().len() as u32;
+        self.flags |= HAS_WHEEL_COUNT;
+    }
+
+    /// Becomes a refusal of a query to a vehicle that says which field is wrong.
+    pub fn refuse(&mut self, invalid: &InvalidState, vehicle: &ServedVehicle) {
         *self = Self {
             status: Status::InvalidState as u32,
             field: invalid.field as u32,
             problem: invalid.problem as u32,
             ..Self::UNSET
         };
+        self.count_wheels(vehicle);
     }
 
     /// A copy, for which what counts is read alone: memory that another core has written is slow to read.
@@ -222,6 +229,7 @@ impl Answer {
             bed_clearance_m: self.bed_clearance_m,
             bed: self.bed,
             provenance: self.provenance,
+            wheel_count: self.wheel_count,
             ..Self::UNSET
         };
         let (effects, surfaces) = (self.effects(), self.surfaces());
@@ -240,12 +248,24 @@ impl Answer {
     pub fn refusal(&self) -> Option<InvalidState> {
         (self.status == Status::InvalidState as u32)
             .then(|| {
-                Some(InvalidState {
-                    field: Field::from_code(self.field)?,
-                    problem: Problem::from_code(self.problem)?,
-                })
+                Some(InvalidState::new(Field::from_code(self.field)?, Problem::from_code(self.problem)?))
             })
             .flatten()
+    }
+
+    /// The same with the numbers of wheels in words, for the state that was asked about.
+    pub fn refusal_of(&self, state: &State) -> Option<InvalidState> {
+        let invalid = self.refusal()?;
+        let wheels = (self.flags & HAS_WHEEL_COUNT != 0).then_some(self.wheel_count as usize);
+        match (wheels, &state.wheel_speeds) {
+            (Some(wheels), Some(given))
+                if (invalid.field, invalid.problem) == (Field::WheelSpeed, Problem::Count) =>
+            {
+                // the names of the wheels are not in shared memory
+                Some(InvalidState::wheels(given.len(), wheels, ""))
+            }
+            _ => Some(invalid),
+        }
     }
 
     /// The surfaces that hold a load.
@@ -290,11 +310,11 @@ fn known<const N: usize>(excess: &[f32]) -> [f64; N] {
 }
 
 impl BatchAnswer {
-    /// What was wrong with which state, where something was.
-    pub fn refusal(&self) -> Option<(InvalidState, usize)> {
+    /// What was wrong with which of the states that were asked about, where something was.
+    pub fn refusal_of(&self, states: &[State]) -> Option<(InvalidState, usize)> {
         let index = self.index as usize % MAX_BATCH;
         (self.status == Status::InvalidState as u32)
-            .then(|| Some((self.answers[index].refusal()?, index)))
+            .then(|| Some((self.answers[index].refusal_of(states.get(index)?)?, index)))
             .flatten()
     }
 }

@@ -31,11 +31,13 @@ pub const MAX_EFFECTS: usize = 32;
 /// Room for the quantities of a training domain, and of the box in which effects were seen.
 pub const MAX_QUANTITIES: usize = 16;
 /// Room for wheels.
-pub const MAX_WHEELS: usize = 8;
+pub const MAX_WHEELS: usize = wade_core::vehicle::MAX_WHEELS;
 /// Length of the provenance, which is cut to fit.
 pub const PROVENANCE_LEN: usize = 64;
-/// Bytes of each message that have no meaning yet.
+/// Bytes that each message had without a meaning when the layout began.
 pub const RESERVED_LEN: usize = 128;
+/// Those of them that an [`Answer`] has left.
+pub const ANSWER_RESERVED_LEN: usize = 124;
 
 /// Version of the layout, as the names of the services have it.
 pub const VERSION: &str = "v4";
@@ -122,6 +124,8 @@ pub const SESSION_BEGINS: u64 = 2;
 pub const HAS_ADDED_MASS: u64 = 4;
 /// Flag of [`Answer::flags`]: `damping` holds a matrix.
 pub const HAS_DAMPING: u64 = 8;
+/// Flag of [`Answer::flags`]: `wheel_count` is set.
+pub const HAS_WHEEL_COUNT: u64 = 16;
 
 /// A state and who asks. 328 bytes.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
@@ -165,8 +169,8 @@ pub struct Query {
     pub bed_clearance_m: f32,
     /// Whether the bed moves under the vehicle: 0 parked to 1 driving.
     pub bed: f32,
-    /// Wheel speeds by axle from the front, left before right [rad/s]: front left, front right, rear left, rear right.
-    /// Places beyond the vehicle's wheels are NaN.
+    /// Speed of each wheel of the vehicle by axle from the front, left before right [rad/s]; of four wheels front left, front
+    /// right, rear left, rear right. Places beyond the vehicle's wheels are NaN.
     pub wheel_speed_radps: [f32; MAX_WHEELS],
     /// Height of the water surface above the body origin along up at each wheel [m], in the same order.
     pub wheel_water_level_m: [f32; MAX_WHEELS],
@@ -215,7 +219,7 @@ pub struct Answer {
     pub sequence: u64,
     /// Time from the checked state to the forces [ns].
     pub compute_ns: u64,
-    /// [`SERVER_POLLS`], [`SESSION_BEGINS`], [`HAS_ADDED_MASS`], [`HAS_DAMPING`]
+    /// [`SERVER_POLLS`], [`SESSION_BEGINS`] and those named `HAS_`
     pub flags: u64,
     /// [`Status`]
     pub status: u32,
@@ -259,8 +263,11 @@ pub struct Answer {
     pub added_mass: [f32; 36],
     /// Linear damping about `about_m` by rows, forces first [N s/m, N s, N m s].
     pub damping: [f32; 36],
+    /// How many wheels the vehicle has, each of which takes a speed; in a refusal too. Of a server that does not state it the
+    /// flag is clear.
+    pub wheel_count: u32,
     /// Zero.
-    pub reserved: [u8; RESERVED_LEN],
+    pub reserved: [u8; ANSWER_RESERVED_LEN],
 }
 
 /// What comes before the states of a batch. 160 bytes.
@@ -402,7 +409,8 @@ impl Answer {
         surfaces: [SurfaceAnswer::UNSET; MAX_SURFACES],
         added_mass: [f32::NAN; 36],
         damping: [f32::NAN; 36],
-        reserved: [0; RESERVED_LEN],
+        wheel_count: 0,
+        reserved: [0; ANSWER_RESERVED_LEN],
     };
 }
 

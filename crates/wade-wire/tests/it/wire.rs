@@ -36,7 +36,7 @@ prop_compose! {
         let (heading, depth_rate, wheel_speed, time_step) = given;
         State { velocity, current, angular_velocity, acceleration, angular_acceleration, gravity, depth: depth.abs(),
                 density: density.abs(), dry_contact, heading: Some(heading), depth_rate: Some(depth_rate),
-                wheel_speeds: Some([wheel_speed; 4]), time_step: time_step.abs(), implicit_added_mass, ..State::default() }
+                wheel_speeds: Some([wheel_speed; 4].into()), time_step: time_step.abs(), implicit_added_mass, ..State::default() }
     }
 }
 

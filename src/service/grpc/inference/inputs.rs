@@ -3,14 +3,16 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
+use wade_core::served::ServedVehicle;
+use wade_core::vehicle::MAX_WHEELS;
 use wade_wire::proto;
 use wade_wire::proto::inference::infer_parameter::ParameterChoice;
 use wade_wire::proto::inference::model_infer_request::InferInputTensor;
 use wade_wire::proto::inference::{InferParameter, ModelInferRequest};
 use wade_wire::{Field, InvalidState, Problem, Refusal, TensorFault};
 
-/// The inputs with their values a state, by the names of the arrays of a batch. All are FP32.
-pub const INPUTS: [(Field, usize); 14] = [
+/// The inputs of every vehicle with their values a state, by the names of the arrays of a batch. All are FP32.
+const INPUTS: [(Field, usize); 13] = [
     (Field::Depth, 1),
     (Field::WaterLevel, 1),
     (Field::BedClearance, 1),
@@ -24,8 +26,15 @@ pub const INPUTS: [(Field, usize); 14] = [
     (Field::Gravity, 3),
     (Field::Heading, 1),
     (Field::DepthRate, 1),
-    (Field::WheelSpeed, 4),
 ];
+
+/// The inputs of a vehicle with the rest of their shapes behind the number of states: a scalar has none.
+pub fn of_vehicle(vehicle: &ServedVehicle) -> impl Iterator<Item = (Field, Option<usize>)> {
+    let wheels = vehicle.model().wheels().len();
+    let has_speeds = (1..=MAX_WHEELS).contains(&wheels);
+    let input = |(field, width): (Field, usize)| (field, (width > 1).then_some(width));
+    INPUTS.into_iter().map(input).chain(has_speeds.then_some((Field::WheelSpeed, Some(wheels))))
+}
 
 /// The parameters of a request, which hold for all its states.
 const PARAMETERS: &str =
@@ -39,13 +48,17 @@ pub fn short(name: &str) -> String {
     name.chars().take(MAX_NAME).collect()
 }
 
-/// The shape of a tensor with so many values a state: a scalar has no second dimension.
-pub fn shape(rows: i64, width: usize) -> Vec<i64> {
-    if width == 1 { vec![rows] } else { vec![rows, width as i64] }
+/// The shape of a tensor of so many rows.
+pub fn shape(rows: i64, width: Option<usize>) -> Vec<i64> {
+    std::iter::once(rows).chain(width.map(|width| width as i64)).collect()
 }
 
-/// The batch that a request asks for.
-pub fn batch(request: &ModelInferRequest, max: usize) -> Result<proto::EvaluateBatchRequest, Refusal> {
+/// The batch that a request asks a vehicle for.
+pub fn batch(
+    request: &ModelInferRequest,
+    vehicle: &ServedVehicle,
+    max: usize,
+) -> Result<proto::EvaluateBatchRequest, Refusal> {
     let (inputs, raw) = (&request.inputs, &request.raw_input_contents);
     if !raw.is_empty() && raw.len() != inputs.len() {
         return Err(TensorFault::RawCount { raw: raw.len(), inputs: inputs.len() }.into());
@@ -59,8 +72,10 @@ pub fn batch(request: &ModelInferRequest, max: usize) -> Result<proto::EvaluateB
             return Err(TensorFault::Repeated { name: name() }.into());
         }
         seen.push(&input.name);
-        let known = INPUTS.into_iter().find(|(field, _)| field.name() == input.name);
-        let (field, width) = known.ok_or_else(|| TensorFault::Unknown { name: name(), known: names() })?;
+        check_wheels(input, vehicle)?;
+        let known = of_vehicle(vehicle).find(|(field, _)| field.name() == input.name);
+        let unknown = || TensorFault::Unknown { name: name(), known: names(vehicle) };
+        let (field, width) = known.ok_or_else(unknown)?;
         if let Some(parameter) = input.parameters.keys().next() {
             return Err(TensorFault::Parameter { name: short(parameter), known: "none" }.into());
         }
@@ -73,8 +88,19 @@ pub fn batch(request: &ModelInferRequest, max: usize) -> Result<proto::EvaluateB
     Ok(batch)
 }
 
-fn names() -> String {
-    INPUTS.map(|(field, _)| field.name()).join(", ")
+fn names(vehicle: &ServedVehicle) -> String {
+    of_vehicle(vehicle).map(|(field, _)| field.name()).collect::<Vec<_>>().join(", ")
+}
+
+/// Refuses the speeds of another number of wheels than the vehicle has, and names these.
+fn check_wheels(input: &InferInputTensor, vehicle: &ServedVehicle) -> Result<(), Refusal> {
+    let wheels = vehicle.model().wheels().len();
+    match *input.shape.as_slice() {
+        [_, given] if input.name == Field::WheelSpeed.name() && given != wheels as i64 => {
+            Err(InvalidState::wheel_count(usize::try_from(given).unwrap_or(0), vehicle).into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The number of states: the rows of depth_m, or of water_level_m where there are none.
@@ -104,7 +130,7 @@ fn values(
     input: &InferInputTensor,
     raw: Option<&[u8]>,
     rows: usize,
-    width: usize,
+    width: Option<usize>,
 ) -> Result<Vec<f32>, TensorFault> {
     let name = || input.name.clone();
     if input.datatype != "FP32" {
@@ -114,20 +140,21 @@ fn values(
     if input.shape != expected {
         return Err(TensorFault::Shape { name: name(), shape: start(&input.shape), expected });
     }
+    let count = rows * width.unwrap_or(1);
     let length = |len, expected, unit| Err(TensorFault::Length { name: name(), len, expected, unit });
     match (raw, &input.contents) {
         (Some(_), Some(_)) => Err(TensorFault::Both { name: name() }),
         (Some(bytes), None) => {
             let (values, rest) = bytes.as_chunks::<4>();
-            if values.len() != rows * width || !rest.is_empty() {
-                return length(bytes.len(), 4 * rows * width, "bytes");
+            if values.len() != count || !rest.is_empty() {
+                return length(bytes.len(), 4 * count, "bytes");
             }
             Ok(values.iter().copied().map(f32::from_le_bytes).collect())
         }
         (None, contents) => {
             let values = contents.as_ref().map_or(&[][..], |contents| &contents.fp32_contents);
-            if values.len() != rows * width {
-                return length(values.len(), rows * width, "values");
+            if values.len() != count {
+                return length(values.len(), count, "values");
             }
             Ok(values.to_vec())
         }
@@ -163,7 +190,7 @@ fn parameters(
     for (name, parameter) in parameters {
         match (name.as_str(), &parameter.parameter_choice) {
             ("ground_contact", Some(ParameterChoice::StringParam(value))) => {
-                let unknown = InvalidState { field: Field::GroundContact, problem: Problem::Unknown };
+                let unknown = InvalidState::new(Field::GroundContact, Problem::Unknown);
                 let contact = proto::GroundContact::from_str_name(value).ok_or(unknown)?;
                 batch.ground_contact = contact as i32;
             }
