@@ -125,6 +125,13 @@ using Vector3 = float[3];
   return Span<const float>(forces.damping, 36);
 }
 
+// Power that the shafts of the wheels put in [W]; none where the bundle has no physical base or the server does not state it.
+[[nodiscard]] inline std::optional<float> shaft_power(const Forces &forces) noexcept {
+  const bool stated = forces.shaft_power_w == forces.shaft_power_w;
+  if ((forces.flags & WADE_HAS_BASE) == 0 || !stated) return std::nullopt;
+  return forces.shaft_power_w;
+}
+
 // The surfaces of a vehicle, in the order of the answers.
 [[nodiscard]] inline Span<const wade_surface> surfaces(const Vehicle &vehicle) noexcept {
   return {vehicle.surfaces, vehicle.surface_count};

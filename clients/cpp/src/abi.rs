@@ -49,7 +49,8 @@ pub const WADE_IN_DOMAIN: u32 = 1;
 pub const WADE_SESSION_BEGINS: u32 = 2;
 /// Flag of forces: `added_mass` holds a matrix.
 pub const WADE_HAS_ADDED_MASS: u32 = 4;
-/// Flag of forces: the bundle has the physical base, and `damping`, `water_level_m`, `bed_clearance_m` and `bed` hold values.
+/// Flag of forces: the bundle has the physical base, and `damping`, `water_level_m`, `bed_clearance_m`, `bed` and
+/// `shaft_power_w` hold values.
 pub const WADE_HAS_BASE: u32 = 8;
 
 /// What came of a call.
@@ -216,8 +217,8 @@ pub struct WadeForces {
     pub surface_count: u32,
     /// Entries of `effects` that hold a load.
     pub effect_count: u32,
-    /// 0
-    pub reserved: u32,
+    /// Power that the shafts of the wheels put in [W]; NaN of a server that does not state it.
+    pub shaft_power_w: f32,
     /// Net force [N].
     pub force_n: [f32; 3],
     /// Net moment about `about_m` [N m].

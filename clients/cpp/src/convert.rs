@@ -102,7 +102,7 @@ impl WadeForces {
         bundle_version: 0,
         surface_count: 0,
         effect_count: 0,
-        reserved: 0,
+        shaft_power_w: 0.0,
         force_n: [0.0; 3],
         moment_nm: [0.0; 3],
         about_m: [0.0; 3],
@@ -194,7 +194,7 @@ impl From<&Answer> for WadeForces {
         if has_base {
             forces.damping = answer.damping;
             (forces.water_level_m, forces.bed_clearance_m) = (answer.water_level_m, answer.bed_clearance_m);
-            forces.bed = answer.bed;
+            (forces.bed, forces.shaft_power_w) = (answer.bed, answer.shaft_power());
         }
         for (i, load) in surfaces.iter().take(WADE_MAX_SURFACES).enumerate() {
             forces.surface_force_n[i] = load.force_n;
@@ -245,7 +245,7 @@ impl From<&Reply> for WadeForces {
         if let Some(base) = &reply.base {
             forces.damping = base.damping;
             (forces.water_level_m, forces.bed_clearance_m) = (base.water_level, base.bed_clearance);
-            forces.bed = base.bed;
+            (forces.bed, forces.shaft_power_w) = (base.bed, base.shaft_power);
         }
         for (i, surface) in reply.surfaces.iter().take(WADE_MAX_SURFACES).enumerate() {
             forces.surface_force_n[i] = surface.force;

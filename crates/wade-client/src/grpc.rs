@@ -256,8 +256,7 @@ impl From<&Reply> for proto::EvaluateResponse {
                 water_level_m: base.water_level,
                 bed_clearance_m: base.bed_clearance,
                 bed: base.bed,
-                // it does not travel in shared memory
-                shaft_power_w: f32::NAN,
+                shaft_power_w: base.shaft_power,
                 damping: base.damping.to_vec(),
             }),
             in_domain: reply.outside.is_inside(),
@@ -347,6 +346,7 @@ fn base(base: &proto::BaseAnswer) -> Option<BaseReply> {
         water_level: base.water_level_m,
         bed_clearance: base.bed_clearance_m,
         bed: base.bed,
+        shaft_power: base.shaft_power_w,
         damping: base.damping.as_slice().try_into().ok()?,
     })
 }

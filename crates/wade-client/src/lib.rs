@@ -57,6 +57,8 @@ pub struct BaseReply {
     pub bed_clearance: f32,
     /// Share of the motion through the water that is motion over the bed, as used.
     pub bed: f32,
+    /// Power that the shafts of the wheels put in [W]; NaN of a server that does not state it.
+    pub shaft_power: f32,
     /// Linear damping by rows, forces first [kg/s, kg m/s, kg m2/s].
     pub damping: [f32; 36],
 }
@@ -122,6 +124,7 @@ impl Reply {
             water_level: base.water_level as f32,
             bed_clearance: base.bed_clearance as f32,
             bed: base.bed as f32,
+            shaft_power: base.shaft_power as f32,
             damping: by_rows(&base.damping),
         };
         Self {

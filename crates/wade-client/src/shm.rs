@@ -141,6 +141,7 @@ impl From<&Answer> for Reply {
             water_level: answer.water_level_m,
             bed_clearance: answer.bed_clearance_m,
             bed: answer.bed,
+            shaft_power: answer.shaft_power(),
             damping: answer.damping,
         });
         let effect = |load: &EffectAnswer| {

@@ -133,6 +133,8 @@ class Forces:
     bed_clearance_m: Array | None
     #: Share of the motion through the water that is motion over the bed, as used.
     bed: Array | None
+    #: Power that the shafts of the wheels put in [W]. None of a server that does not state it, too.
+    shaft_power_w: Array | None
     #: True where a run of states begins with this one: effects remember nothing yet. In the middle of a run it says
     #: that the server has forgotten it.
     session_begins: NDArray[np.bool_] | np.bool_

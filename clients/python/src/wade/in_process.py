@@ -181,6 +181,7 @@ class _Vehicle:
             water_level_m=of_base("water_level_m"),
             bed_clearance_m=of_base("bed_clearance_m"),
             bed=of_base("bed"),
+            shaft_power_w=of_base("shaft_power_w"),
             session_begins=answer["session_begins"] != 0,
             bundle_version=self.version,
             provenance=self.provenance,

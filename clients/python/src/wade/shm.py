@@ -231,6 +231,7 @@ def _forces(answer: np.void) -> Forces:
         water_level_m=answer["water_level_m"] if has_base else None,
         bed_clearance_m=answer["bed_clearance_m"] if has_base else None,
         bed=answer["bed"] if has_base else None,
+        shaft_power_w=answer["shaft_power_w"] if flags & layout.HAS_SHAFT_POWER else None,
         session_begins=_YES if flags & layout.SESSION_BEGINS else _NO,
         bundle_version=int(answer["bundle_version"]),
         provenance=answer["provenance"].decode(errors="ignore"),
@@ -278,7 +279,7 @@ def _read_batch(
     for matrix, name in ((forces.added_mass, "added_mass"), (forces.damping, "damping")):
         if matrix is not None:
             matrix[chunk] = answers[name].reshape(-1, 6, 6)
-    for name in ("water_level_m", "bed_clearance_m", "bed"):
+    for name in ("water_level_m", "bed_clearance_m", "bed", "shaft_power_w"):
         if (values := getattr(forces, name)) is not None:
             values[chunk] = answers[name]
     _read_effects(answers, forces, chunk)
@@ -327,6 +328,7 @@ def _empty(answer: np.void, length: int, surfaces: int) -> Forces:
         water_level_m=array() if has_base else None,
         bed_clearance_m=array() if has_base else None,
         bed=array() if has_base else None,
+        shaft_power_w=array() if flags & layout.HAS_SHAFT_POWER else None,
         session_begins=np.empty(length, bool),
         bundle_version=int(answer["bundle_version"]),
         provenance=answer["provenance"].decode(errors="ignore"),

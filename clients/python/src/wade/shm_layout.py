@@ -21,7 +21,7 @@ MAX_QUANTITIES = 16
 MAX_WHEELS = 8
 PROVENANCE_LEN = 64
 RESERVED_LEN = 128
-ANSWER_RESERVED_LEN = 124
+ANSWER_RESERVED_LEN = 120
 
 #: Attributes of the service of `served_name`: the version of the layout, and lists of the vehicles that are served.
 SERVED_LAYOUT = "layout"
@@ -51,6 +51,8 @@ HAS_ADDED_MASS = 4
 HAS_DAMPING = 8
 #: Flag of an answer: `wheel_count` is set.
 HAS_WHEEL_COUNT = 16
+#: Flag of an answer: `shaft_power_w` is set.
+HAS_SHAFT_POWER = 32
 
 STATUS_OK = 0
 STATUS_INVALID_STATE = 1
@@ -123,6 +125,7 @@ ANSWER = np.dtype(
         ("added_mass", "<f4", 36),
         ("damping", "<f4", 36),
         ("wheel_count", "<u4"),
+        ("shaft_power_w", "<f4"),
         ("reserved", "u1", ANSWER_RESERVED_LEN),
     ]
 )

@@ -2,7 +2,7 @@
 
 use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, FULL, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE,
-    HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL, HAS_WHEEL_COUNT, HAS_WHEEL_LEVELS,
+    HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_SHAFT_POWER, HAS_WATER_LEVEL, HAS_WHEEL_COUNT, HAS_WHEEL_LEVELS,
     HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN,
     QUASI_STEADY, Query, Status, SurfaceAnswer,
 };
@@ -151,7 +151,8 @@ impl Answer {
             self.bed_clearance_m = base.bed_clearance as f32;
             self.bed = base.bed as f32;
             self.damping = by_rows(&base.damping);
-            self.flags |= HAS_DAMPING;
+            self.shaft_power_w = base.shaft_power as f32;
+            self.flags |= HAS_DAMPING | HAS_SHAFT_POWER;
         }
         for (slot, excess) in self.outside.iter_mut().zip(forces.outside.excess) {
             *slot = excess as f32;
@@ -230,6 +231,7 @@ impl Answer {
             bed: self.bed,
             provenance: self.provenance,
             wheel_count: self.wheel_count,
+            shaft_power_w: self.shaft_power_w,
             ..Self::UNSET
         };
         let (effects, surfaces) = (self.effects(), self.surfaces());
@@ -271,6 +273,11 @@ impl Answer {
     /// The surfaces that hold a load.
     pub fn surfaces(&self) -> &[SurfaceAnswer] {
         &self.surfaces[..(self.surface_count as usize).min(MAX_SURFACES)]
+    }
+
+    /// Power that the shafts of the wheels put in [W]; NaN where it is not stated.
+    pub fn shaft_power(&self) -> f32 {
+        if self.flags & HAS_SHAFT_POWER != 0 { self.shaft_power_w } else { f32::NAN }
     }
 
     /// The effects that hold a load.

@@ -37,7 +37,7 @@ pub const PROVENANCE_LEN: usize = 64;
 /// Bytes that each message had without a meaning when the layout began.
 pub const RESERVED_LEN: usize = 128;
 /// Those of them that an [`Answer`] has left.
-pub const ANSWER_RESERVED_LEN: usize = 124;
+pub const ANSWER_RESERVED_LEN: usize = 120;
 
 /// Version of the layout, as the names of the services have it.
 pub const VERSION: &str = "v4";
@@ -126,6 +126,8 @@ pub const HAS_ADDED_MASS: u64 = 4;
 pub const HAS_DAMPING: u64 = 8;
 /// Flag of [`Answer::flags`]: `wheel_count` is set.
 pub const HAS_WHEEL_COUNT: u64 = 16;
+/// Flag of [`Answer::flags`]: `shaft_power_w` is set.
+pub const HAS_SHAFT_POWER: u64 = 32;
 
 /// A state and who asks. 328 bytes.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
@@ -266,6 +268,9 @@ pub struct Answer {
     /// How many wheels the vehicle has, each of which takes a speed; in a refusal too. Of a server that does not state it the
     /// flag is clear.
     pub wheel_count: u32,
+    /// Power that the shafts of the wheels put in [W]. Of a model without the physical base it is NaN; of a server that does not
+    /// state it the flag is clear.
+    pub shaft_power_w: f32,
     /// Zero.
     pub reserved: [u8; ANSWER_RESERVED_LEN],
 }
@@ -410,6 +415,7 @@ impl Answer {
         added_mass: [f32::NAN; 36],
         damping: [f32::NAN; 36],
         wheel_count: 0,
+        shaft_power_w: f32::NAN,
         reserved: [0; ANSWER_RESERVED_LEN],
     };
 }

@@ -89,7 +89,8 @@ words_of_structs! {
     SurfaceAnswer: force_n, point_m, couple_nm, effect_force_n, wetted_fraction;
     Answer: sequence, compute_ns, flags, status, field, problem, bundle_version, surface_count, effect_count, force_n,
         moment_nm, about_m, force_deviation_n, moment_deviation_nm, outside, effects_outside, water_level_m,
-        bed_clearance_m, bed, provenance, effects, surfaces, added_mass, damping, wheel_count, reserved;
+        bed_clearance_m, bed, provenance, effects, surfaces, added_mass, damping, wheel_count,
+        shaft_power_w, reserved;
     BatchHeader: sequence, wake_key, flags, count, spare, reserved;
     BatchQuery: header, queries;
     BatchAnswer: sequence, compute_ns, flags, status, index, count, spare, reserved, answers;
@@ -130,7 +131,7 @@ fn fields<T: Words>(name: &str, page: &T, rows: &[(&str, Vec<f64>)]) {
         let expected: Vec<f64> = match *field {
             "reserved" | "spare" => vec![0.0; words.len()],
             // reserved on the first day
-            "wheel_count" => vec![0.0; words.len()],
+            "wheel_count" | "shaft_power_w" => vec![0.0; words.len()],
             // a text, not a number
             "provenance" => {
                 let mut text = b"the first page of v4".map(f64::from).to_vec();
@@ -159,7 +160,7 @@ fn is_a_set_answer(name: &str, answer: &Answer) {
     let rows = rows!(answer; sequence, compute_ns, flags, status, field, problem, bundle_version, surface_count,
         effect_count, force_n, moment_nm, about_m, force_deviation_n, moment_deviation_nm, outside, effects_outside,
         water_level_m, bed_clearance_m, bed, provenance, effects, surfaces, added_mass, damping, wheel_count,
-        reserved);
+        shaft_power_w, reserved);
     fields(name, answer, &rows);
     assert_eq!(answer.provenance(), "the first page of v4");
 }
@@ -210,6 +211,8 @@ fn what_is_not_set_is_nan_or_has_no_flag() {
     let unset =
         [answer.moment_deviation_nm.words(), answer.added_mass.words(), answer.damping.words()].concat();
     assert!(unset.iter().all(|word| word.is_nan()), "{unset:?}");
+    // the zeros of bytes that were reserved are no power
+    assert!(answer.shaft_power().is_nan() && answer.shaft_power_w == 0.0);
     assert!([answer.water_level_m, answer.bed_clearance_m, answer.bed].iter().all(|value| value.is_nan()));
     let couples = answer.surfaces.iter().flat_map(|surface| surface.couple_nm);
     assert!(couples.into_iter().all(f32::is_nan));
