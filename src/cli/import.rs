@@ -176,7 +176,7 @@ fn document(imported: &Imported, folder: &Path, version: u32) -> serde_json::Val
     });
     let wheels = wheels.iter().map(|wheel| {
         let center = wheel.center + vehicle.translation;
-        json!({"name": wheel.name, "source": wheel.source, "radius_m": wheel.radius, "width_m": wheel.width,
+        json!({"name": wheel.name, "kind": wheel.kind, "source": wheel.source, "radius_m": wheel.radius, "width_m": wheel.width,
             "center_m": center.as_slice(), "roundness": wheel.roundness})
     });
     let d = &vehicle.dimensions;

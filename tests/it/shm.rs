@@ -227,7 +227,7 @@ fn what_no_model_answers_yet_is_unset_and_never_zero() {
         &answer.surfaces[surfaces.len()..].iter().flat_map(|load| load.force_n).collect::<Vec<_>>(),
         &answer.effects_outside,
         &answer.outside[8..],
-        &[answer.water_level_m, answer.bed_clearance_m, answer.bed],
+        &[answer.water_level_m, answer.bed_clearance_m, answer.bed, answer.shaft_power_w],
         &answer.added_mass,
         &answer.damping,
     ];

@@ -74,6 +74,7 @@ fn six_wheels_take_six_speeds_on_every_transport() {
             let batch: Vec<_> = client.evaluate_batch(&states).unwrap().into_iter().map(comparable).collect();
             assert_eq!(batch, expected, "batch over {name}");
         }
+        assert!(expected.iter().all(|reply| reply.base.unwrap().shaft_power > 0.0), "over every transport");
         // the last speed is that of the last wheel
         let push = expected[0].surfaces.last().unwrap().force[0];
         assert!(before.is_none_or(|before: f32| before > push), "{before:?} {push}");

@@ -304,7 +304,7 @@ pub enum WadeQuantity {
 pub struct WadeSurface {
     /// As in vehicle.toml.
     pub name: [c_char; WADE_NAME_SIZE],
-    /// bottom, front, rear, side or wheel.
+    /// bottom, front, rear, side, wheel or track.
     pub kind: [c_char; 16],
     /// [m]
     pub centroid_m: [f32; 3],

@@ -85,7 +85,7 @@ pub fn global(condition: &Condition, dimensions: &Dimensions) -> [f64; GLOBAL] {
 /// The features of a surface that do not change with the state.
 pub fn surface_static(surface: &Surface, dimensions: &Dimensions) -> [f64; STATIC] {
     let mut features = [0.0; STATIC];
-    features[surface.kind as usize] = 1.0;
+    features[surface.kind.network_input()] = 1.0;
     features[5] = surface.centroid.x / dimensions.length;
     features[6] = surface.centroid.y / dimensions.width;
     features[7] = surface.centroid.z / dimensions.height;

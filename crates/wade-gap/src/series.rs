@@ -10,7 +10,7 @@ use wade_core::effects::{Body, Immersion, Input};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::wrench::Wrench;
 use wade_learn::signal::pieces;
-use wade_learn::trials::{SimIs, Trial, Trials, WHEELS, WRENCH};
+use wade_learn::trials::{SimIs, Trial, Trials, WRENCH};
 
 /// Nothing wades where the water is as many times as deep as its hull is high.
 const DEEPEST: f64 = 4.0;
@@ -210,7 +210,7 @@ fn of_trial(
         smooth_rates(&trial.t, &pieces, &mut conditions);
     }
     // the four columns say nothing of a vehicle with other wheels
-    let has_four = body.wheels() == WHEELS.len();
+    let has_four = body.has_four_wheels();
     let speeds = trial.wheel_speeds.each_ref().map(|column| column.as_ref().filter(|_| has_four));
     let wheels: Vec<[Option<f64>; 4]> =
         (0..count).map(|i| speeds.map(|column| column.map(|column| column[i]))).collect();

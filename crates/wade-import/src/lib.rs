@@ -14,6 +14,7 @@ mod scene;
 mod shapes;
 mod solid;
 mod surfaces;
+mod tracks;
 mod unite;
 mod watch;
 mod wheels;
@@ -27,10 +28,10 @@ pub use unite::UniteError;
 pub use wheels::Wheel;
 
 use wade_core::frame::Vec3;
-use wade_core::vehicle::Vehicle;
 use wade_core::vehicle::build::{AssignedHull, BuildError, build_from_hull};
 use wade_core::vehicle::plausible::{Floating, questions};
 use wade_core::vehicle::spec::{Axis, BodyFromStl, ContactSpec, VehicleSpec};
+use wade_core::vehicle::{SurfaceKind, Vehicle};
 
 use limits::{ASSUMED_DENSITY, MOST_FACES};
 use place::Placement;
@@ -89,7 +90,7 @@ pub struct Imported {
     pub vehicle: Vehicle,
     /// Displaced volume and floating position.
     pub floating: Floating,
-    /// Its wheels, in the order of their surfaces.
+    /// Its wheels and tracks, in the order of their surfaces.
     pub wheels: Vec<Wheel>,
     /// What was found and guessed, a sentence each.
     pub notes: Vec<String>,
@@ -244,7 +245,7 @@ fn build(
     Ok(build_from_hull(&spec, hull)?)
 }
 
-/// Where wheels stand on the ground, for the convention without water under the tires.
+/// Where wheels and tracks stand on the ground, for the convention without water under the tires.
 fn contacts(wheels: &[Wheel], assigned: &Assigned) -> Vec<ContactSpec> {
     let lowest = |vertices: &[Vec3]| vertices.iter().map(|vertex| vertex.z).fold(f64::INFINITY, f64::min);
     let ground = lowest(&assigned.mesh.vertices);
@@ -252,9 +253,14 @@ fn contacts(wheels: &[Wheel], assigned: &Assigned) -> Vec<ContactSpec> {
         wheel.center.z - wheel.radius - ground <= limits::WHEEL_GROUND_SHARE * 2.0 * wheel.radius
             && assigned.patches.iter().any(|patch| patch.name == wheel.name)
     };
+    // a track lies flat between its two ends
+    let length = |wheel: &Wheel| match wheel.kind {
+        SurfaceKind::Track => (wheel.length - 2.0 * wheel.radius).max(limits::CONTACT_SHARE * wheel.radius),
+        _ => limits::CONTACT_SHARE * wheel.radius,
+    };
     let contact = |wheel: &Wheel| ContactSpec {
         patch: wheel.name.clone(),
-        area_m2: limits::CONTACT_SHARE * wheel.radius * wheel.width,
+        area_m2: length(wheel) * wheel.width,
         center_xy_m: None,
     };
     wheels.iter().filter(stands).map(contact).collect()

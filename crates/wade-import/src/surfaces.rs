@@ -1,4 +1,4 @@
-//! A surface for every face: one a wheel, and of the body bottom, front, rear, left and right.
+//! A surface for every face: one a wheel and a track, and of the body bottom, front, rear, left and right.
 
 use wade_core::geometry::mesh::Mesh;
 use wade_core::vehicle::spec::PatchSpec;
@@ -54,10 +54,11 @@ pub fn assign(united: &United, pieces: &[Piece], wheels: &[Wheel]) -> Assigned {
     };
     let patch = |&surface: &usize| PatchSpec {
         name: name(surface),
-        kind: surface.checked_sub(BODY.len()).map_or_else(|| BODY[surface].1, |_| SurfaceKind::Wheel),
+        kind: surface.checked_sub(BODY.len()).map_or_else(|| BODY[surface].1, |wheel| wheels[wheel].kind),
         left_right: partner(surface, left_right),
         front_rear: partner(surface, front_rear),
         normal: normal(surface, wheels),
+        sprocket_radius_m: None,
     };
     let patches = kept.iter().map(patch).collect();
     // a face of a surface that is none goes to the first: it has no area
@@ -81,7 +82,7 @@ fn body_surface(mesh: &Mesh, face: usize, middle: f64) -> usize {
     }
 }
 
-/// Stated where the mean of the faces would mislead: the deck folded into the sides, and wheels.
+/// Stated where the mean of the faces would mislead: the deck folded into the sides, wheels and tracks.
 fn normal(surface: usize, wheels: &[Wheel]) -> Option<[f64; 3]> {
     match surface {
         2 => Some([0.0, 1.0, 0.0]),
@@ -99,6 +100,8 @@ fn left_right(name: &str) -> Option<String> {
     let swapped = match name {
         "left" => "right".to_owned(),
         "right" => "left".to_owned(),
+        "track_left" => "track_right".to_owned(),
+        "track_right" => "track_left".to_owned(),
         "wheel_fl" => "wheel_fr".to_owned(),
         "wheel_fr" => "wheel_fl".to_owned(),
         "wheel_rl" => "wheel_rr".to_owned(),
@@ -119,7 +122,7 @@ fn front_rear(name: &str) -> Option<String> {
         "wheel_fr" => "wheel_rr",
         "wheel_rl" => "wheel_fl",
         "wheel_rr" => "wheel_fr",
-        "left" | "right" | "bottom" => name,
+        "left" | "right" | "bottom" | "track_left" | "track_right" => name,
         _ => return None,
     };
     Some(swapped.to_owned())

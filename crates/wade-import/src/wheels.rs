@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::Bounds;
+use wade_core::vehicle::SurfaceKind;
 
 use crate::at;
 use crate::limits::{
@@ -11,29 +12,34 @@ use crate::limits::{
 };
 use crate::scene::{Joint, Scene};
 use crate::solid::Piece;
+use crate::tracks;
 
-/// A wheel of the vehicle; body axes, origin of the files.
+/// A wheel or a track of the vehicle; body axes, origin of the files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wheel {
     /// Name of its surface.
     pub name: String,
+    /// Wheel or track.
+    pub kind: SurfaceKind,
     /// The link or part that it was.
     pub source: String,
     /// Unit vector along its axle, to the left.
     pub axis: Vec3,
-    /// Middle of the wheel on its axle [m].
+    /// Middle of the wheel on its axle, or of the track [m].
     pub center: Vec3,
-    /// Largest radius [m].
+    /// Largest radius of a wheel, half the height of a track [m].
     pub radius: f64,
     /// Width along the axle [m].
     pub width: f64,
-    /// Smallest over largest radius around the axle; 1 for a cylinder.
+    /// Length along x: the diameter of a wheel [m].
+    pub length: f64,
+    /// Smallest over largest radius around the axle; 1 for a cylinder, 0 for a track.
     pub roundness: f64,
     /// True on the left of the middle of the vehicle, or in it.
     pub is_left: bool,
 }
 
-/// Finds the wheels, marks their pieces and orders them: from the front, the left one first.
+/// Finds wheels and tracks, marks their pieces and orders them: wheels from the front, the left one first, and then the tracks.
 pub fn find(
     scene: &Scene,
     pieces: &mut [Piece],
@@ -51,6 +57,7 @@ pub fn find(
             ));
         }
     }
+    let tracks = tracks::find(scene, pieces, &mut found, notes);
     found.sort_by(|(a, _), (b, _)| {
         let near = (a.center.x - b.center.x).abs() < 0.5 * a.radius.min(b.radius);
         let front = if near { std::cmp::Ordering::Equal } else { b.center.x.total_cmp(&a.center.x) };
@@ -60,9 +67,22 @@ pub fn find(
     let middle = middle.map_or(0.0, |bounds| bounds.center().y);
     found.iter_mut().for_each(|(wheel, _)| wheel.is_left = wheel.center.y >= middle);
     let names = names(&found);
-    for (index, ((wheel, members), name)) in found.iter_mut().zip(names).enumerate() {
-        wheel.name = name;
+    found.iter_mut().zip(names).for_each(|((wheel, _), name)| wheel.name = name);
+    found.extend(tracks);
+    for (index, (wheel, members)) in found.iter().enumerate() {
         members.iter().for_each(|piece| pieces[*piece].wheel = Some(index));
+        if wheel.kind == SurfaceKind::Track {
+            notes.push(format!(
+                "track `{}`: {}, length {:.4} m, height {:.4} m, width {:.4} m, center {}; radius of its sprocket taken as half the height",
+                wheel.name,
+                wheel.source,
+                wheel.length,
+                2.0 * wheel.radius,
+                wheel.width,
+                at(&wheel.center)
+            ));
+            continue;
+        }
         if wheel.roundness < LEAST_ROUNDNESS {
             warnings.push(format!(
                 "wheel `{}` ({}) is no cylinder: its radius about the axle through {} is {:.4} to {:.4} m",
@@ -163,11 +183,13 @@ fn measure(source: &str, axis: Vec3, origin: Vec3, pieces: &[Piece], members: &[
     let smallest = seen.fold(radius, f64::min);
     Wheel {
         name: String::new(),
+        kind: SurfaceKind::Wheel,
         source: source.to_owned(),
         axis,
         center: origin + axis * (0.5 * (along[0] + along[1])),
         radius,
         width: along[1] - along[0],
+        length: 2.0 * radius,
         roundness: if radius > 0.0 { smallest / radius } else { 0.0 },
         is_left: true,
     }

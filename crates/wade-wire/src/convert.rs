@@ -447,6 +447,7 @@ fn surface(surface: &Surface) -> proto::Surface {
         SurfaceKind::Rear => "rear",
         SurfaceKind::Side => "side",
         SurfaceKind::Wheel => "wheel",
+        SurfaceKind::Track => "track",
     };
     proto::Surface {
         name: surface.name.clone(),

@@ -58,7 +58,9 @@ pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool) -> Vec<Column> {
     }
     if has_base {
         columns.push(column("damping", FLOAT, &[6, 6]));
-        columns.extend(["water_level_m", "bed_clearance_m", "bed", "shaft_power_w"].map(|name| column(name, FLOAT, &[])));
+        columns.extend(
+            ["water_level_m", "bed_clearance_m", "bed", "shaft_power_w"].map(|name| column(name, FLOAT, &[])),
+        );
     }
     columns
 }
@@ -104,7 +106,10 @@ pub fn push(rows: &mut Vec<u8>, evaluated: &Evaluated<'_>, begins: bool, with_su
     push_floats(rows, added_mass(effects).into_iter().flatten());
     if let Some(base) = &forces.base {
         push_floats(rows, by_rows(&base.damping));
-        push_floats(rows, [base.water_level, base.bed_clearance, base.bed, base.shaft_power].map(|x| x as f32));
+        push_floats(
+            rows,
+            [base.water_level, base.bed_clearance, base.bed, base.shaft_power].map(|x| x as f32),
+        );
     }
 }
 

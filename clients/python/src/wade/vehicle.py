@@ -15,7 +15,7 @@ class Surface:
     """A named region of the hull."""
 
     name: str
-    #: bottom, front, rear, side or wheel.
+    #: bottom, front, rear, side, wheel or track.
     kind: str
     #: [m], `[3]`
     centroid_m: NDArray[np.float32]

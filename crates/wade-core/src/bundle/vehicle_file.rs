@@ -53,6 +53,9 @@ struct SurfaceEntry {
     mirror_left_right: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     mirror_front_rear: Option<String>,
+    /// Of a track alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sprocket_radius_m: Option<f64>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -104,6 +107,7 @@ impl VehicleFile {
             area_m2: surface.area,
             mirror_left_right: name(surface.mirror_left_right),
             mirror_front_rear: surface.mirror_front_rear.map(name),
+            sprocket_radius_m: surface.sprocket_radius,
         };
         let contact = |contact: &ContactPatch| ContactEntry {
             surface: name(contact.surface),
@@ -151,6 +155,7 @@ impl VehicleFile {
                 area: entry.area_m2,
                 mirror_left_right: index(&entry.mirror_left_right)?,
                 mirror_front_rear: entry.mirror_front_rear.as_ref().map(index).transpose()?,
+                sprocket_radius: entry.sprocket_radius_m,
             })
         };
         let contact = |entry: &ContactEntry| {

@@ -5,7 +5,7 @@ use super::immersion::{Immersion, WetPanel};
 use crate::condition::Condition;
 use crate::forces::SurfaceForce;
 use crate::frame::{Vec3, WaterPlane};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{SurfaceKind, Vehicle};
 
 /// A piece of the hull; body frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Panel {
     pub facing_plus: Vec3,
     /// Area seen from -x, -y, -z [m2].
     pub facing_minus: Vec3,
-    /// Number of the wheel speed that turns it, in the order of the vehicle's wheels.
+    /// Number of the wheel speed that turns it, in the order of the vehicle's wheels; none of what is no wheel.
     pub wheel: Option<usize>,
 }
 
@@ -114,7 +114,11 @@ impl Body {
     pub fn of_vehicle(vehicle: &Vehicle) -> Self {
         let wheels = vehicle.wheels();
         let panel = |index: usize| Panel {
-            wheel: wheels.iter().position(|&wheel| wheel == index),
+            // the belt of a track is no wheel that pushes water with its disc or its lugs
+            wheel: wheels
+                .iter()
+                .position(|&wheel| wheel == index)
+                .filter(|_| vehicle.surfaces[index].kind == SurfaceKind::Wheel),
             ..mesh_panel(vehicle, index)
         };
         let panels: Vec<Panel> = (0..vehicle.surfaces.len()).map(panel).collect();
@@ -187,9 +191,11 @@ impl Body {
         table.immerse(&condition.water_plane(self.z0), out);
     }
 
-    /// Number of wheels.
-    pub fn wheels(&self) -> usize {
-        self.panels.iter().filter(|panel| panel.wheel.is_some()).count()
+    /// True where speeds are those of four wheels.
+    pub fn has_four_wheels(&self) -> bool {
+        let mut wheels: Vec<usize> = self.panels.iter().filter_map(|panel| panel.wheel).collect();
+        wheels.sort_unstable();
+        wheels == [0, 1, 2, 3]
     }
 
     /// True where the wheels' places and sizes are known, not assumed.

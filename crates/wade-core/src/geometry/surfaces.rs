@@ -20,6 +20,15 @@ impl Hull {
         self.face_surface.iter().enumerate().filter(move |(_, s)| **s as usize == surface).map(|(f, _)| f)
     }
 
+    /// Extent of one surface along z [m]; 0 where it has no face.
+    pub fn height_of(&self, surface: usize) -> f64 {
+        let corners = self.faces_of(surface).flat_map(|face| self.mesh.faces[face]);
+        let heights = corners.map(|corner| self.mesh.vertices[corner as usize].z);
+        let [least, most] =
+            heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], z| [least.min(z), most.max(z)]);
+        (most - least).max(0.0)
+    }
+
     /// Area moments of one surface; `None` when it has no face.
     pub fn patch(&self, surface: usize) -> Option<Patch> {
         Patch::of(&self.mesh, self.faces_of(surface))

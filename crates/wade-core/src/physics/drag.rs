@@ -13,8 +13,12 @@
 //! Elements of a wheel whose speed `W` is stated have the velocity of its rim too, and besides `C_f` the coefficient
 //! [`TREAD`] `(W r)^2 / ((W r)^2 + |u|^2)` of its lugs: a wheel that stands still has the drag of one of which nothing is stated.
 //!
+//! Elements of a track whose speed `W` is stated, that of its drive sprocket of the radius `r`, have besides the velocity of the
+//! belt `W r (n_z, 0, -n_x)`, which runs round about the body's y, and the coefficient of its lugs on the share `1 - n_y^2` of
+//! them that the belt covers: the sides of a track stand still.
+//!
 //! Every term opposes the velocity of its own element and every factor is positive, so the sum over the elements takes
-//! power from the motion through the water in every state; wheels that turn put in their shaft power at most.
+//! power from the motion through the water in every state; wheels and tracks that turn put in their shaft power at most.
 
 use super::elements::{Element, LANES};
 use crate::condition::Condition;
@@ -47,8 +51,8 @@ pub struct Drag {
     blocks: Vec<Block>,
     /// Blocks of each surface: from, to.
     ranges: Vec<[usize; 2]>,
-    /// Center and radius of each surface that is a wheel [m].
-    wheels: Vec<Option<(Vec3, f64)>>,
+    /// How each surface that turns does so.
+    turning: Vec<Option<Turning>>,
     half_length: f64,
     half_width: f64,
     length: f64,
@@ -56,6 +60,26 @@ pub struct Drag {
 }
 
 type Lane = [f64; LANES];
+
+/// A wheel or a track.
+#[derive(Debug, Clone, Copy)]
+struct Turning {
+    center: Vec3,
+    /// Of the rim of a wheel, or of the sprocket of a track [m].
+    radius: f64,
+    is_track: bool,
+}
+
+/// A turning surface in a state: what its elements need of it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Skin {
+    /// Speed of a wheel [rad/s], or of the belt of a track [m/s].
+    speed: f64,
+    axle_x: f64,
+    axle_z: f64,
+    /// Tangential coefficient of the lugs.
+    lugs: f64,
+}
 
 /// [`LANES`] elements, in lock step.
 #[derive(Debug, Clone, Copy)]
@@ -103,19 +127,26 @@ impl Drag {
             blocks.extend(own.chunks(LANES).map(|chunk| Block::new(chunk, film)));
             ranges.push([from, blocks.len()]);
         }
-        let wheel = |(index, surface): (usize, &crate::vehicle::Surface)| {
+        let turning = |(index, surface): (usize, &crate::vehicle::Surface)| {
             let from_axle = |e: &Element| {
                 let arm = e.center - surface.centroid;
                 arm.x.hypot(arm.z)
             };
             let own = elements.iter().filter(|e| e.surface == index);
             let radius = || own.map(from_axle).fold(0.0, f64::max);
-            (surface.kind == SurfaceKind::Wheel).then(|| (surface.centroid, radius()))
+            let turning =
+                |radius: f64, is_track: bool| Turning { center: surface.centroid, radius, is_track };
+            match surface.kind {
+                SurfaceKind::Wheel => Some(turning(radius(), false)),
+                // a vehicle that was checked has the radius
+                SurfaceKind::Track => Some(turning(surface.sprocket_radius.unwrap_or(0.0), true)),
+                SurfaceKind::Bottom | SurfaceKind::Front | SurfaceKind::Rear | SurfaceKind::Side => None,
+            }
         };
         Self {
             blocks,
             ranges,
-            wheels: vehicle.surfaces.iter().enumerate().map(wheel).collect(),
+            turning: vehicle.surfaces.iter().enumerate().map(turning).collect(),
             half_length: 0.5 * vehicle.dimensions.length,
             half_width: 0.5 * vehicle.dimensions.width,
             length: vehicle.dimensions.length,
@@ -134,7 +165,7 @@ impl Drag {
     }
 
     /// Loads of the motion through the water on each surface; `wheel_speeds` has one entry a surface, the speed of a wheel
-    /// about the body's y [rad/s], NaN where none is stated. `out` has one entry a surface. No allocation.
+    /// or of the sprocket of a track about the body's y [rad/s], NaN where none is stated. `out` has one entry a surface. No allocation.
     pub fn evaluate(
         &self,
         plane: &WaterPlane,
@@ -155,16 +186,22 @@ impl Drag {
         for (surface, out) in out.iter_mut().enumerate() {
             let [from, to] = self.ranges[surface];
             let speed = wheel_speeds[surface];
-            let rim = self.wheels[surface].filter(|_| !speed.is_nan());
+            let turning = self.turning[surface].filter(|_| !speed.is_nan());
             let mut sums = Sums::default();
-            let rim = rim.map(|(center, radius)| {
+            let skin = turning.map(|Turning { center, radius, is_track }| {
                 let axle = condition.velocity + condition.angular_velocity.cross(&center);
                 let (spin, past) = ((speed * radius).powi(2), axle.norm_squared());
                 let lugs = if spin > 0.0 { TREAD * spin / (spin + past) } else { 0.0 };
-                [speed, center.x, center.z, lugs]
+                let speed = if is_track { speed * radius } else { speed };
+                Skin { speed, axle_x: center.x, axle_z: center.z, lugs }
             });
+            let skin = skin.unwrap_or_default();
+            let is_track = turning.is_some_and(|turning| turning.is_track);
             for block in &self.blocks[from..to] {
-                block.add(flow, rim, &mut sums);
+                match is_track {
+                    true => block.add::<true>(flow, skin, &mut sums),
+                    false => block.add::<false>(flow, skin, &mut sums),
+                }
             }
             *out = sums.finish();
         }
@@ -239,10 +276,9 @@ impl Block {
     }
 
     #[inline(always)]
-    fn add(&self, flow: &Flow, rim: Option<[f64; 4]>, sums: &mut Sums) {
+    fn add<const IS_TRACK: bool>(&self, flow: &Flow, skin: Skin, sums: &mut Sums) {
         let [ux, uy, uz] = flow.up;
-        let [speed, axle_x, axle_z, lugs] = rim.unwrap_or_default();
-        let tangential = flow.friction + lugs;
+        let Skin { speed, axle_x, axle_z, lugs } = skin;
         let pi = std::f64::consts::PI;
         for i in 0..LANES {
             let [x, y, z] = [self.center[0][i], self.center[1][i], self.center[2][i]];
@@ -270,7 +306,11 @@ impl Block {
                 flow.velocity[1] + (wz * x - wx * z),
                 flow.velocity[2] + (wx * y - wy * x),
             ];
-            let skin = [speed * (z - axle_z), -speed * (x - axle_x)];
+            let (skin, tangential) = if IS_TRACK {
+                ([speed * nz, -speed * nx], flow.friction + lugs * (1.0 - ny * ny))
+            } else {
+                ([speed * (z - axle_z), -speed * (x - axle_x)], flow.friction + lugs)
+            };
             let (vx, vy, vz) = (hull[0] + skin[0], hull[1], hull[2] + skin[1]);
             let across = vx * nx + vy * ny + vz * nz;
             let squared = vx * vx + vy * vy + vz * vz;

@@ -250,6 +250,10 @@ fn surfaces(spec: &VehicleSpec, hull: &Hull) -> Result<Vec<Surface>, BuildError>
             area: moments.area,
             mirror_left_right: partner(&patch.left_right)?.unwrap_or(index),
             mirror_front_rear: partner(&patch.front_rear)?,
+            sprocket_radius: match patch.kind {
+                SurfaceKind::Track => Some(patch.sprocket_radius_m.unwrap_or(0.5 * hull.height_of(index))),
+                _ => patch.sprocket_radius_m,
+            },
         });
     }
     Ok(surfaces)
@@ -262,7 +266,9 @@ fn normal(spec: &PatchSpec, moments: &Patch) -> Vec3 {
         SurfaceKind::Bottom => -Vec3::z(),
         SurfaceKind::Front => Vec3::x(),
         SurfaceKind::Rear => -Vec3::x(),
-        SurfaceKind::Side | SurfaceKind::Wheel => Vec3::y() * 1f64.copysign(moments.centroid.y),
+        SurfaceKind::Side | SurfaceKind::Wheel | SurfaceKind::Track => {
+            Vec3::y() * 1f64.copysign(moments.centroid.y)
+        }
     })
 }
 

@@ -31,7 +31,7 @@ use spec::BodyFromStl;
 /// Most surfaces a vehicle may have.
 pub const MAX_SURFACES: usize = 64;
 
-/// What a surface is to the flow; the order of the variants is the one-hot order of the network's input.
+/// What a surface is to the flow; the order of the first five is the one-hot order of the network's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SurfaceKind {
@@ -45,6 +45,24 @@ pub enum SurfaceKind {
     Side,
     /// A wheel.
     Wheel,
+    /// A track: a belt that runs round about the body's y.
+    Track,
+}
+
+impl SurfaceKind {
+    /// True of what has a shaft whose speed can be stated.
+    pub fn turns(self) -> bool {
+        matches!(self, Self::Wheel | Self::Track)
+    }
+
+    /// Place of the kind among the inputs of a network, which know five: to a network that was trained without tracks a track is a
+    /// wheel.
+    pub fn network_input(self) -> usize {
+        match self {
+            Self::Track => Self::Wheel as usize,
+            kind => kind as usize,
+        }
+    }
 }
 
 /// A named region of the hull with the source paper's descriptors; body frame.
@@ -66,6 +84,8 @@ pub struct Surface {
     pub mirror_left_right: usize,
     /// Index of the counterpart across x = 0, itself when it lies on that plane; `None` when it has none.
     pub mirror_front_rear: Option<usize>,
+    /// Radius of the drive sprocket of a track, which turns its speed into that of the belt [m]; `None` of what is no track.
+    pub sprocket_radius: Option<f64>,
 }
 
 /// Size of the bounding box or as stated [m].

@@ -136,6 +136,9 @@ pub struct PatchSpec {
     /// Normal to state where the mean of the faces would mislead: a deck folded into a front panel, a wheel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 3]>,
+    /// Radius of the drive sprocket of a track [m]; default: half the height of the track.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sprocket_radius_m: Option<f64>,
 }
 
 /// Faces of one surface: all the conditions given must hold; a rule without conditions takes every face.

@@ -1,6 +1,6 @@
 //! What the rest of the program may rely on in a vehicle.
 
-use super::{ContactPatch, Dimensions, MAX_SURFACES, Vehicle};
+use super::{ContactPatch, Dimensions, MAX_SURFACES, SurfaceKind, Vehicle};
 use crate::frame::Vec3;
 
 /// Why a set of values is no vehicle.
@@ -31,6 +31,12 @@ pub enum VehicleError {
     /// A surface with impossible geometry.
     #[error("surface `{name}`: area, centroid or unit normal is not a sound number")]
     Surface {
+        /// The surface.
+        name: String,
+    },
+    /// A track without the radius of its sprocket, or another surface with one.
+    #[error("surface `{name}`: a track has a positive sprocket_radius_m, and nothing else has one")]
+    Sprocket {
         /// The surface.
         name: String,
     },
@@ -137,6 +143,11 @@ impl Vehicle {
             let unit = (s.normal.norm() - 1.0).abs() < 1e-6;
             if !(unit && s.area > 0.0 && s.area.is_finite() && finite(&s.centroid)) {
                 return Err(VehicleError::Surface { name });
+            }
+            let is_track = s.kind == SurfaceKind::Track;
+            let sprocket = s.sprocket_radius.map(|radius| radius > 0.0 && radius.is_finite());
+            if sprocket != is_track.then_some(true) {
+                return Err(VehicleError::Sprocket { name });
             }
             let left_right = partner(s.mirror_left_right).is_some_and(|p| p.mirror_left_right == index);
             let back = |p: usize| partner(p).is_some_and(|p| p.mirror_front_rear == Some(index));

@@ -1,8 +1,8 @@
-//! The wheels of a vehicle in the order in which their speeds are stated.
+//! The wheels and tracks of a vehicle in the order in which their speeds are stated. Of a track it is that of its drive sprocket.
 
 use std::ops::Deref;
 
-use super::{SurfaceKind, Vehicle};
+use super::Vehicle;
 
 /// Most wheels whose speeds can be stated.
 pub const MAX_WHEELS: usize = 8;
@@ -16,7 +16,7 @@ impl Vehicle {
     /// Of two pairs the order is front left, front right, rear left, rear right of the middle of the hull, also where the wheels
     /// of a pair are not at the same x. A vehicle may have more wheels than [`MAX_WHEELS`]; then no speeds can be stated for it.
     pub fn wheels(&self) -> Vec<usize> {
-        let turns = |index: &usize| self.surfaces[*index].kind == SurfaceKind::Wheel;
+        let turns = |index: &usize| self.surfaces[*index].kind.turns();
         let mut wheels: Vec<usize> = (0..self.surfaces.len()).filter(turns).collect();
         let at = |index: usize| self.surfaces[index].centroid;
         let quarter = |index: usize| 2 * usize::from(at(index).x < 0.0) + usize::from(at(index).y < 0.0);

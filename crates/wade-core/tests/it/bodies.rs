@@ -1,4 +1,4 @@
-//! Hulls of other kinds than the shipped ones: a box, a sphere, a car, a tub.
+//! Hulls of other kinds than the shipped ones: a box, a sphere, a car, a tub, a tracked one.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use wade_core::geometry::parametric::{Section, cuboid, cylinder, loft, sphere};
 use wade_core::physics::Radiation;
 use wade_core::vehicle::{Dimensions, Hull, Surface, SurfaceKind, Vehicle, shipped};
 
-/// The shipped vehicles and four other bodies, all symmetric from left to right.
+/// The shipped vehicles and five other bodies, all symmetric from left to right.
 pub fn bodies() -> Vec<Vehicle> {
     let shipped = [shipped::husky(), shipped::warthog()].map(|v| v.expect("sound").vehicle().expect("sound"));
     let parts = |parts: &[(Mesh, SurfaceKind)]| parts.to_vec();
@@ -26,6 +26,7 @@ pub fn bodies() -> Vec<Vehicle> {
         body("sphere", 260.0, &parts(&[(sphere(&Vec3::zeros(), 0.5, 32), SurfaceKind::Bottom)])),
         body("car", 1050.0, &car),
         body("tub", 90.0, &parts(&[(tub(), SurfaceKind::Bottom)])),
+        tracked(),
     ];
     shipped.into_iter().chain(others).collect()
 }
@@ -48,6 +49,42 @@ fn car_body() -> Mesh {
         ],
         [0.0, 0.0],
     )
+}
+
+/// A hull between two tracks, each a belt round two sprockets of 0.25 m, 1.6 m apart.
+pub fn tracked() -> Vehicle {
+    let hull = cuboid(&Bounds { min: Vec3::new(-0.9, -0.4, -0.05), max: Vec3::new(0.9, 0.4, 0.4) });
+    let track = |y: f64| (belt(0.8, 0.25, [y - 0.15, y + 0.15]), SurfaceKind::Track);
+    body("tracked", 500.0, &[track(0.6), track(-0.6), (hull, SurfaceKind::Bottom)])
+}
+
+/// A prism along y between two sides whose outline is a belt: two half circles about (-half, 0) and (half, 0), and the straight
+/// runs between them.
+fn belt(half: f64, radius: f64, sides: [f64; 2]) -> Mesh {
+    const ARC: usize = 12;
+    let at = |i: usize| {
+        let angle = std::f64::consts::PI * ((i % (ARC + 1)) as f64 / ARC as f64 - 0.5);
+        let (x, z) = (half + radius * angle.cos(), radius * angle.sin());
+        if i <= ARC { [x, z] } else { [-x, -z] }
+    };
+    let count = 2 * (ARC + 1);
+    let ring = |y: f64| (0..count).map(move |i| Vec3::new(at(i)[0], y, at(i)[1]));
+    let vertices: Vec<Vec3> = sides.into_iter().flat_map(ring).collect();
+    let n = count as u32;
+    let mut faces = Vec::new();
+    for i in 0..n {
+        let next = (i + 1) % n;
+        faces.extend([[i, i + n, next], [next, i + n, next + n]]);
+    }
+    for i in 1..n - 1 {
+        faces.extend([[0, i, i + 1], [n, n + i + 1, n + i]]);
+    }
+    let mesh = Mesh { vertices, faces };
+    let width = sides[1] - sides[0];
+    let polygon =
+        4.0 * half * radius + radius * radius * ARC as f64 * (std::f64::consts::PI / ARC as f64).sin();
+    assert!((mesh.volume() - polygon * width).abs() < 1e-9, "{} {}", mesh.volume(), polygon * width);
+    mesh
 }
 
 /// A box open above with walls of 5 cm: one closed skin, outside, rim and inside.
@@ -95,6 +132,7 @@ pub fn body(name: &str, mass: f64, parts: &[(Mesh, SurfaceKind)]) -> Vehicle {
         area: patch(index).area,
         mirror_left_right: mirror(index),
         mirror_front_rear: None,
+        sprocket_radius: (*kind == SurfaceKind::Track).then(|| 0.5 * hull.height_of(index)),
     };
     let squares = extent.component_mul(&extent) / 12.0;
     let inertia = Vec3::new(squares.y + squares.z, squares.x + squares.z, squares.x + squares.y) * mass;

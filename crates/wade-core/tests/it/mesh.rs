@@ -353,6 +353,24 @@ fn plain_spec(more: &str) -> VehicleSpec {
 
 const CENTERED: &str = "center_of_mass_m = [0, 0, 0]";
 
+#[test]
+fn a_track_has_a_sprocket_of_half_its_height_or_of_the_radius_stated() {
+    let build = |kind: &str, radius: &str| {
+        let mut spec = plain_spec(CENTERED);
+        let text = format!("name = \"body\"\nkind = \"{kind}\"\n{radius}");
+        spec.patch = vec![toml::from_str(&text).unwrap()];
+        build(&spec, &write_stl(&unit_box()), false)
+    };
+    let radius = |more: &str| build("track", more).unwrap().surfaces[0].sprocket_radius;
+    assert!((radius("").unwrap() - 0.5).abs() < 1e-6);
+    assert_eq!(radius("sprocket_radius_m = 0.2"), Some(0.2));
+    assert_eq!(build("wheel", "").unwrap().surfaces[0].sprocket_radius, None);
+    for (kind, radius) in [("track", "0.0"), ("track", "nan"), ("wheel", "0.2")] {
+        let refused = build(kind, &format!("sprocket_radius_m = {radius}")).unwrap_err().to_string();
+        assert!(refused.contains("`body`") && refused.contains("sprocket_radius_m"), "{refused}");
+    }
+}
+
 /// The corner of a face of a binary STL that is moved.
 fn with_corner_moved(mesh: &Mesh, by: f32) -> Vec<u8> {
     let mut bytes = write_stl(mesh);

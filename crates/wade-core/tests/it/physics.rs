@@ -106,6 +106,25 @@ fn without_inertia(state: Condition) -> Condition {
     Condition { acceleration: state.angular_velocity.cross(&state.velocity), ..state }
 }
 
+/// The image of a force or a velocity across y = 0, and that of a moment or a rate.
+fn flip(v: &Vec3) -> Vec3 {
+    Vec3::new(v.x, -v.y, v.z)
+}
+
+fn turn(v: &Vec3) -> Vec3 {
+    Vec3::new(-v.x, v.y, -v.z)
+}
+
+fn mirrored(state: &Condition) -> Condition {
+    Condition {
+        velocity: flip(&state.velocity),
+        ground_velocity: flip(&state.ground_velocity),
+        angular_velocity: turn(&state.angular_velocity),
+        up: UnitVector3::new_normalize(flip(&state.up)),
+        ..*state
+    }
+}
+
 fn power(load: &Wrench, state: &Condition) -> f64 {
     load.force.dot(&state.velocity) + load.moment.dot(&state.angular_velocity)
 }
@@ -125,6 +144,47 @@ fn motion_through_the_water_costs_power_in_every_state() {
             worst = worst.max((power(&moving, &state) - out.base.shaft_power.max(0.0)) / scale);
         }
         assert!(worst <= 1e-4, "{}: {worst}", subject.vehicle.name);
+    }
+}
+
+#[test]
+fn tracks_push_ahead_together_and_turn_the_hull_against_each_other() {
+    let mut out = Answer::default();
+    let subject = subjects().iter().find(|subject| subject.vehicle.name == "tracked").expect("there");
+    // half of the tracks is under water; the order is left, right
+    let state =
+        Condition { water_level: Some(subject.vehicle.z0 + 0.25), ..Condition::level(Vec3::zeros(), 0.0) };
+    let mut at = |speeds: [f64; 2], state: &Condition| {
+        let mut all = NO_WHEELS;
+        subject.vehicle.wheels().into_iter().zip(speeds).for_each(|(surface, speed)| all[surface] = speed);
+        let [_, moving] = subject.loads(state, &all, Physics::QuasiSteady, &mut out);
+        (moving, out.base.shaft_power)
+    };
+    assert_eq!(subject.vehicle.wheels().len(), 2);
+    let (ahead, power) = at([12.0, 12.0], &state);
+    let (force, moment) = (ahead.force, ahead.moment);
+    assert!(force.x > 10.0 && force.y.abs() < 1e-9 * force.x, "{ahead:?}");
+    assert!(moment.z.abs() < 1e-6 * force.x && power > 0.0, "{ahead:?} {power} W");
+    let (astern, _) = at([-12.0, -12.0], &state);
+    assert!((astern.force.x + force.x).abs() < 1e-6 * force.x, "{astern:?}");
+    // the right track ahead and the left one astern: to the left
+    let (turned, _) = at([-12.0, 12.0], &state);
+    assert!(turned.moment.z > 10.0 && turned.force.x.abs() < 1e-6 * force.x, "{turned:?}");
+    let (one, _) = at([0.0, 12.0], &state);
+    assert!(one.moment.z > 0.0 && one.force.x > 0.0);
+
+    let mut random = Random::new(11);
+    for _ in 0..2_000 {
+        let state = subject.random(&mut random);
+        let [left, right] = [40.0 * random.unit() - 20.0, 40.0 * random.unit() - 20.0];
+        let (load, power) = at([left, right], &state);
+        let (image, other) = at([right, left], &mirrored(&state));
+        let q = 0.5 * state.density * 100.0 * subject.size().powi(2);
+        assert!((load.force - flip(&image.force)).norm() < 1e-5 * q, "{load:?} {image:?}");
+        assert!((load.moment - turn(&image.moment)).norm() < 1e-5 * q * subject.size(), "{load:?} {image:?}");
+        assert!((power - other).abs() < 1e-4 * q, "{power} {other}");
+        assert_eq!(at([0.0, 0.0], &state).0, at([f64::NAN, f64::NAN], &state).0, "at rest");
+        assert_eq!(at([0.0, 0.0], &state).1, 0.0);
     }
 }
 
@@ -193,22 +253,13 @@ fn above_the_water_nothing_acts() {
 
 #[test]
 fn a_mirrored_state_has_a_mirrored_load() {
-    let flip = |v: &Vec3| Vec3::new(v.x, -v.y, v.z);
-    let turn = |v: &Vec3| Vec3::new(-v.x, v.y, -v.z);
     let mut out = Answer::default();
     for subject in subjects() {
         let mut random = Random::new(4);
         for _ in 0..STATES / 10 {
             let state = subject.random(&mut random);
-            let mirrored = Condition {
-                velocity: flip(&state.velocity),
-                ground_velocity: flip(&state.ground_velocity),
-                angular_velocity: turn(&state.angular_velocity),
-                up: UnitVector3::new_normalize(flip(&state.up)),
-                ..state
-            };
             let [_, one] = subject.loads(&state, &NO_WHEELS, Physics::Full, &mut out);
-            let [_, other] = subject.loads(&mirrored, &NO_WHEELS, Physics::Full, &mut out);
+            let [_, other] = subject.loads(&mirrored(&state), &NO_WHEELS, Physics::Full, &mut out);
             let q = 0.5 * state.density * 40.0 * subject.size().powi(2);
             let force = (one.force - flip(&other.force)).norm() / q;
             let moment = (one.moment - turn(&other.moment)).norm() / (q * subject.size());

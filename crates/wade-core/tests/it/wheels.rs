@@ -1,16 +1,18 @@
 //! Which surface is which wheel, and that a speed turns that one.
 
+use wade_core::bundle;
 use wade_core::condition::Condition;
 use wade_core::forces::Forces;
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::{Bounds, Mesh};
 use wade_core::geometry::parametric::{cuboid, cylinder};
+use wade_core::model::kernel::Isa;
 use wade_core::model::{Model, Workspace};
 use wade_core::physics::{Base, Motion, Physics};
 use wade_core::vehicle::{MAX_WHEELS, PerWheel, SurfaceKind, Vehicle};
 
 use crate::bodies::{bodies, body, radiation};
-use crate::common::{VEHICLES, model};
+use crate::common::{VEHICLES, model, vehicles};
 
 /// A box on wheels of 0.3 m at these places.
 fn on_wheels(name: &str, places: &[[f64; 2]]) -> Vehicle {
@@ -94,6 +96,28 @@ fn a_speed_turns_its_own_wheel_and_those_of_another_number_none() {
         }
     }
     assert_eq!(thrusts(Some([20.0; 4].into())), still);
+}
+
+#[test]
+fn a_bundle_keeps_its_tracks_and_a_network_takes_them_for_wheels() {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let mut husky = bundle::read(&vehicles().join("husky")).expect("sound");
+    for wheel in husky.vehicle.wheels() {
+        let surface = &mut husky.vehicle.surfaces[wheel];
+        (surface.kind, surface.sprocket_radius) = (SurfaceKind::Track, Some(0.125));
+    }
+    let place = folder.path().join("husky");
+    bundle::write(&place, &husky).expect("written");
+    let tracked = bundle::load(&place, Isa::available()[0]).expect("sound");
+    assert_eq!(tracked.vehicle().surfaces, husky.vehicle.surfaces);
+    assert_eq!(tracked.wheels(), model("husky").wheels());
+    let state = Condition::level(Vec3::new(0.8, 0.1, 0.0), 0.15);
+    let forces = [tracked, model("husky")].map(|model| {
+        let mut forces = Forces::default();
+        model.evaluate(&state, &mut Workspace::new(), &mut forces);
+        forces
+    });
+    assert_eq!(forces[0].surfaces, forces[1].surfaces);
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod bad_input;
 mod mass;
 mod solids;
 mod time;
+mod tracks;
 mod volume;
 mod wheels;
 mod write;

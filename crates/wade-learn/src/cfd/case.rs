@@ -11,7 +11,7 @@ use super::placement::Placement;
 use super::plan::{Bed, Case};
 use wade_core::frame::{GRAVITY, VISCOSITY, Vec3};
 use wade_core::geometry::mesh::Mesh;
-use wade_core::vehicle::{SurfaceKind, Vehicle};
+use wade_core::vehicle::Vehicle;
 
 /// Density of the air above [kg/m3].
 pub const AIR_DENSITY: f64 = 1.0;
@@ -481,7 +481,7 @@ impl Inputs<'_> {
     fn snappy(&self, channel: &Channel, has_ramp: bool) -> String {
         let Self { vehicle, settings, solver, .. } = self;
         let MeshSettings { hull_level, wheel_level, .. } = settings.mesh;
-        let wheels = vehicle.surfaces.iter().filter(|s| s.kind == SurfaceKind::Wheel);
+        let wheels = vehicle.surfaces.iter().filter(|s| s.kind.turns());
         let levels: String = wheels
             .map(|s| {
                 format!("                {} {{ level ({wheel_level} {wheel_level}); patchInfo {{ type wall; }} }}\n", s.name)
