@@ -73,7 +73,8 @@
 // Flag of forces: `added_mass` holds a matrix.
 #define WADE_HAS_ADDED_MASS 4
 
-// Flag of forces: the bundle has the physical base, and `damping`, `water_level_m`, `bed_clearance_m` and `bed` hold values.
+// Flag of forces: the bundle has the physical base, and `damping`, `water_level_m`, `bed_clearance_m`, `bed` and
+// `shaft_power_w` hold values.
 #define WADE_HAS_BASE 8
 
 // What came of a call.
@@ -88,8 +89,7 @@ typedef enum {
   WADE_STATUS_UNKNOWN_VEHICLE = 3,
   // The server is of another version: shared memory of another layout, or another service. The forces are the last ones.
   WADE_STATUS_LAYOUT_MISMATCH = 4,
-  // A field of the state is wrong, which `invalid_field` and `invalid_problem` name. Nothing was asked; the forces are the
-  // last ones.
+  // A field of the state is wrong, which `invalid_field` and `invalid_problem` name. The forces are the last ones.
   WADE_STATUS_INVALID_STATE = 5,
   // The server is at a limit. The forces are the last ones.
   WADE_STATUS_RESOURCE_EXHAUSTED = 6,
@@ -162,7 +162,7 @@ typedef struct {
   uint64_t session;
   // WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, those named WADE_HAS_ and one of those named WADE_PHYSICS_
   uint32_t flags;
-  // Entries of `wheel_speed_radps` that hold a value, where the flags say so; 0 for four.
+  // Entries of `wheel_speed_radps` that hold a value, where the flags say so: one for each wheel of the vehicle; 0 for four.
   uint32_t wheel_count;
   // Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
   float depth_m;
@@ -192,7 +192,7 @@ typedef struct {
   float heading_rad;
   // Rate at which the water rises at the body origin [m/s].
   float depth_rate_mps;
-  // By axle from the front, left before right [rad/s]: front left, front right, rear left, rear right.
+  // By axle from the front, left before right [rad/s]; of four wheels front left, front right, rear left, rear right.
   float wheel_speed_radps[WADE_MAX_WHEELS];
   // Time since the state before it in the session [s]. The steps of states that could not be asked for want of time are added
   // to the next one that is.
@@ -232,8 +232,8 @@ typedef struct {
   uint32_t surface_count;
   // Entries of `effects` that hold a load.
   uint32_t effect_count;
-  // 0
-  uint32_t reserved;
+  // Power that the shafts of the wheels put in [W]; NaN of a server that does not state it.
+  float shaft_power_w;
   // Net force [N].
   float force_n[3];
   // Net moment about `about_m` [N m].
@@ -301,7 +301,7 @@ typedef struct {
 typedef struct {
   // As in vehicle.toml.
   char name[WADE_NAME_SIZE];
-  // bottom, front, rear, side or wheel.
+  // bottom, front, rear, side, wheel or track.
   char kind[16];
   // [m]
   float centroid_m[3];
