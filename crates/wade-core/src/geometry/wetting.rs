@@ -372,11 +372,11 @@ impl Clipping {
         let depths = face.corners.map(|corner| plane.depth_below(&corner) + 0.0);
         let (lane, faces) = (self.count, &mut self.faces);
         self.surfaces[lane] = surface;
-        for axis in 0..3 {
+        for (axis, depth) in depths.into_iter().enumerate() {
             for corner in 0..3 {
                 faces.corners[corner][axis][lane] = face.corners[corner][axis];
             }
-            faces.depths[axis][lane] = depths[axis];
+            faces.depths[axis][lane] = depth;
             faces.normal[axis][lane] = face.normal[axis];
         }
         faces.area[lane] = face.area;
@@ -396,6 +396,7 @@ impl Clipping {
     }
 
     #[inline(always)]
+    #[allow(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
     fn flush(&mut self, out: &mut [Wetting]) {
         let (faces, values) = (&self.faces, &mut self.values);
         for i in 0..LANES {
