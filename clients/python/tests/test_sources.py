@@ -72,8 +72,8 @@ def rust_fields(struct: str) -> list[tuple[str, str]]:
 def rust_type(dtype: np.dtype[Any]) -> str:
     """How Rust writes a field of this type."""
     names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|u1": "u8", "|S64": "[u8; PROVENANCE_LEN]"}
-    rooms = ("MAX_SURFACES", "MAX_BATCH", "MAX_EFFECTS", "MAX_QUANTITIES", "MAX_WHEELS", "RESERVED_LEN")
-    rooms = (*rooms, "ANSWER_RESERVED_LEN")
+    reserved = ("RESERVED_LEN", "ANSWER_RESERVED_LEN")
+    rooms = ("MAX_SURFACES", "MAX_BATCH", "MAX_EFFECTS", "MAX_QUANTITIES", "MAX_WHEELS", *reserved)
     lengths = {getattr(shm_layout, room): room for room in rooms}
     structs = {shm_layout.QUERY: "Query", shm_layout.ANSWER: "Answer", shm_layout.BATCH_HEADER: "BatchHeader"}
     structs[shm_layout.EFFECT_ANSWER] = "EffectAnswer"

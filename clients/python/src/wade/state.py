@@ -99,8 +99,9 @@ class State:
     #: Rate at which the water rises at the body origin [m/s]. None: in a run of states that of the depth, else effects
     #: that need it are left out.
     depth_rate_mps: ArrayLike | None = None
-    #: Speed of each of the vehicle's wheels by axle from the front, left before right [rad/s]: of four wheels front left,
-    #: front right, rear left, rear right. `[W]` or `[N, W]` for W wheels. None: effects that need them are left out.
+    #: Speed of each wheel or track of the vehicle by axle from the front, left before right [rad/s]: of four wheels
+    #: front left, front right, rear left, rear right; of a track that of its drive sprocket. `[W]` or `[N, W]` for W
+    #: wheels. None: effects that need them are left out.
     wheel_speed_radps: ArrayLike | None = None
     #: Signed height of the still-water plane above the body origin along up [m], in the place of `depth_m`.
     water_level_m: ArrayLike | None = None
