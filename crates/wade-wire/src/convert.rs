@@ -37,11 +37,8 @@ pub fn state(message: &proto::State, vehicle: &ServedVehicle) -> Result<State, I
         wheel_speeds: match message.wheel_speed_radps.as_slice() {
             [] => None,
             speeds => {
-                let speeds = PerWheel::new(speeds);
-                Some(
-                    speeds
-                        .ok_or_else(|| InvalidState::wheel_count(message.wheel_speed_radps.len(), vehicle))?,
-                )
+                let count = || InvalidState::wheel_count(speeds.len(), vehicle);
+                Some(PerWheel::new(speeds).ok_or_else(count)?)
             }
         },
         time_step: message.time_step_s,

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::mesh::Mesh;
 use crate::frame::Vec3;
 
 type Triangle = [Vec3; 3];
@@ -16,28 +17,30 @@ const LEVEL: f64 = 1e-3;
 /// The same surface, in which each flat convex part that was several triangles is cut into layers across the body's z, two
 /// triangles each: the water of a vehicle that stands nearly upright meets few of them, where it meets half of a fan. What is not
 /// convex, or has a hole, stays as it is. Flat is what the rounding of an STL file cannot tell from a plane.
-pub(super) fn merged(triangles: &[Triangle]) -> Vec<Triangle> {
-    let net = Net::new(triangles);
-    let mut taken = vec![false; triangles.len()];
+pub(super) fn merged(mesh: &Mesh, faces: &[usize]) -> Vec<Triangle> {
+    let net = Net::new(mesh, faces);
+    let mut taken = vec![false; mesh.faces.len()];
     let mut merged = Vec::new();
-    let mut by_area: Vec<usize> = (0..triangles.len()).collect();
+    let mut by_area = faces.to_vec();
     // the largest knows its plane best
-    by_area.sort_by(|a, b| area(&triangles[*b]).total_cmp(&area(&triangles[*a])));
+    by_area.sort_by(|a, b| mesh.area_vector(*b).norm().total_cmp(&mesh.area_vector(*a).norm()));
     for seed in by_area {
         if taken[seed] {
             continue;
         }
         let part = net.flat_part(seed, &mut taken);
-        let polygon = (part.len() > 1).then(|| net.convex_outline(&part, seed)).flatten();
-        let old = part.iter().map(|face| triangles[*face]);
-        let Some(polygon) = polygon else {
+        let normal = net.normal(seed).filter(|_| part.len() > 1);
+        let outline = normal.and_then(|normal| Some((normal, net.convex_outline(&part, &normal)?)));
+        let old = part.iter().map(|face| mesh.triangle(*face));
+        let Some((normal, polygon)) = outline else {
             merged.extend(old);
             continue;
         };
         let from = merged.len();
-        layers(&polygon, &normal(&triangles[seed]).unwrap_or_default(), &mut merged);
-        let areas = [old.clone().map(|t| area(&t)).sum(), merged[from..].iter().map(area).sum::<f64>()];
-        if (areas[0] - areas[1]).abs() > SAME_AREA * areas[0] {
+        layers(&polygon, &normal, &mut merged);
+        let before = part.iter().map(|face| mesh.area_vector(*face).norm()).sum::<f64>();
+        let after = merged[from..].iter().map(|triangle| vector(triangle).norm()).sum::<f64>();
+        if (before - after).abs() > SAME_AREA * before {
             merged.truncate(from);
             merged.extend(old);
         }
@@ -45,51 +48,40 @@ pub(super) fn merged(triangles: &[Triangle]) -> Vec<Triangle> {
     merged
 }
 
-/// Triangles with their corners by number and their neighbors across an edge.
+/// Faces of a mesh with their neighbors across an edge.
 struct Net<'a> {
-    triangles: &'a [Triangle],
-    places: Vec<Vec3>,
-    corners: Vec<[usize; 3]>,
+    mesh: &'a Mesh,
     /// The face that runs along an edge in this direction.
-    along: HashMap<[usize; 2], usize>,
+    along: HashMap<[u32; 2], usize>,
     tolerance: f64,
 }
 
 impl<'a> Net<'a> {
-    fn new(triangles: &'a [Triangle]) -> Self {
-        let (mut numbers, mut places, mut along) = (HashMap::new(), Vec::new(), HashMap::new());
-        let mut number = |place: &Vec3| {
-            *numbers.entry([place.x, place.y, place.z].map(f64::to_bits)).or_insert_with(|| {
-                places.push(*place);
-                places.len() - 1
-            })
-        };
-        let corners: Vec<[usize; 3]> =
-            triangles.iter().map(|t| [number(&t[0]), number(&t[1]), number(&t[2])]).collect();
-        for (face, corners) in corners.iter().enumerate() {
-            for edge in edges(corners) {
-                along.insert(edge, face);
-            }
-        }
-        let size = places.iter().map(Vec3::amax).fold(0.0, f64::max);
-        Self { triangles, places, corners, along, tolerance: ROUNDING * size }
+    fn new(mesh: &'a Mesh, faces: &[usize]) -> Self {
+        let runs = |&face: &usize| edges(&mesh.faces[face]).map(|edge| (edge, face));
+        let size = mesh.vertices.iter().map(Vec3::amax).fold(0.0, f64::max);
+        Self { mesh, along: faces.iter().flat_map(runs).collect(), tolerance: ROUNDING * size }
+    }
+
+    fn normal(&self, face: usize) -> Option<Vec3> {
+        self.mesh.area_vector(face).try_normalize(0.0)
     }
 
     /// Faces that lie in the plane of `seed` and hang together with it.
     fn flat_part(&self, seed: usize, taken: &mut [bool]) -> Vec<usize> {
         taken[seed] = true;
         let mut part = vec![seed];
-        let Some(normal) = normal(&self.triangles[seed]) else { return part };
-        let origin = self.triangles[seed][0];
+        let Some(normal) = self.normal(seed) else { return part };
+        let origin = self.mesh.triangle(seed)[0];
         let flat = |face: usize| {
-            let triangle = &self.triangles[face];
-            triangle.iter().all(|corner| (corner - origin).dot(&normal).abs() <= self.tolerance)
-                && vector(triangle).dot(&normal) >= 0.0
+            let corners = self.mesh.triangle(face);
+            corners.iter().all(|corner| (corner - origin).dot(&normal).abs() <= self.tolerance)
+                && self.mesh.area_vector(face).dot(&normal) >= 0.0
         };
         let mut next = 0;
         while let Some(&face) = part.get(next) {
             next += 1;
-            for [from, to] in edges(&self.corners[face]) {
+            for [from, to] in edges(&self.mesh.faces[face]) {
                 let Some(&neighbor) = self.along.get(&[to, from]) else { continue };
                 if !taken[neighbor] && flat(neighbor) {
                     taken[neighbor] = true;
@@ -101,12 +93,11 @@ impl<'a> Net<'a> {
     }
 
     /// Corners of the one outline of a part, those within an edge left out; `None` where it is not convex.
-    fn convex_outline(&self, part: &[usize], seed: usize) -> Option<Vec<Vec3>> {
-        let normal = normal(&self.triangles[seed])?;
+    fn convex_outline(&self, part: &[usize], normal: &Vec3) -> Option<Vec<Vec3>> {
         let faces: HashSet<usize> = part.iter().copied().collect();
-        let own = |edge: [usize; 2]| self.along.get(&edge).is_some_and(|face| faces.contains(face));
+        let own = |edge: [u32; 2]| self.along.get(&edge).is_some_and(|face| faces.contains(face));
         let mut after = HashMap::new();
-        for [from, to] in part.iter().flat_map(|face| edges(&self.corners[*face])) {
+        for [from, to] in part.iter().flat_map(|face| edges(&self.mesh.faces[*face])) {
             if !own([to, from]) && after.insert(from, to).is_some() {
                 return None;
             }
@@ -114,7 +105,7 @@ impl<'a> Net<'a> {
         let start = *after.keys().min()?;
         let (mut outline, mut corner) = (Vec::new(), start);
         while outline.len() < after.len() {
-            outline.push(self.places[corner]);
+            outline.push(self.mesh.vertices[corner as usize]);
             corner = *after.get(&corner)?;
             if corner == start {
                 break;
@@ -137,7 +128,7 @@ impl<'a> Net<'a> {
         }
         let convex = |i: usize| {
             let [before, here, next] = [0, 1, 2].map(|step| outline[(i + step) % outline.len()]);
-            (here - before).cross(&(next - here)).dot(&normal) > 0.0
+            (here - before).cross(&(next - here)).dot(normal) > 0.0
         };
         (outline.len() >= 3 && (0..outline.len()).all(convex)).then_some(outline)
     }
@@ -166,20 +157,12 @@ fn layers(polygon: &[Vec3], normal: &Vec3, out: &mut Vec<Triangle>) {
     }
 }
 
-fn edges([a, b, c]: &[usize; 3]) -> [[usize; 2]; 3] {
-    [[*a, *b], [*b, *c], [*c, *a]]
+fn edges(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
 }
 
 fn vector([a, b, c]: &Triangle) -> Vec3 {
     (b - a).cross(&(c - a)) * 0.5
-}
-
-fn area(triangle: &Triangle) -> f64 {
-    vector(triangle).norm()
-}
-
-fn normal(triangle: &Triangle) -> Option<Vec3> {
-    vector(triangle).try_normalize(0.0)
 }
 
 #[cfg(test)]
@@ -187,26 +170,33 @@ mod tests {
     use super::*;
     use crate::vehicle::shipped;
 
+    /// Unit squares of a plane, two triangles each.
+    fn squares(places: impl IntoIterator<Item = (u32, u32)>) -> Mesh {
+        let row = 8;
+        let vertices = (0..row * row).map(|i| Vec3::new(f64::from(i % row), f64::from(i / row), 1.0));
+        let two = |(x, y): (u32, u32)| {
+            let at = |dx: u32, dy: u32| x + dx + row * (y + dy);
+            [[at(0, 0), at(1, 0), at(1, 1)], [at(0, 0), at(1, 1), at(0, 1)]]
+        };
+        Mesh { vertices: vertices.collect(), faces: places.into_iter().flat_map(two).collect() }
+    }
+
+    fn all(mesh: &Mesh) -> Vec<Triangle> {
+        merged(mesh, &(0..mesh.faces.len()).collect::<Vec<_>>())
+    }
+
     #[test]
     fn a_finely_cut_plate_becomes_a_few_triangles_and_a_fan_is_met_rarely() {
-        // a square of sixteen squares
-        let place = |x: usize, y: usize| Vec3::new(x as f64, y as f64, 1.0);
-        let squares = (0..16).map(|i| (i % 4, i / 4));
-        let plate: Vec<Triangle> = squares
-            .flat_map(|(x, y)| {
-                let [a, b, c, d] = [place(x, y), place(x + 1, y), place(x + 1, y + 1), place(x, y + 1)];
-                [[a, b, c], [a, c, d]]
-            })
-            .collect();
-        let merged_plate = merged(&plate);
-        assert_eq!(merged_plate.len(), 2);
-        assert!(merged_plate.iter().all(|t| vector(t).z > 0.0));
-        let rim = |i: usize| {
-            let angle = i as f64 / 64.0 * std::f64::consts::TAU;
+        let plate = all(&squares((0..16).map(|i| (i % 4, i / 4))));
+        assert_eq!(plate.len(), 2);
+        assert!(plate.iter().all(|t| vector(t).z > 0.0));
+        let rim = |i: u32| {
+            let angle = f64::from(i) / 64.0 * std::f64::consts::TAU;
             Vec3::new(angle.cos(), 0.0, angle.sin())
         };
-        let fan: Vec<Triangle> = (1..63).map(|i| [rim(0), rim(i + 1), rim(i)]).collect();
-        let layers = merged(&fan);
+        let fan =
+            Mesh { vertices: (0..64).map(rim).collect(), faces: (1..63).map(|i| [0, i + 1, i]).collect() };
+        let layers = all(&fan);
         assert_eq!(layers.len(), 62);
         let met = |triangles: &[Triangle], height: f64| {
             let across = |t: &&Triangle| t.iter().any(|c| c.z < height) && t.iter().any(|c| c.z > height);
@@ -214,30 +204,15 @@ mod tests {
         };
         let most =
             |triangles: &[Triangle]| (0..99).map(|i| met(triangles, -0.98 + 0.02 * f64::from(i))).max();
+        let fan: Vec<Triangle> = (0..62).map(|face| fan.triangle(face)).collect();
         assert!(most(&layers) <= Some(3) && most(&fan) >= Some(30), "{:?} {:?}", most(&layers), most(&fan));
     }
 
     #[test]
     fn a_frame_and_a_corner_stay_as_they_are() {
-        let place = |x: i32, y: i32| Vec3::new(f64::from(x), f64::from(y), 0.0);
-        // an L of three squares
-        let corner: Vec<Triangle> = [(0, 0), (1, 0), (0, 1)]
-            .into_iter()
-            .flat_map(|(x, y)| {
-                let [a, b, c, d] = [place(x, y), place(x + 1, y), place(x + 1, y + 1), place(x, y + 1)];
-                [[a, b, c], [a, c, d]]
-            })
-            .collect();
-        assert_eq!(merged(&corner).len(), 6);
+        assert_eq!(all(&squares([(0, 0), (1, 0), (0, 1)])).len(), 6);
         let around = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
-        let frame: Vec<Triangle> = around
-            .into_iter()
-            .flat_map(|(x, y)| {
-                let [a, b, c, d] = [place(x, y), place(x + 1, y), place(x + 1, y + 1), place(x, y + 1)];
-                [[a, b, c], [a, c, d]]
-            })
-            .collect();
-        assert_eq!(merged(&frame).len(), 16);
+        assert_eq!(all(&squares(around)).len(), 16);
     }
 
     #[test]
@@ -245,11 +220,11 @@ mod tests {
         for vehicle in [shipped::husky(), shipped::warthog()] {
             let vehicle = vehicle.expect("sound").vehicle().expect("sound");
             for surface in 0..vehicle.surfaces.len() {
-                let faces: Vec<Triangle> =
-                    vehicle.hull.faces_of(surface).map(|face| vehicle.hull.mesh.triangle(face)).collect();
-                let merged = merged(&faces);
+                let own: Vec<usize> = vehicle.hull.faces_of(surface).collect();
+                let merged = merged(&vehicle.hull.mesh, &own);
+                let faces: Vec<Triangle> = own.iter().map(|face| vehicle.hull.mesh.triangle(*face)).collect();
                 let sum = |triangles: &[Triangle]| triangles.iter().map(vector).sum::<Vec3>();
-                let total = faces.iter().map(area).sum::<f64>();
+                let total = faces.iter().map(|t| vector(t).norm()).sum::<f64>();
                 assert!((sum(&faces) - sum(&merged)).norm() < 1e-6 * total);
                 assert!(merged.len() <= faces.len());
             }

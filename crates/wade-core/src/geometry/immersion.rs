@@ -68,7 +68,7 @@ pub fn clip(corners: [Vec3; 3], plane: &WaterPlane) -> WetTriangles {
 }
 
 /// A place and its depth.
-pub(super) type Corner = (Vec3, f64);
+type Corner = (Vec3, f64);
 
 fn one(triangle: WetTriangle) -> WetTriangles {
     WetTriangles { triangles: [triangle, WetTriangle::default()], count: 1 }
@@ -85,7 +85,7 @@ fn starting_at(first: Option<usize>, p: [Vec3; 3], d: [f64; 3]) -> [Corner; 3] {
 
 /// Where an edge from a wet to a dry corner meets the surface, and which share of it is wet; always computed from the wet
 /// end, so that the two faces of an edge agree on the point.
-pub(super) fn cut((wet, depth): Corner, (dry, height): Corner) -> (Corner, f64) {
+fn cut((wet, depth): Corner, (dry, height): Corner) -> (Corner, f64) {
     let share = depth / (depth - height);
     ((wet + (dry - wet) * share, 0.0), share)
 }

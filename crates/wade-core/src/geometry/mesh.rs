@@ -33,6 +33,11 @@ impl Bounds {
         Some(points.fold(start, |b, p| Self { min: b.min.inf(p), max: b.max.sup(p) }))
     }
 
+    /// The smallest box around both.
+    pub fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
+    }
+
     /// Edge lengths [m].
     pub fn extent(&self) -> Vec3 {
         self.max - self.min

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::mesh::Mesh;
+use super::mesh::{Bounds, Mesh};
 use crate::frame::Vec3;
 
 /// A closed mesh whose every face belongs to a surface; body frame.
@@ -20,13 +20,10 @@ impl Hull {
         self.face_surface.iter().enumerate().filter(move |(_, s)| **s as usize == surface).map(|(f, _)| f)
     }
 
-    /// Extent of one surface along z [m]; 0 where it has no face.
-    pub fn height_of(&self, surface: usize) -> f64 {
+    /// The box around one surface [m]; `None` when it has no face.
+    pub fn bounds_of(&self, surface: usize) -> Option<Bounds> {
         let corners = self.faces_of(surface).flat_map(|face| self.mesh.faces[face]);
-        let heights = corners.map(|corner| self.mesh.vertices[corner as usize].z);
-        let [least, most] =
-            heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], z| [least.min(z), most.max(z)]);
-        (most - least).max(0.0)
+        Bounds::around(corners.map(|corner| &self.mesh.vertices[corner as usize]))
     }
 
     /// Area moments of one surface; `None` when it has no face.

@@ -12,6 +12,7 @@
 use nalgebra::{Matrix3, SMatrix};
 
 use super::flats::merged;
+use super::mesh::Bounds;
 use super::surfaces::Hull;
 use crate::frame::{Vec3, WaterPlane};
 use crate::lanes::{Instructions, run_for};
@@ -189,8 +190,8 @@ impl WettingTable {
 
 impl SurfaceTable {
     fn new(hull: &Hull, surface: usize) -> Self {
-        let triangles: Vec<[Vec3; 3]> = hull.faces_of(surface).map(|f| hull.mesh.triangle(f)).collect();
-        let mut faces: Vec<Face> = merged(&triangles).into_iter().map(Face::new).collect();
+        let own: Vec<usize> = hull.faces_of(surface).collect();
+        let mut faces: Vec<Face> = merged(&hull.mesh, &own).into_iter().map(Face::new).collect();
         let (mut boxes, mut terms) = (Vec::new(), Vec::new());
         grow(&mut faces, 0, &mut boxes, &mut terms);
         Self { faces, boxes, terms, level: None }
@@ -240,69 +241,48 @@ impl SurfaceTable {
     }
 }
 
-/// Axis and number of faces of the first half by which water meets the fewest faces: each half counts by its extent.
-fn best_split(faces: &mut [Face]) -> (usize, usize) {
-    let mut best = (f64::INFINITY, 2, faces.len() / 2);
+/// Splits the faces so that water meets the fewest, each half counted by its extent: puts them in order, and tells how many are
+/// in the first half.
+fn split(faces: &mut [Face]) -> usize {
+    let count = faces.len();
+    let mut best = (f64::INFINITY, 2, count / 2);
     // never so uneven that the tree gets deep
-    let least = faces.len().div_ceil(8);
-    let mut ahead = vec![0.0; faces.len()];
+    let least = count.div_ceil(8);
+    let met = |bounds: &Bounds| bounds.extent().dot(&UPRIGHT);
+    let along = |axis: usize| move |a: &Face, b: &Face| a.center()[axis].total_cmp(&b.center()[axis]);
+    let mut ahead = vec![0.0; count];
     for axis in 0..3 {
-        faces.sort_by(|a, b| a.center()[axis].total_cmp(&b.center()[axis]));
-        let mut bounds = Bounds::NONE;
-        for (count, face) in faces.iter().enumerate() {
-            ahead[count] = bounds.met() * count as f64;
-            bounds.add(face);
+        faces.sort_by(along(axis));
+        let mut bounds = faces[0].bounds();
+        for index in 1..count {
+            ahead[index] = met(&bounds) * index as f64;
+            bounds = bounds.union(&faces[index].bounds());
         }
-        let mut bounds = Bounds::NONE;
-        for (index, face) in faces.iter().enumerate().skip(1).rev() {
-            bounds.add(face);
-            let cost = ahead[index] + bounds.met() * (faces.len() - index) as f64;
-            if cost < best.0 && index >= least && index <= faces.len() - least {
+        let mut bounds = faces[count - 1].bounds();
+        for index in (1..count).rev() {
+            bounds = bounds.union(&faces[index].bounds());
+            let cost = ahead[index] + met(&bounds) * (count - index) as f64;
+            if cost < best.0 && index >= least && index <= count - least {
                 best = (cost, axis, index);
             }
         }
     }
-    (best.1, best.2)
-}
-
-struct Bounds {
-    low: Vec3,
-    high: Vec3,
-}
-
-impl Bounds {
-    const NONE: Self = Self {
-        low: Vec3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
-        high: Vec3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
-    };
-
-    fn add(&mut self, face: &Face) {
-        for corner in &face.corners {
-            (self.low, self.high) = (self.low.inf(corner), self.high.sup(corner));
-        }
-    }
-
-    /// Measure of how often water meets the box.
-    fn met(&self) -> f64 {
-        (self.high - self.low).dot(&UPRIGHT)
-    }
+    faces.sort_by(along(best.1));
+    best.2
 }
 
 /// Orders the faces and adds the boxes over them, of which the first is `first`.
 fn grow(faces: &mut [Face], first: usize, boxes: &mut Vec<Node>, terms: &mut Vec<Terms>) {
-    let mut bounds = Bounds::NONE;
-    faces.iter().for_each(|face| bounds.add(face));
-    let Bounds { low, high } = bounds;
-    let index = boxes.len();
-    let (half, leaf) = ((high - low) * 0.5, faces.len() <= LEAF);
+    let Some(bounds) = Bounds::around(faces.iter().flat_map(|face| &face.corners)) else { return };
+    let (index, leaf) = (boxes.len(), faces.len() <= LEAF);
     let range = if leaf { [first, first + faces.len()] } else { [first; 2] };
-    boxes.push(Node { center: (low + high) * 0.5, half: half.add_scalar(ROOM), next: 0, faces: range });
+    let half = (bounds.extent() * 0.5).add_scalar(ROOM);
+    boxes.push(Node { center: bounds.center(), half, next: 0, faces: range });
     let mut sum = Terms::default();
     faces.iter().for_each(|face| sum.add(face));
     terms.push(sum);
     if !leaf {
-        let (axis, middle) = best_split(faces);
-        faces.sort_by(|a, b| a.center()[axis].total_cmp(&b.center()[axis]));
+        let middle = split(faces);
         let (near, far) = faces.split_at_mut(middle);
         grow(near, first, boxes, terms);
         grow(far, first + middle, boxes, terms);
@@ -361,6 +341,11 @@ impl Face {
 
     fn center(&self) -> Vec3 {
         self.corners.iter().sum::<Vec3>() / 3.0
+    }
+
+    fn bounds(&self) -> Bounds {
+        let [a, b, c] = &self.corners;
+        Bounds { min: a.inf(b).inf(c), max: a.sup(b).sup(c) }
     }
 }
 

@@ -251,7 +251,9 @@ fn surfaces(spec: &VehicleSpec, hull: &Hull) -> Result<Vec<Surface>, BuildError>
             mirror_left_right: partner(&patch.left_right)?.unwrap_or(index),
             mirror_front_rear: partner(&patch.front_rear)?,
             sprocket_radius: match patch.kind {
-                SurfaceKind::Track => Some(patch.sprocket_radius_m.unwrap_or(0.5 * hull.height_of(index))),
+                SurfaceKind::Track => {
+                    patch.sprocket_radius_m.or(hull.bounds_of(index).map(|b| 0.5 * b.extent().z))
+                }
                 _ => patch.sprocket_radius_m,
             },
         });

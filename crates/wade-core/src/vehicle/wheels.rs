@@ -41,13 +41,7 @@ impl Vehicle {
 
     /// Half the extent of a surface along x [m].
     fn radius_along_x(&self, surface: usize) -> f64 {
-        let mesh = &self.hull.mesh;
-        let corners = self.hull.faces_of(surface).flat_map(|face| mesh.faces[face]);
-        let [least, most] = corners.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], corner| {
-            let x = mesh.vertices[corner as usize].x;
-            [least.min(x), most.max(x)]
-        });
-        0.5 * (most - least).max(0.0)
+        self.hull.bounds_of(surface).map_or(0.0, |bounds| 0.5 * bounds.extent().x)
     }
 }
 
