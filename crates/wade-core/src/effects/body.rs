@@ -113,13 +113,10 @@ impl Body {
     /// A vehicle with its mesh. Tabulates the hydrostatics over level and tilt, which takes a tenth of a second.
     pub fn of_vehicle(vehicle: &Vehicle) -> Self {
         let wheels = vehicle.wheels();
-        let panel = |index: usize| Panel {
+        let panel = |index: usize| {
             // the belt of a track is no wheel that pushes water with its disc or its lugs
-            wheel: wheels
-                .iter()
-                .position(|&wheel| wheel == index)
-                .filter(|_| vehicle.surfaces[index].kind == SurfaceKind::Wheel),
-            ..mesh_panel(vehicle, index)
+            let turns = vehicle.surfaces[index].kind == SurfaceKind::Wheel;
+            mesh_panel(vehicle, index, wheels.iter().position(|&wheel| turns && wheel == index))
         };
         let panels: Vec<Panel> = (0..vehicle.surfaces.len()).map(panel).collect();
         let radius = |panel: &Panel| panel.wheel.map(|_| panel.centroid.z - vehicle.z0);
@@ -204,7 +201,7 @@ impl Body {
     }
 }
 
-fn mesh_panel(vehicle: &Vehicle, index: usize) -> Panel {
+fn mesh_panel(vehicle: &Vehicle, index: usize, wheel: Option<usize>) -> Panel {
     let surface = &vehicle.surfaces[index];
     let (mut plus, mut minus) = (Vec3::zeros(), Vec3::zeros());
     for face in vehicle.hull.faces_of(index) {
@@ -222,7 +219,7 @@ fn mesh_panel(vehicle: &Vehicle, index: usize) -> Panel {
         spread,
         facing_plus: plus,
         facing_minus: minus,
-        wheel: None,
+        wheel,
     }
 }
 

@@ -132,7 +132,10 @@ pub fn body(name: &str, mass: f64, parts: &[(Mesh, SurfaceKind)]) -> Vehicle {
         area: patch(index).area,
         mirror_left_right: mirror(index),
         mirror_front_rear: None,
-        sprocket_radius: (*kind == SurfaceKind::Track).then(|| 0.5 * hull.height_of(index)),
+        sprocket_radius: hull
+            .bounds_of(index)
+            .filter(|_| *kind == SurfaceKind::Track)
+            .map(|b| 0.5 * b.extent().z),
     };
     let squares = extent.component_mul(&extent) / 12.0;
     let inertia = Vec3::new(squares.y + squares.z, squares.x + squares.z, squares.x + squares.y) * mass;

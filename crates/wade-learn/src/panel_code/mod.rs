@@ -234,9 +234,12 @@ fn unsound(mass: &Matrix6<f64>, other: Option<&Matrix6<f64>>) -> Option<String> 
     }
     let modes = ["surge", "sway", "heave", "roll", "pitch", "yaw"];
     (0..6).find_map(|mode| {
-        let times = other.map_or(1.0, |other| mass[(mode, mode)] / other[(mode, mode)]);
-        let is_sound = mass[(mode, mode)] > 0.0 && (1.0 / FARTHEST..FARTHEST).contains(&times);
-        (!is_sound).then(|| {
+        let own = mass[(mode, mode)];
+        if own.is_nan() || own <= 0.0 {
+            return Some(format!("in {} it is {own:.3}, which is not positive", modes[mode]));
+        }
+        let times = own / other?[(mode, mode)];
+        (!(1.0 / FARTHEST..FARTHEST).contains(&times)).then(|| {
             format!(
                 "in {} it has {times:.2} times what wade's own solver finds for the same panels",
                 modes[mode]
