@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::Bounds;
-use wade_core::vehicle::SurfaceKind;
+use wade_core::vehicle::{SurfaceKind, by_axle};
 
 use crate::at;
 use crate::limits::{
@@ -58,11 +58,8 @@ pub fn find(
         }
     }
     let tracks = tracks::find(scene, pieces, &mut found, notes);
-    found.sort_by(|(a, _), (b, _)| {
-        let near = (a.center.x - b.center.x).abs() < 0.5 * a.radius.min(b.radius);
-        let front = if near { std::cmp::Ordering::Equal } else { b.center.x.total_cmp(&a.center.x) };
-        front.then(b.center.y.total_cmp(&a.center.y))
-    });
+    let places: Vec<(Vec3, f64)> = found.iter().map(|(wheel, _)| (wheel.center, wheel.radius)).collect();
+    let mut found: Vec<_> = by_axle(&places).into_iter().map(|place| found[place].clone()).collect();
     let middle = Bounds::around(pieces.iter().flat_map(|piece| &piece.mesh.vertices));
     let middle = middle.map_or(0.0, |bounds| bounds.center().y);
     found.iter_mut().for_each(|(wheel, _)| wheel.is_left = wheel.center.y >= middle);

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::geometry::submergence::Samples;
 pub use crate::geometry::surfaces::Hull;
 pub use validate::VehicleError;
-pub use wheels::{MAX_WHEELS, PerWheel};
+pub use wheels::{MAX_WHEELS, PerWheel, by_axle};
 
 use crate::condition::{Condition, GroundContact};
 use crate::frame::{GRAVITY, Vec3, WaterPlane};

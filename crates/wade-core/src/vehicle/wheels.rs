@@ -3,6 +3,7 @@
 use std::ops::Deref;
 
 use super::Vehicle;
+use crate::frame::Vec3;
 
 /// Most wheels whose speeds can be stated.
 pub const MAX_WHEELS: usize = 8;
@@ -26,23 +27,32 @@ impl Vehicle {
             wheels.sort_by_key(|&index| quarter(index));
             return wheels;
         }
-        wheels.sort_by(|&a, &b| at(b).x.total_cmp(&at(a).x));
-        let mut start = 0;
-        while start < wheels.len() {
-            let first = wheels[start];
-            let reach = |index: usize| ONE_AXLE * self.radius_along_x(first).min(self.radius_along_x(index));
-            let others = wheels[start..].iter();
-            let count = others.take_while(|&&index| at(first).x - at(index).x <= reach(index)).count();
-            wheels[start..start + count].sort_by(|&a, &b| at(b).y.total_cmp(&at(a).y));
-            start += count;
-        }
-        wheels
+        let places: Vec<(Vec3, f64)> =
+            wheels.iter().map(|&index| (at(index), self.radius_along_x(index))).collect();
+        by_axle(&places).into_iter().map(|place| wheels[place]).collect()
     }
 
     /// Half the extent of a surface along x [m].
     fn radius_along_x(&self, surface: usize) -> f64 {
         self.hull.bounds_of(surface).map_or(0.0, |bounds| 0.5 * bounds.extent().x)
     }
+}
+
+/// Order of wheels, each with its center and radius [m], by axle from the front, left before right.
+pub fn by_axle(wheels: &[(Vec3, f64)]) -> Vec<usize> {
+    let center = |wheel: usize| wheels[wheel].0;
+    let mut order: Vec<usize> = (0..wheels.len()).collect();
+    order.sort_by(|&a, &b| center(b).x.total_cmp(&center(a).x));
+    let mut rest = &mut order[..];
+    while let Some(&first) = rest.first() {
+        let reach = |wheel: usize| ONE_AXLE * wheels[first].1.min(wheels[wheel].1);
+        let is_beside = |&&wheel: &&usize| center(first).x - center(wheel).x <= reach(wheel);
+        let count = rest.iter().take_while(is_beside).count();
+        let (axle, behind) = rest.split_at_mut(count);
+        axle.sort_by(|&a, &b| center(b).y.total_cmp(&center(a).y));
+        rest = behind;
+    }
+    order
 }
 
 /// One value a wheel in the order of [`Vehicle::wheels`], of up to [`MAX_WHEELS`]. A value to copy, without a heap.
