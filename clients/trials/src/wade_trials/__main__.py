@@ -1,0 +1,8 @@
+"""``python -m wade_trials``."""
+
+import sys
+
+from .cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())
