@@ -4,7 +4,7 @@ A finding names the check, the field, what is wrong and what to write. ``wrong``
 accepts the check; ``doubt`` does not; ``skipped`` says what is needed for the check.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
@@ -23,6 +23,10 @@ from .units import UNITS, quantity_of
 
 Array = NDArray[np.float64]
 Level = Literal["ok", "doubt", "wrong", "skipped"]
+
+
+#: Right-handed axes with another axis up, beside the presets.
+SINGLE_TURNS: list[Axes] = [("y", "z", "x"), ("z", "y", "-x"), ("x", "z", "-y"), ("-x", "-y", "z")]
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,7 @@ class Figures:
 def figures(track: Track, pose: Pose, trial: Trial, body: Body) -> Figures:
     """The figures of one reading, from a few thousand frames."""
     count = len(track.t)
-    span = max(int(round(limits.DIFFERENCE / max(float(np.median(np.diff(track.t))), 1e-9))), 1)
+    span = max(round(limits.DIFFERENCE / max(float(np.median(np.diff(track.t))), 1e-9)), 1)
     span = min(span, count - 1)
     first = np.arange(0, count - span, max((count - span) // limits.MOST_FRAMES, 1))
     rows = np.concatenate([first, first + span, first + span // 2])
@@ -142,10 +146,12 @@ def figures(track: Track, pose: Pose, trial: Trial, body: Body) -> Figures:
         deep = depth_of(trial.water_level_m, position[2 * n :, 2][upright], up[upright], pose, body)
         depth = float(np.quantile(deep, 0.95)) if len(deep) else np.nan
         if trial.depth_m is not None:
-            near = float(np.count_nonzero(np.abs(deep - trial.depth_m) < limits.DEPTH_TOLERANCE)) / n
-    along, across, upward = np.median(share[:, 0]), *np.median(np.abs(share[:, 1:]), axis=0)
+            level = up[upright, 2] >= limits.LEVEL
+            near = float(np.count_nonzero(level & (np.abs(deep - trial.depth_m) < limits.DEPTH_TOLERANCE))) / n
+    along = float(np.median(share[:, 0]))
+    across, upward = (float(np.median(np.abs(share[:, axis]))) for axis in (1, 2))
     fast = float(np.quantile(speed[whole], 0.99)) if whole.any() else 0.0
-    return Figures(float(np.median(up[:, 2])), fast, float(along), float(across), float(upward), depth, near)
+    return Figures(float(np.median(up[:, 2])), fast, along, across, upward, depth, near)
 
 
 def faults(found: Figures, trial: Trial, max_speed: float) -> list[str]:
@@ -164,14 +170,15 @@ def faults(found: Figures, trial: Trial, max_speed: float) -> list[str]:
     return out
 
 
+def opposite(axis: str) -> str:
+    """The other direction of a signed axis."""
+    return axis[1:] if axis.startswith("-") else "-" + axis
+
+
 def turned_about_up(axes: Axes, quarters: int) -> Axes:
     """Body axes of a tracked body that was turned about its up axis by quarters of a turn."""
     x, y, z = axes
-
-    def minus(axis: str) -> str:
-        return axis[1:] if axis.startswith("-") else "-" + axis
-
-    return [(x, y, z), (y, minus(x), z), (minus(x), minus(y), z), (minus(y), x, z)][quarters]
+    return [(x, y, z), (y, opposite(x), z), (opposite(x), opposite(y), z), (opposite(y), x, z)][quarters]
 
 
 def readings(pose: Pose) -> list[tuple[Pose, list[str]]]:
@@ -478,40 +485,43 @@ def check_lift(name: str, mapping: Mapping, columns: dict[str, Array], rest: NDA
     yield Finding("lift", "wrong", name, field, *_likely_lift(mapping, columns, rest, fz, fits, message))
 
 
-def _likely_lift(mapping, columns, rest, fz, fits, message):  # type: ignore[no-untyped-def]
+def _likely_lift(
+    mapping: Mapping,
+    columns: dict[str, Array],
+    rest: NDArray[np.bool_],
+    fz: float,
+    fits: Callable[[float], bool],
+    message: str,
+) -> tuple[str, str]:
     """What explains a wrong lift, and what to write."""
+    wrench = mapping.wrench
     weight = (mapping.body.mass_kg or 0.0) * limits.GRAVITY if mapping.body else 0.0
-    in_wrench = mapping.wrench is not None
-    where = "under [wrench]" if in_wrench else "in [columns] fz"
+    where = "under [wrench]" if wrench else "in [columns] fz"
+    if wrench:
+        unit_key, stated, reverse = "force_unit", wrench.force_unit, f"sign = {-wrench.sign}"
+    else:
+        column = mapping.columns["fz"]
+        unit_key, stated, reverse = "unit", column.unit or "N", f"factor = {-column.factor:g}"
     if fits(-fz):
-        if in_wrench:
-            return (
-                message + "; the sign is reversed: the cell states the reaction, or its z points down (NED)",
-                'sign = -1, or axes = "NED", under [wrench]',
-            )
-        return message + "; the sign is reversed: z points down (NED), or it is the reaction", f"factor = -1 {where}"
-    stated = mapping.wrench.force_unit if in_wrench else mapping.columns["fz"].unit or "N"
+        message += "; the sign is reversed: it is the reaction on the cell, or z points down (NED)"
+        return message, f'{reverse}, or axes = "NED", {where}' if wrench else f"{reverse} {where}"
     for unit, scale in UNITS["force"].items():
-        for sign, also in ((1, ""), (-1, " and sign = -1" if in_wrench else " and factor = -1")):
+        for sign, also in ((1, ""), (-1, f" and {reverse}")):
             if unit != stated and fits(sign * fz * scale / UNITS["force"][stated]):
-                key = "force_unit" if in_wrench else "unit"
-                return message + f"; it fits {unit}", f'{key} = "{unit}"{also} {where}'
-    for axis in ("fx", "fy"):
+                return f"{message}; it fits {unit}", f'{unit_key} = "{unit}"{also} {where}'
+    for at, axis in enumerate(("fx", "fy")):
         value = float(np.mean(columns[axis][rest])) if axis in columns else 0.0
-        if fits(abs(value)) and in_wrench:
-            sign = "" if value > 0 else "-"
-            x, y, z = mapping.wrench.axes
-            up = {"fx": x, "fy": y}[axis]
-            up = up if not sign else (up[1:] if up.startswith("-") else "-" + up)
-            axes = next((a for a in PRESETS.values() if a[2] == up), None)
-            text = axes_text(axes) if axes else f'["?", "?", "{up}"]'
-            return message + f"; {axis} has that value: the axis {up} of the cell points up", f"axes = {text} {where}"
+        if wrench and fits(abs(value)):
+            up = wrench.axes[at] if value * wrench.sign > 0 else opposite(wrench.axes[at])
+            axes = next((a for a in (*PRESETS.values(), *SINGLE_TURNS) if a[2] == up), PRESETS["z up"])
+            return (
+                f"{message}; {axis} has that value, so {up} of the cell points up",
+                f"axes = {axes_text(axes)} {where}",
+            )
     if weight and fits(fz + weight):
-        return (
-            message + "; the reading holds the weight of the vehicle",
-            f"weight_n = {weight:.1f} {where}" if in_wrench else "the reading less the weight, by a [wrench]",
-        )
-    return message + "; neither sign, unit, axis nor the weight explain it: was the cell zeroed in air?", ""
+        message += "; the reading holds the weight of the vehicle"
+        return message, f"weight_n = {weight:.1f} {where}" if wrench else ""
+    return f"{message}; neither sign, unit, axis nor weight explain it: was the cell zeroed in air?", ""
 
 
 # --- the inertial sensor ---------------------------------------------------------------------------------------------
@@ -546,7 +556,7 @@ def check_imu(
         if np.linalg.norm(force) < limits.GRAVITY_TOLERANCE:
             likely = "; gravity was taken off: map the raw accelerometer, or leave [imu] out"
         for unit, factor in UNITS["acceleration"].items():
-            for axes in (imu.axes, *PRESETS.values(), *_single_turns()):
+            for axes in (imu.axes, *PRESETS.values(), *SINGLE_TURNS):
                 if not write and fits(matrix(axes) @ mean * factor):
                     changed = [f'force_unit = "{unit}"'] if unit != imu.force_unit else []
                     changed += [f"axes = {axes_text(axes)}"] if axes != imu.axes else []
@@ -558,11 +568,6 @@ def check_imu(
         yield Finding("gravity", "wrong", name, field, message + likely, write)
     if all(imu.angular_velocity):
         yield from _check_rates(name, imu, series, columns)
-
-
-def _single_turns() -> list[Axes]:
-    """Right-handed axes with another axis up."""
-    return [("y", "z", "x"), ("z", "y", "-x"), ("-x", "z", "y"), ("x", "z", "-y"), ("-x", "-y", "z")]
 
 
 def _check_rates(name: str, imu: Imu, series: dict[str, Series], columns: dict[str, Array]) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from .axes import PRESETS, parse_axes
 from .errors import TrialsError
 from .mapping import COLUMNS, Column, Imu, Mapping, Pose, Trial, Wrench
 from .readers import open_source
-from .source import Channel, Clock, Source
+from .source import NO_CLOCK, Channel, Clock, Source
 from .units import canonical_unit, quantity_of, si_unit
 
 #: Endings of a pose: of the position and of the quaternion's components, w first. ``*`` is a prefix that all share.
@@ -58,7 +58,7 @@ def guess(
     vehicle: str,
     path: Path,
     *,
-    clock: Clock = Clock(),
+    clock: Clock = NO_CLOCK,
     body_name: str = "",
     tracked_point_to_origin_m: tuple[float, float, float] | None = None,
     water_level_m: float | None = None,
@@ -130,8 +130,10 @@ def _pose(
     pose = Pose((position[0], position[1], position[2]), (w, x, y, z))
     stated, unsure = source.conventions.stated, source.conventions.guessed
     unit = stated.get("pose.position_unit")
-    if unit:
-        pose = replace(pose, position_unit=str(unit[0]))
+    texts = [channel.unit for channel in source.channels() if channel.name == position[0]]
+    own = canonical_unit("length", texts[0]) if texts and texts[0] else None
+    if unit or own:
+        pose = replace(pose, position_unit=str(unit[0]) if unit else str(own))
     else:
         guesses["pose.position_unit"] = "the file states no unit"
     axes = stated.get("pose.axes") or unsure.get("pose.axes")

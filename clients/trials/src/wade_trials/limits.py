@@ -2,9 +2,11 @@
 
 #: Cosine of the tilt above which a vehicle stands on its wheels: 26 degrees, steeper than a ramp.
 MIN_UP = 0.9
+#: Cosine of the tilt up to which a vehicle stands on flat ground: 15 degrees.
+LEVEL = 0.966
 #: Depth of the recording and depth measured at rest may differ by this [m]: markers, tires and waves.
 DEPTH_TOLERANCE = 0.05
-#: Share of the frames that lie at the stated depth at least: the rest may be ramps.
+#: Share of the frames that lie level at the stated depth at least: the rest may be ramps.
 MIN_SHARE_AT_DEPTH = 0.1
 #: Speed from which a vehicle moves [m/s].
 MOVING = 0.3

@@ -437,7 +437,7 @@ class _Reader:
     def names(self, at: str, table: dict[str, Any], count: int, *, empty: bool = False) -> tuple[str, ...]:
         value = table.get(at.rsplit(".", 1)[-1])
         ok = isinstance(value, list) and len(value) == count and all(isinstance(v, str) for v in value)
-        if not ok or not all(value or [""]) and not empty or not any(value or []):
+        if not ok or (not all(value or [""]) and not empty) or not any(value or []):
             rest = '; "" is a component that was not measured' if empty else ""
             raise self.fault(at, f"it is a list of {count} names of channels{rest}")
         return tuple(value or [])

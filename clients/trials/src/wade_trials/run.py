@@ -93,7 +93,7 @@ def _columns(mapping: Mapping, name: str, trial: Trial, result: Result, report: 
     findings.extend(clock)
     if clock:
         return {"t": series[next(iter(series))].t}
-    findings.extend(check_frozen(name, mapping, series))
+    findings.extend(check_frozen(name, mapping, {channel: window(own, trial) for channel, own in series.items()}))
     if mapping.pose is not None:
         assert mapping.body is not None
         track = track_of(path, mapping, trial, series)

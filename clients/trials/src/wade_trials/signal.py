@@ -1,6 +1,7 @@
 """Resampling, smoothing and differentiating: the same steps as ``wade validate --mocap``."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ def pieces(t: Array) -> list[slice]:
     steps = np.diff(t)
     ends = np.flatnonzero(steps > GAP_STEPS * float(np.median(steps))) + 1
     bounds = [0, *ends.tolist(), len(t)]
-    return [slice(a, b) for a, b in zip(bounds, bounds[1:], strict=False)]
+    return [slice(a, b) for a, b in pairwise(bounds)]
 
 
 def grid(first: float, last: float, rate: float) -> Array:
@@ -71,7 +72,7 @@ def without_sign_flips(quaternion: Array) -> Array:
     """The same rotations with each sign chosen to be nearest to the one before."""
     dots = np.sum(quaternion[1:] * quaternion[:-1], axis=1)
     signs = np.concatenate([[1.0], np.cumprod(np.where(dots < 0, -1.0, 1.0))])
-    return quaternion * signs[:, None]
+    return np.asarray(quaternion * signs[:, None])
 
 
 def body_rate(quaternion: Array, rate: Array) -> Array:
@@ -83,8 +84,11 @@ def body_rate(quaternion: Array, rate: Array) -> Array:
 
 
 def resample(t: Array, values: Array, at: Array) -> Array:
-    """Values at each instant: linear between two samples, the mean over a step of the grid where the channel was sampled
-    more than twice as fast, so that noise above the new rate does not fold back. NaN in a hole and beyond the ends."""
+    """Values at each instant, linear between two samples; NaN in a hole and beyond the ends.
+
+    Where the channel was sampled more than twice as fast, it is the mean over a step of the grid, so that noise above
+    the new rate does not fold back.
+    """
     out = np.interp(at, t, values)
     step = float(np.median(np.diff(at))) if len(at) > 1 else 0.0
     own = float(np.median(np.diff(t))) if len(t) > 1 else 0.0

@@ -70,6 +70,10 @@ class Clock:
     unit: str = ""
 
 
+#: Where the recording has a clock of its own, or a column with a usual name.
+NO_CLOCK = Clock()
+
+
 def check_count(path: Path, count: int) -> None:
     """Refuses a recording that does not fit into memory."""
     if count > MOST_SAMPLES:

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from ..errors import TrialsError
-from ..source import Clock, Source
+from ..source import NO_CLOCK, Clock, Source
 
 
-def open_source(path: Path, clock: Clock = Clock()) -> Source:
+def open_source(path: Path, clock: Clock = NO_CLOCK) -> Source:
     """The source of a file or of a folder (a ROS 2 bag), by its ending and its first bytes."""
     if not path.exists():
         raise TrialsError(path, "", "there is no such file: correct the path")

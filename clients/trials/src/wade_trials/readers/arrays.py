@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TrialsError
-from ..source import Channel, Clock, Conventions, Progress, Series, check_count
+from ..source import NO_CLOCK, Channel, Clock, Conventions, Progress, Series, check_count
 from .table import time_column, without_origin
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ class ArraySource:
 
     format = "numpy"
 
-    def __init__(self, path: Path, clock: Clock = Clock()) -> None:
+    def __init__(self, path: Path, clock: Clock = NO_CLOCK) -> None:
         self.path, self.conventions = path, Conventions()
         try:
             loaded = np.load(path, mmap_mode="r" if path.suffix == ".npy" else None, allow_pickle=False)

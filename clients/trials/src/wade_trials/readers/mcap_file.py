@@ -76,7 +76,8 @@ class McapSource:
             self._first = {}
             topics = sorted({c.topic for c in self._summary.channels.values()}) if self._summary else None
             try:
-                for topic in topics or [None]:  # type: ignore[list-item]
+                every: list[str | None] = [None]
+                for topic in topics or every:
                     for schema, channel, message in self._messages([topic] if topic else None):
                         if channel.topic not in self._first:
                             decode = self._decoder(schema, channel)

@@ -22,7 +22,7 @@ class RosbagSource:
             from rosbags.typesys import Stores, get_typestore
         except ImportError:
             raise missing_extra(path, "rosbags", "ros") from None
-        self._failures: tuple[type[Exception], ...] = (AnyReaderError, FileNotFoundError, OSError, ValueError)
+        self._failures: tuple[type[Exception], ...] = (AnyReaderError, OSError, ValueError)
         try:
             # the types of a bag stand in it; bags before ROS 2 Iron have none, and these are the standard ones
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
@@ -37,9 +37,11 @@ class RosbagSource:
             self._first = {}
             for connection in self._reader.connections:
                 try:
-                    _, _, raw = next(self._reader.messages(connections=[connection]))
-                    message = self._reader.deserialize(raw, connection.msgtype)
-                except (StopIteration, KeyError, *self._failures):
+                    first = next(iter(self._reader.messages(connections=[connection])), None)
+                    if first is None:
+                        continue
+                    message = self._reader.deserialize(first[2], connection.msgtype)
+                except self._failures:
                     continue
                 self._first.setdefault(connection.topic, number_fields(message))
         return self._first

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TrialsError
-from ..source import Channel, Clock, Conventions, Progress, Series, check_count, unknown_channel
+from ..source import NO_CLOCK, Channel, Clock, Conventions, Progress, Series, check_count, unknown_channel
 from ..units import UNITS, canonical_unit
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ class TableSource:
 
     format = "CSV"
 
-    def __init__(self, path: Path, clock: Clock = Clock()) -> None:
+    def __init__(self, path: Path, clock: Clock = NO_CLOCK) -> None:
         self.path, self.conventions = path, Conventions()
         self.lines_before, header, self.delimiter = self._header()
         pairs = [name_and_unit(cell) for cell in header]

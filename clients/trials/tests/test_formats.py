@@ -1,0 +1,100 @@
+"""Promise: a recording is the same trial in every format, by files that the kept libraries wrote."""
+
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import generated
+import numpy as np
+import pytest
+from helpers import columns_of
+
+from wade_trials.axes import PRESETS
+from wade_trials.cli import main
+
+Y_UP = PRESETS["y up"]
+
+
+def _npz(path: Path, recording: generated.Recording) -> Path:
+    np.savez(path, **generated.table(recording))  # type: ignore[arg-type]
+    return path
+
+
+def _motive(path: Path, recording: generated.Recording) -> Path:
+    return generated.write_motive(path, replace(recording, axes=Y_UP, body_axes=Y_UP), unit="Millimeters", scale=1e3)
+
+
+FORMATS: dict[str, Callable[[Path, generated.Recording], Path]] = {
+    "run.csv": lambda path, recording: generated.write_csv(path, generated.table(recording)),
+    "run.npz": _npz,
+    "take.csv": _motive,
+    "run.bag": generated.write_ros1,
+    "run": generated.write_ros2,
+    "run.mcap": generated.write_mcap,
+    "json.mcap": lambda path, recording: generated.write_mcap(path, recording, "json"),
+    "run.mf4": generated.write_mdf,
+}
+ARGUMENTS = ["--vehicle", "warthog", "--water-level", "1.7", "--depth", "0.2", "--point-to-origin=0.2,0,-0.572"]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_format_is_mapped_imported_and_repeated(
+    name: str, wade: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = generated.record(seconds=8, noise=3e-5)
+    file = FORMATS[name](tmp_path / name, recording)
+    assert main(["inspect", str(file)]) == 0
+    mapping, out = tmp_path / "mapping.toml", tmp_path / "out"
+    assert main(["map", str(file), *ARGUMENTS, "--out", str(mapping)]) == 0
+    shown = capsys.readouterr().out
+    assert re.search(r"vx vy vz, depth +m", shown) or "mm" in shown
+    assert "guess 1: " in shown and "guesses to confirm" in shown
+    assert main(["check", str(mapping)]) == 0 and not out.exists()
+    assert main(["import", str(mapping), "--out", str(out)]) == 0
+    trial = next(out.glob("*.csv"))
+    found = columns_of(trial)
+    speed = np.interp(found["t"], recording.t, recording.speed)
+    assert np.abs(found["vx"] - speed).max() < 0.012 and np.abs(found["depth"] - generated.DEPTH).max() < 2e-3
+    if name != "take.csv":
+        assert abs(found["fz"].mean() - generated.LIFT) < 2 and abs(found["fx"].min() + 60 * 1.2**2) < 12
+    # the mapping beside the trials repeats them
+    written = tomllib.loads((out / "mapping.toml").read_text())
+    assert written["guesses"] and all(len(trial["sha256"]) == 64 for trial in written["trials"].values())
+    again = tmp_path / "again"
+    assert main(["import", str(out / "mapping.toml"), "--out", str(again)]) == 0
+    assert trial.read_bytes() == (again / trial.name).read_bytes()
+    assert (out / "trials.toml").read_bytes() == (again / "trials.toml").read_bytes()
+
+
+def test_the_stamp_of_the_header_is_the_clock_and_receipt_is_not(wade: str, tmp_path: Path) -> None:
+    """The header's stamps are exact; receipt is up to 3 ms uneven."""
+    recording = generated.record(seconds=6, noise=3e-5)
+    mapping = tmp_path / "mapping.toml"
+    assert main(["map", str(generated.write_ros2(tmp_path / "run", recording)), *ARGUMENTS, "--out", str(mapping)]) == 0
+    assert main(["import", str(mapping), "--out", str(tmp_path / "out")]) == 0
+    found = columns_of(tmp_path / "out" / "run.csv")
+    assert np.abs(found["vx"] - np.interp(found["t"], recording.t, recording.speed)).max() < 0.012
+
+
+def test_frames_in_which_tracking_was_lost_are_a_hole(wade: str, tmp_path: Path) -> None:
+    recording = replace(generated.record(seconds=8), axes=Y_UP, body_axes=Y_UP)
+    file = generated.write_motive(tmp_path / "take.csv", recording, lost=slice(400, 520))
+    mapping = tmp_path / "mapping.toml"
+    assert main(["map", str(file), *ARGUMENTS, "--body", "Warthog", "--out", str(mapping)]) == 0
+    assert main(["import", str(mapping), "--out", str(tmp_path / "out")]) == 0
+    t = columns_of(tmp_path / "out" / "take.csv")["t"]
+    assert np.diff(t).max() == pytest.approx(1.0, abs=0.03)
+
+
+def test_an_axis_that_the_header_states_is_no_guess(tmp_path: Path) -> None:
+    from wade_trials.readers import open_source
+
+    file = generated.write_motive(tmp_path / "take.csv", generated.record(seconds=4))
+    file.write_text(
+        file.read_text().replace("Coordinate Space,Global", "Coordinate Space,Global,Axis Convention,Z up", 1)
+    )
+    conventions = open_source(file).conventions
+    assert conventions.stated["pose.axes"][0] == "z up" and not conventions.guessed
+    assert conventions.stated["pose.position_unit"][0] == "m"
