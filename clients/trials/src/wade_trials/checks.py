@@ -264,14 +264,12 @@ def check_pose(name: str, mapping: Mapping, trial: Trial, track: Track) -> Itera
         else:
             yield Finding(check, "ok", name, "pose", _passed(check, found, trial))
     if failed:
-        fitting = [(r, c) for r, c in readings(pose) if not faults(figures(track, r, trial, body), trial, max_speed)]
-        # one that drives forward is the likelier among those that change as much
-        fitting.sort(key=lambda item: (len(item[1]), not figures(track, item[0], trial, body).forward > 0))
+        fitting = _fitting(track, pose, trial, body, max_speed)
         check = failed[-1]
         field, message = complaint(check, found, trial, max_speed)
         write = ""
         if fitting:
-            other, changed = fitting[0]
+            other, changed, _ = fitting[0]
             message += f"; the recording fits {named(pose, other)}"
             write = " and ".join(changed) + " under [pose]"
         elif check == "depth" and not np.isnan(found.depth) and trial.depth_m is not None:
@@ -285,6 +283,21 @@ def check_pose(name: str, mapping: Mapping, trial: Trial, track: Track) -> Itera
         yield _backward(name, track, pose, trial, body, max_speed)
 
 
+def _fitting(
+    track: Track, pose: Pose, trial: Trial, body: Body, max_speed: float
+) -> list[tuple[Pose, list[str], Figures]]:
+    """The readings that pass every check with the fewest changed fields; those that drive forward come first."""
+    fitting: list[tuple[Pose, list[str], Figures]] = []
+    for other, changed in readings(pose):
+        if fitting and len(changed) > len(fitting[0][1]):
+            break
+        looks = figures(track, other, trial, body)
+        if not faults(looks, trial, max_speed):
+            fitting.append((other, changed, looks))
+    fitting.sort(key=lambda item: not item[2].forward > 0)
+    return fitting
+
+
 def _passed(check: str, found: Figures, trial: Trial) -> str:
     return {
         "depth": f"{found.share_at_depth:.0%} of the frames lie at the stated {trial.depth_m} m",
@@ -295,11 +308,8 @@ def _passed(check: str, found: Figures, trial: Trial) -> str:
 
 
 def _backward(name: str, track: Track, pose: Pose, trial: Trial, body: Body, max_speed: float) -> Finding:
-    forward = []
-    for other, changed in readings(pose):
-        looks = figures(track, other, trial, body)
-        if not faults(looks, trial, max_speed) and looks.forward > 0.5:
-            forward.append(" and ".join(changed))
+    fitting = _fitting(track, pose, trial, body, max_speed)
+    forward = [" and ".join(changed) for _, changed, looks in fitting if looks.forward > 0.5]
     choice = " or ".join(forward[:2])
     message = "the vehicle drives backward throughout; if it did not, its axes or the order of its quaternion are wrong"
     return Finding("direction", "doubt", name, "pose.body_axes", message, f"{choice} under [pose]" if choice else "")

@@ -15,7 +15,7 @@ MAX_VERTICAL, MAX_LATERAL = 0.3, 0.5
 #: Time between the two frames of a difference [s]: noise of a millimeter makes 0.01 m/s.
 DIFFERENCE = 0.1
 #: Frames of a recording that a check looks at.
-MOST_FRAMES = 4000
+MOST_FRAMES = 2000
 #: A vehicle below these is at rest [m/s, rad/s], if it lasts [s].
 REST_SPEED, REST_RATE, REST_DURATION = 0.05, 0.1, 0.5
 #: A channel that keeps one value to the last bit for longer than this [s] and this many samples is frozen ...
