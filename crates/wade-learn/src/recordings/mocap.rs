@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
+use super::reading::check_depth;
 use super::recording::{Recording, RecordingError, RecordingFault, Recordings, at};
 use crate::signal::{
     FilterError, SavitzkyGolay, UniformGrid, angular_velocity, interpolate, pieces, slerp, without_sign_flips,
@@ -218,6 +219,9 @@ pub fn trials_from_recordings(
         );
         let path = recordings.directory.join(format!("{name}.csv"));
         check_clock(recording, config.rate_hz).map_err(at(&path))?;
+        if let Some(measured) = file.recording[name].depth_m {
+            check_depth(recording, &rig, measured).map_err(at(&path))?;
+        }
         let kinematics = process(recording, &rig, config)
             .map_err(|source| at(&path)(RecordingFault::Filter { rate_hz: config.rate_hz, source }))?;
         write(&format!("{name}.csv"), &kinematics.to_csv())?;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
+use super::reading::{Misreading, explanation};
 use crate::signal::FilterError;
 use crate::trials::{Table, TrialError, csv_text};
 use wade_core::at::At;
@@ -147,6 +148,21 @@ pub enum RecordingFault {
         row: u64,
         /// Its length.
         length: f64,
+    },
+    /// Another depth than the one that was measured.
+    #[error(
+        "it puts the vehicle {deepest:.3} m deep, tilted by {tilt:.0} degrees, but depth_m = {measured} of {RECORDINGS_FILE} was measured at rest over flat ground; {}",
+        explanation(.mistakes)
+    )]
+    Depth {
+        /// Measured at rest [m].
+        measured: f64,
+        /// Largest depth of the recording, but for a twentieth of its frames [m].
+        deepest: f64,
+        /// Median tilt of the vehicle [deg].
+        tilt: f64,
+        /// The mistakes that explain it; empty where none do.
+        mistakes: Vec<Misreading>,
     },
     /// Stamps that are no seconds.
     #[error(

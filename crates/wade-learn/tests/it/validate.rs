@@ -421,3 +421,55 @@ fn a_recording_whose_clock_is_in_another_unit_is_named() {
     recording.t[middle..].iter_mut().for_each(|t| *t += 36_000.0);
     made(&recordings).expect("made");
 }
+
+#[test]
+fn a_recording_that_contradicts_the_measured_depth_is_refused_with_the_mistake() {
+    let (vehicle, folder) = (warthog(), TempDir::new().expect("a folder"));
+    let recorded = folder.path().join("recordings");
+    generated::write(&recorded, &vehicle, 5).expect("written");
+    let sound = Recordings::read(&recorded).expect("sound");
+    let made = |recordings: &Recordings| {
+        let trials = folder.path().join("trials");
+        wade_learn::recordings::trials_from_recordings(recordings, &vehicle, &MocapConfig::default(), &trials)
+    };
+    made(&sound).expect("a sound recording is accepted");
+
+    type Mistake<'a> = Box<dyn Fn(&mut Vec3, &mut UnitQuaternion<f64>) + 'a>;
+    let rotated = |q: &mut UnitQuaternion<f64>, w: f64, x: f64, y: f64, z: f64| {
+        *q = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
+    };
+    let mistakes: [(&str, Mistake<'_>); 5] = [
+        (
+            "y up",
+            Box::new(|p, q| {
+                *p = Vec3::new(p.x, p.z, -p.y);
+                rotated(q, q.w, q.i, q.k, -q.j);
+            }),
+        ),
+        (
+            "(NED)",
+            Box::new(|p, q| {
+                *p = Vec3::new(p.x, -p.y, -p.z);
+                rotated(q, q.w, q.i, -q.j, -q.k);
+            }),
+        ),
+        ("order x y z w", Box::new(|_, q| rotated(q, q.i, q.j, q.k, q.w))),
+        ("millimeters", Box::new(|p, _| *p *= 1e3)),
+        ("check water_level_m", Box::new(|p, _| p.z += 0.2)),
+    ];
+    for (said, mistake) in mistakes {
+        // the vehicle of this one does not drive along x, which the order of a quaternion needs to show
+        let name = sound.recordings.keys().find(|name| name.contains("angle")).expect("one").clone();
+        let mut recordings = sound.clone();
+        let recording = recordings.recordings.get_mut(&name).expect("there");
+        for (position, rotation) in recording.position.iter_mut().zip(&mut recording.rotation) {
+            mistake(position, rotation);
+        }
+        let error = made(&recordings).expect_err(said).to_string();
+        assert!(error.contains(&format!("{name}.csv")) && error.contains("depth_m"), "{error}");
+        assert!(error.contains(said), "{said}: {error}");
+        // what was not measured cannot contradict
+        recordings.file.recording.get_mut(&name).expect("there").depth_m = None;
+        made(&recordings).expect("accepted");
+    }
+}
