@@ -149,9 +149,11 @@ fn packages_state_their_license_and_dependencies_allow_it() {
 #[test]
 fn packages_outside_cargo_have_the_same_license_and_version() {
     let version = env!("CARGO_PKG_VERSION");
-    let python: toml::Table = text("clients/python/pyproject.toml").parse().expect("TOML");
-    assert_eq!(python["project"]["license"].as_str(), Some(OURS));
-    assert_eq!(python["project"]["version"].as_str(), Some(version));
+    for name in ["python", "trials"] {
+        let python: toml::Table = text(format!("clients/{name}/pyproject.toml")).parse().expect("TOML");
+        assert_eq!(python["project"]["license"].as_str(), Some(OURS), "{name}");
+        assert_eq!(python["project"]["version"].as_str(), Some(version), "{name}");
+    }
     let native: toml::Table = text("clients/python/native/pyproject.toml").parse().expect("TOML");
     assert_eq!(native["project"]["license"].as_str(), Some(OURS));
     let dynamic = native["project"]["dynamic"].as_array().expect("a list");

@@ -98,3 +98,16 @@ def test_an_axis_that_the_header_states_is_no_guess(tmp_path: Path) -> None:
     conventions = open_source(file).conventions
     assert conventions.stated["pose.axes"][0] == "z up" and not conventions.guessed
     assert conventions.stated["pose.position_unit"][0] == "m"
+
+
+def test_both_readers_of_mcap_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from wade_trials.readers.mcap_file import McapSource
+
+    source = McapSource(generated.write_mcap(tmp_path / "run.mcap", generated.record(seconds=5)))
+    names = [channel.name for channel in source.channels()]
+    assert len(names) == 23
+    fast = source.read(names, lambda share: None)
+    monkeypatch.setattr(McapSource, "_is_ros2", lambda self, topics: False)
+    slow = source.read(names, lambda share: None)
+    for name in names:
+        assert np.array_equal(fast[name].t, slow[name].t) and np.array_equal(fast[name].values, slow[name].values)

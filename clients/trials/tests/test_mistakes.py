@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from helpers import FORCES, NED, POSE, Y_UP, accepted, mapping_of, refusal
 
-from wade_trials import import_trials
+from wade_trials import TrialsError, import_trials
 from wade_trials.checks import turned_about_up
-from wade_trials.mapping import Clock, Column, Imu, Trial, Wrench
+from wade_trials.mapping import Column, Imu, Trial, Wrench
+from wade_trials.source import Clock
 
 POSES: dict[str, tuple[dict[str, Any], float, dict[str, Any], list[str]]] = {
     # name: what the recording is, scale of its position, what corrects the mapping, words of the message
@@ -122,6 +123,18 @@ def test_a_channel_that_freezes_for_a_while(tmp_path: Path) -> None:
     assert "channel fz has been frozen from 3.3 s to 4.3 s" in message and "leave_out_s = [[3.333, 4.325]]" in message
     trial = Trial(str(file), generated.WATER_LEVEL, generated.DEPTH, leave_out_s=((3.333, 4.325),))
     accepted(mapping_of(file, trials={"run": trial}))
+
+
+def test_a_simulator_at_rest_is_not_frozen(tmp_path: Path) -> None:
+    """Its pose stands still to the last bit between two drives."""
+    first = generated.table(generated.record(noise=0.0))
+    columns = {name: np.concatenate([values, values[-1:] + values - values[0]]) for name, values in first.items()}
+    columns["t"][len(first["t"]) :] += 1 / 120
+    for name in ("qw", "qx", "qy", "qz", "fx", "fy", "fz"):
+        columns[name] = np.concatenate([first[name], first[name][::-1]])
+    for name in ("x", "y", "z"):
+        columns[name] = np.concatenate([first[name], first[name][::-1]])
+    accepted(mapping_of(generated.write_csv(tmp_path / "run.csv", columns)))
 
 
 def test_a_channel_of_few_counts_is_not_frozen(tmp_path: Path) -> None:
@@ -264,8 +277,10 @@ def test_a_clock_in_milliseconds(tmp_path: Path) -> None:
     columns = generated.table(generated.record(rate=100))
     columns["t"] = columns["t"] * 1e3
     file = generated.write_csv(tmp_path / "run.csv", columns)
-    message = refusal(mapping_of(file))
-    assert "time.unit: the samples of x are 10 s apart" in message and 'unit = "ms" under [time]' in message
+    with pytest.raises(
+        TrialsError, match=r"time.unit: the samples of x are 10 s apart.*write unit = \"ms\" under \[time\]"
+    ):
+        import_trials(mapping_of(file), None)
     accepted(mapping_of(file, clock=Clock("t", "ms")))
 
 

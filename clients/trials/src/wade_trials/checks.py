@@ -7,6 +7,7 @@ accepts the check; ``doubt`` does not; ``skipped`` says what is needed for the c
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,8 @@ from .source import Series
 from .units import UNITS, quantity_of
 
 Array = NDArray[np.float64]
+#: The checks that a mapping may accept.
+CHECKS = ("frozen", "depth", "upright", "motion", "speed", "direction", "lift", "gravity", "rates", "angles", "wheels")
 Level = Literal["ok", "doubt", "wrong", "skipped"]
 
 
@@ -50,13 +53,13 @@ class Finding:
 # --- the clock and frozen channels -----------------------------------------------------------------------------------
 
 
-def check_clock(name: str, channel: str, series: Series) -> Iterator[Finding]:
-    """Steps that look like another unit of time."""
+def check_clock(path: Path, channel: str, series: Series) -> None:
+    """Refuses steps that look like another unit of time: no other check would mean anything."""
     step = float(np.median(np.diff(series.t)))
     if step > limits.LONG_STEP:
         unit = "ms" if step < 1e3 else "us" if step < 1e6 else "ns"
         message = f"the samples of {channel} are {step:g} s apart, too long for seconds"
-        yield Finding("clock", "wrong", name, "time.unit", message, f'unit = "{unit}" under [time]')
+        raise TrialsError(path, "time.unit", f'{message}: write unit = "{unit}" under [time]')
 
 
 def frozen_run(series: Series) -> tuple[float, float] | None:
@@ -88,8 +91,14 @@ def check_frozen(name: str, mapping: Mapping, series: dict[str, Series]) -> Iter
         # wheels and carriages stand still at exactly 0
         if span is None or (field.startswith("columns.") and own.values[np.searchsorted(own.t, span[0])] == 0):
             continue
-        reported.setdefault(span, []).append(channel)
+        # channels that stop together: one may move a sample longer than another
+        near = [other for other in reported if np.allclose(other, span, atol=limits.DIFFERENCE)]
+        group = reported.pop(near[0]) if near else []
+        joint = (max(span[0], near[0][0]), min(span[1], near[0][1])) if near else span
+        reported[joint] = [*group, channel]
     for (start, end), channels in reported.items():
+        if mapping.pose and _is_rest(mapping.pose, series, start, end, channels):
+            continue
         last = max(float(series[channel].t[-1]) for channel in channels)
         names = ", ".join(channels[:3]) + (f" and {len(channels) - 3} more" if len(channels) > 3 else "")
         verb = "has" if len(channels) == 1 else "have"
@@ -100,6 +109,22 @@ def check_frozen(name: str, mapping: Mapping, series: dict[str, Series]) -> Iter
             message = f"channel {names} {verb} been frozen from {start:.1f} s to {end:.1f} s"
             write = f"leave_out_s = [[{start:.3f}, {end:.3f}]] under [trials.{name}]"
         yield Finding("frozen", "wrong", name, mapping.field_of(channels[0]), message, write)
+
+
+def _is_rest(pose: Pose, series: dict[str, Series], start: float, end: float, channels: list[str]) -> bool:
+    """True where the whole pose stands still and the vehicle did so before and after: a simulator has no noise."""
+    live = {name for name in (*pose.position, *pose.quaternion) if np.ptp(series[name].values) > 0}
+    if not live <= set(channels):
+        return False
+    scale = UNITS["length"][pose.position_unit]
+    for at, other in ((start, start - limits.DIFFERENCE), (end, end + limits.DIFFERENCE)):
+        way = [
+            np.interp(at, series[n].t, series[n].values) - np.interp(other, series[n].t, series[n].values)
+            for n in pose.position
+        ]
+        if float(np.linalg.norm(way)) * scale > 2 * limits.REST_SPEED * limits.DIFFERENCE:
+            return False
+    return end < float(series[pose.position[0]].t[-1]) - limits.DIFFERENCE
 
 
 # --- the pose --------------------------------------------------------------------------------------------------------

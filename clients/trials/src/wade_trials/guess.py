@@ -42,10 +42,8 @@ def _group(names: dict[str, str], stems: Any) -> list[tuple[str, list[list[str]]
         if not lower.endswith(first):
             continue
         prefix = lower[: len(lower) - len(first)]
-        # a bare letter is a name of its own, not the end of another
-        if prefix and prefix[-1] not in "./_ " and not first[0] == "p":
-            continue
-        if prefix and len(first) <= 2 and prefix[-1] not in "./_ ":
+        # a stem is a name of its own or follows a separator
+        if prefix and prefix[-1] not in "./_ ":
             continue
         groups = [[prefix + stem + letter for letter in letters] for stem, letters in stems]
         if all(name in names for group in groups for name in group):

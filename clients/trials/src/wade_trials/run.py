@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from .checks import Finding, check_clock, check_columns, check_frozen, check_imu, check_pose
+from .checks import CHECKS, Finding, check_clock, check_columns, check_frozen, check_imu, check_pose
 from .errors import TrialsError
 from .mapping import MAPPING_FILE, WRENCH, Mapping, Trial
 from .motion import add_columns, base_grid, from_pose, increasing, track_of, window
@@ -49,6 +49,11 @@ class Refused(TrialsError):
 
 def import_trials(mapping: Mapping, out: Path | None, report: Report = lambda text, share: None) -> Result:
     """Imports every trial of a mapping into a new folder ``out``; without one everything but the writing is done."""
+    unknown = next((check for check in mapping.accept if check not in CHECKS), None)
+    if unknown is not None:
+        raise TrialsError(mapping.path, "accept", f'there is no check "{unknown}"; there are: {", ".join(CHECKS)}')
+    if not mapping.channels():
+        raise TrialsError(mapping.path, "columns", "no channel is mapped: a trial of constants alone measures nothing")
     result = Result()
     started = time.monotonic()
     if out is None:
@@ -89,10 +94,7 @@ def _columns(mapping: Mapping, name: str, trial: Trial, result: Result, report: 
     series = _read(mapping, name, trial, path, lambda share: report(f"{name}: reading", share))
     report(f"{name}: checking", 0.0)
     findings = result.findings
-    clock = list(check_clock(name, *next(iter(series.items()))))
-    findings.extend(clock)
-    if clock:
-        return {"t": series[next(iter(series))].t}
+    check_clock(path, *next(iter(series.items())))
     findings.extend(check_frozen(name, mapping, {channel: window(own, trial) for channel, own in series.items()}))
     if mapping.pose is not None:
         assert mapping.body is not None

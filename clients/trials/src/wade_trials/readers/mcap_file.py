@@ -10,6 +10,7 @@ from ..errors import TrialsError
 from ..source import Channel, Conventions, Progress, Series
 from . import missing_extra
 from .messages import Topics, by_topic, counted, number_fields
+from .rosbag import RosbagSource
 
 Decode = Callable[[bytes], Any]
 
@@ -88,6 +89,12 @@ class McapSource:
                 raise TrialsError(self.path, "", f"the file is damaged: {error}") from None
         return self._first
 
+    def _is_ros2(self, topics: list[str]) -> bool:
+        """True where rosbags can read the topics."""
+        channels = self._summary.channels.values() if self._summary else []
+        encodings = {channel.message_encoding for channel in channels if channel.topic in topics}
+        return encodings == {"cdr"}
+
     def channels(self) -> list[Channel]:
         counts: dict[str, int] = {}
         statistics = self._summary.statistics if self._summary else None
@@ -111,6 +118,12 @@ class McapSource:
         statistics = self._summary.statistics if self._summary else None
         start = statistics.message_start_time if statistics else 0
         topics = Topics(self.path, by_topic(list(names), list(self._numbers())), start)
+        if self._is_ros2(list(topics.wanted)):
+            try:
+                # six times as fast; it reads fewer kinds of files
+                return RosbagSource(self.path).read(names, progress)
+            except TrialsError:
+                pass
         total = statistics.message_count if statistics else 0
         try:
             for schema, channel, message in counted(self._messages(list(topics.wanted)), total, progress):
