@@ -30,6 +30,18 @@ def test_a_mapping_comes_back_as_it_was_written(tmp_path: Path) -> None:
     assert back.trials["run"].file == "run.csv" and back.trials["run"].depth_m == generated.DEPTH
 
 
+def test_the_mapping_of_the_readme_is_one(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[1] / "README.md").read_text()
+    block = text.split("```toml\n", 1)[1].split("```", 1)[0]
+    (tmp_path / "mapping.toml").write_text(block)
+    mapping = Mapping.read(tmp_path / "mapping.toml")
+    assert mapping.pose and mapping.wrench and mapping.columns and mapping.manifest
+    # and it comes back from what would be written beside the trials
+    (tmp_path / "again.toml").write_text(mapping_text(mapping, tmp_path))
+    again = Mapping.read(tmp_path / "again.toml")
+    assert replace(again, path=mapping.path) == mapping
+
+
 FAULTS = {
     'vehicle = "warthog"': ("", ["vehicle", "it is missing"]),
     "format = 1": ("format = 2", ["format", "must be 1"]),
@@ -117,7 +129,7 @@ def test_a_refused_import_leaves_nothing_and_the_first_trial_neither(tmp_path: P
         "wrong": Trial(str(file), generated.WATER_LEVEL + 1, generated.DEPTH),
     }
     before = sorted(p.name for p in tmp_path.iterdir())
-    with pytest.raises(TrialsError, match=r"nothing was written, since 2 of the checks failed"):
+    with pytest.raises(TrialsError, match=r"nothing was written, since 1 of the checks failed"):
         import_trials(mapping_of(file, trials=trials), tmp_path / "out")
     assert sorted(p.name for p in tmp_path.iterdir()) == before
 

@@ -66,18 +66,39 @@ def test_a_pose_that_was_read_wrongly(mistake: str, tmp_path: Path) -> None:
     accepted(mapping_of(file, pose=replace(POSE, **correction)))
 
 
+def test_several_mistakes_are_named_at_once(wade: str, tmp_path: Path) -> None:
+    """The other checks go on with the reading that the pose fits."""
+    recording = generated.record()
+    recording.axes = recording.body_axes = Y_UP["axes"]
+    recording.force = -recording.force
+    columns = generated.table(recording)
+    columns |= {name: recording.specific_force[:, at] / 9.81 for at, name in enumerate(("sx", "sy", "sz"))}
+    file = generated.write_csv(tmp_path / "run.csv", columns)
+    message = refusal(mapping_of(file, imu=Imu(("sx", "sy", "sz"))))
+    for word in ('axes = "y up" under [pose]', 'force_unit = "g" under [imu]', "factor = -1 in [columns] fz"):
+        assert word in message, message
+
+
 def test_the_recording_as_it_is_is_accepted(tmp_path: Path) -> None:
     for heading in (0.0, 1.0, 3.1, -2.0):
         file = generated.write_csv(tmp_path / "run.csv", generated.table(generated.record(heading=heading)))
         result = accepted(mapping_of(file))
-        assert {f.check for f in result.findings if f.level == "ok"} == {"depth", "upright", "motion", "speed", "lift"}
+        assert {f.check for f in result.findings if f.level == "ok"} == {
+            "depth",
+            "upright",
+            "motion",
+            "speed",
+            "lift",
+            "drag",
+        }
 
 
 def test_a_straight_run_along_x_hides_the_order_and_is_doubted(tmp_path: Path) -> None:
     """At heading 0 both orders stand upright: the wrong one drives backward."""
     recording = replace(generated.record(heading=0.0, turn=0.0), quaternion_order="xyzw")
     file = generated.write_csv(tmp_path / "run.csv", generated.table(recording))
-    doubts = [f for f in import_trials(mapping_of(file), None).findings if f.level == "doubt"]
+    mapping = mapping_of(file, columns={})
+    doubts = [f for f in import_trials(mapping, None).findings if f.level == "doubt"]
     assert len(doubts) == 1 and "backward" in str(doubts[0]) and 'quaternion_order = "xyzw"' in str(doubts[0])
 
 
@@ -125,6 +146,14 @@ def test_a_channel_that_freezes_for_a_while(tmp_path: Path) -> None:
     accepted(mapping_of(file, trials={"run": trial}))
 
 
+def test_a_load_along_the_motion_is_doubted(tmp_path: Path) -> None:
+    columns = generated.table(generated.record())
+    columns["fx"] = -columns["fx"]
+    file = generated.write_csv(tmp_path / "run.csv", columns)
+    doubts = [str(f) for f in import_trials(mapping_of(file), None).findings if f.level == "doubt"]
+    assert len(doubts) == 1 and "fx is along the motion" in doubts[0] and "factor = -1 in [columns] fx" in doubts[0]
+
+
 def test_a_simulator_at_rest_is_not_frozen(tmp_path: Path) -> None:
     """Its pose stands still to the last bit between two drives."""
     first = generated.table(generated.record(noise=0.0))
@@ -153,8 +182,8 @@ def test_a_force_that_is_not_connected(tmp_path: Path) -> None:
 CELL = Wrench(("fx", "fy", "fz"))
 CELLS: dict[str, tuple[Any, dict[str, Any], list[str]]] = {
     # name: force as the cell states it, what corrects the mapping, words of the message
-    "reversed": (lambda f: -f, {"sign": -1}, ["the sign is reversed", "sign = -1"]),
-    "NED": (lambda f: f * [1, -1, -1], {"axes": NED["axes"]}, ["(NED)", 'axes = "NED"']),
+    "reversed": (lambda f: -f, {"sign": -1}, ["the reaction on the cell", "write sign = -1 under"]),
+    "NED": (lambda f: f * [1, -1, -1], {"axes": NED["axes"]}, ["(NED)", 'write axes = "NED" under']),
     "kN": (lambda f: f / 1e3, {"force_unit": "kN"}, ["it fits kN", 'force_unit = "kN"']),
     "lbf": (lambda f: f / 4.4482216, {"force_unit": "lbf"}, ["it fits lbf", 'force_unit = "lbf"']),
     "y up": (

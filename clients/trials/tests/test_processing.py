@@ -7,9 +7,10 @@ from pathlib import Path
 
 import generated
 import numpy as np
+import pytest
 from helpers import BODY, POSE, columns_of, mapping_of
 
-from wade_trials import import_trials
+from wade_trials import import_trials, motion
 from wade_trials.axes import PRESETS, quaternions, rotations
 from wade_trials.mapping import Pose, Trial
 from wade_trials.signal import resample, weights
@@ -82,6 +83,18 @@ def test_the_columns_are_those_of_wade_validate(wade: str, tmp_path: Path) -> No
             for column in columns:
                 start = theirs["t"][0] if column == "t" else 0.0
                 assert np.abs(ours[column] - theirs[column] + start).max() < 2e-6, (name, column)
+
+
+def test_blocks_leave_no_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long recording is processed block by block."""
+    columns = generated.table(generated.record(seconds=8))
+    keep = (columns["t"] < 3.0) | (columns["t"] > 3.7)
+    file = generated.write_csv(tmp_path / "run.csv", {name: values[keep] for name, values in columns.items()})
+    import_trials(mapping_of(file), tmp_path / "whole")
+    for size in (5, 100, 333):
+        monkeypatch.setattr(motion, "BLOCK", size)
+        import_trials(mapping_of(file), tmp_path / f"blocks{size}")
+        assert (tmp_path / f"blocks{size}" / "run.csv").read_bytes() == (tmp_path / "whole" / "run.csv").read_bytes()
 
 
 def test_every_preset_of_axes_gives_the_same_columns(tmp_path: Path) -> None:

@@ -271,31 +271,33 @@ def complaint(check: str, found: Figures, trial: Trial, max_speed: float) -> tup
     return "pose.position_unit", f"the speed reaches {found.speed:.3g} m/s, above max_speed_mps = {max_speed:g}"
 
 
-def check_pose(name: str, mapping: Mapping, trial: Trial, track: Track) -> Iterator[Finding]:
-    """Holds a pose against depth, attitude, direction of motion and speed, and names the reading that fits all four."""
+def check_pose(name: str, mapping: Mapping, trial: Trial, track: Track) -> tuple[list[Finding], Pose | None]:
+    """Checks a pose by depth, attitude, direction of motion and speed; also the reading that fits all four."""
     pose, body, max_speed = mapping.pose, mapping.body, mapping.max_speed_mps
     assert pose is not None and body is not None
     found = figures(track, pose, trial, body)
     failed = faults(found, trial, max_speed)
+    findings: list[Finding] = []
+    likely: Pose | None = None if failed else pose
     for check in ("depth", "upright", "motion", "speed"):
         if check in failed:
             continue
         if check == "depth" and (trial.depth_m is None or trial.water_level_m is None):
             message = "the depth was not checked: state depth_m, the water depth measured at rest"
-            yield Finding("depth", "skipped", name, f"trials.{name}.depth_m", message)
+            findings.append(Finding("depth", "skipped", name, f"trials.{name}.depth_m", message))
         elif check == "motion" and np.isnan(found.forward):
             message = f"the vehicle never moves faster than {limits.MOVING} m/s: its direction was not checked"
-            yield Finding("motion", "skipped", name, "pose.body_axes", message)
+            findings.append(Finding("motion", "skipped", name, "pose.body_axes", message))
         else:
-            yield Finding(check, "ok", name, "pose", _passed(check, found, trial))
+            findings.append(Finding(check, "ok", name, "pose", _passed(check, found, trial)))
     if failed:
         fitting = _fitting(track, pose, trial, body, max_speed)
         check = failed[-1]
         field, message = complaint(check, found, trial, max_speed)
         write = ""
         if fitting:
-            other, changed, _ = fitting[0]
-            message += f"; the recording fits {named(pose, other)}"
+            likely, changed, _ = fitting[0]
+            message += f"; the recording fits {named(pose, likely)}"
             write = " and ".join(changed) + " under [pose]"
         elif check == "depth" and not np.isnan(found.depth) and trial.depth_m is not None:
             off = found.depth - trial.depth_m
@@ -303,9 +305,10 @@ def check_pose(name: str, mapping: Mapping, trial: Trial, track: Track) -> Itera
                 f"; no axes, unit or order explain it: correct water_level_m (lower by {off:.3f} m would agree), "
                 "tracked_point_to_origin_m or depth_m, or leave depth_m out where the trial never reaches that depth"
             )
-        yield Finding(check, "wrong", name, field, message, write)
+        findings.append(Finding(check, "wrong", name, field, message, write))
     elif found.forward < -0.5:
-        yield _backward(name, track, pose, trial, body, max_speed)
+        findings.append(_backward(name, track, pose, trial, body, max_speed))
+    return findings, likely
 
 
 def _fitting(
@@ -366,6 +369,7 @@ def check_columns(name: str, mapping: Mapping, trial: Trial, columns: dict[str, 
         yield from _check_depth(name, mapping, trial, columns, rest)
         yield from _check_angles(name, mapping, columns)
     yield from _check_wheels(name, mapping, columns)
+    yield from check_drag(name, mapping, columns)
     yield from check_lift(name, mapping, columns, rest)
 
 
@@ -517,7 +521,32 @@ def check_lift(name: str, mapping: Mapping, columns: dict[str, Array], rest: NDA
         yield Finding("lift", "ok", name, field, f"{fz:.0f} N at rest, rho g V is {lift:.0f} N")
         return
     message = f"fz at rest is {fz:.4g} N, rho g V at {depth:.3f} m is {lift:.4g} N"
-    yield Finding("lift", "wrong", name, field, *_likely_lift(mapping, columns, rest, fz, fits, message))
+    likely, write = _likely_lift(mapping, columns, rest, fz, fits)
+    yield Finding("lift", "wrong", name, field, message + likely, write)
+
+
+def drag_of(columns: dict[str, Array]) -> float | None:
+    """Mean of fx against the motion [N]; ``None`` where the vehicle hardly moves or fx was not measured."""
+    moving = np.abs(columns["vx"]) > limits.MOVING
+    if "fx" not in columns or np.count_nonzero(moving) < limits.FROZEN_SAMPLES:
+        return None
+    return -float(np.mean(columns["fx"][moving] * np.sign(columns["vx"][moving])))
+
+
+def check_drag(name: str, mapping: Mapping, columns: dict[str, Array]) -> Iterator[Finding]:
+    """The load along x opposes the motion; a cell that also bears the drive may not show it."""
+    drag = drag_of(columns)
+    if drag is None:
+        return
+    field = "wrench.force" if mapping.wrench else "columns.fx"
+    noise = float(np.std(columns["fx"])) / 10
+    if drag > -noise:
+        yield Finding("drag", "ok", name, field, f"fx opposes the motion by {drag:.1f} N on average")
+        return
+    message = f"fx is along the motion, by {-drag:.1f} N on average, and drag opposes it"
+    stated = mapping.columns.get("fx")
+    write = f"factor = {-stated.factor:g} in [columns] fx" if stated else "axes with the other sign under [wrench]"
+    yield Finding("drag", "doubt", name, field, message, write)
 
 
 def _likely_lift(
@@ -526,7 +555,6 @@ def _likely_lift(
     rest: NDArray[np.bool_],
     fz: float,
     fits: Callable[[float], bool],
-    message: str,
 ) -> tuple[str, str]:
     """What explains a wrong lift, and what to write."""
     wrench = mapping.wrench
@@ -538,25 +566,31 @@ def _likely_lift(
         column = mapping.columns["fz"]
         unit_key, stated, reverse = "unit", column.unit or "N", f"factor = {-column.factor:g}"
     if fits(-fz):
-        message += "; the sign is reversed: it is the reaction on the cell, or z points down (NED)"
-        return message, f'{reverse}, or axes = "NED", {where}' if wrench else f"{reverse} {where}"
+        message = "; the sign is reversed: "
+        drag = drag_of(columns)
+        if not wrench or drag is None:
+            message += "it is the reaction on the cell, or z points down (NED)"
+            return message, f'{reverse}, or axes = "NED", {where}' if wrench else f"{reverse} {where}"
+        if drag > 0:
+            return message + "z points down (NED), since fx opposes the motion", f'axes = "NED" {where}'
+        return message + "it is the reaction on the cell, since fx is along the motion, too", f"{reverse} {where}"
     for unit, scale in UNITS["force"].items():
         for sign, also in ((1, ""), (-1, f" and {reverse}")):
             if unit != stated and fits(sign * fz * scale / UNITS["force"][stated]):
-                return f"{message}; it fits {unit}", f'{unit_key} = "{unit}"{also} {where}'
+                return f"; it fits {unit}", f'{unit_key} = "{unit}"{also} {where}'
     for at, axis in enumerate(("fx", "fy")):
         value = float(np.mean(columns[axis][rest])) if axis in columns else 0.0
         if wrench and fits(abs(value)):
             up = wrench.axes[at] if value * wrench.sign > 0 else opposite(wrench.axes[at])
             axes = next((a for a in (*PRESETS.values(), *SINGLE_TURNS) if a[2] == up), PRESETS["z up"])
             return (
-                f"{message}; {axis} has that value, so {up} of the cell points up",
+                f"; {axis} has that value, so {up} of the cell points up",
                 f"axes = {axes_text(axes)} {where}",
             )
     if weight and fits(fz + weight):
-        message += "; the reading holds the weight of the vehicle"
+        message = "; the reading holds the weight of the vehicle"
         return message, f"weight_n = {weight:.1f} {where}" if wrench else ""
-    return f"{message}; neither sign, unit, axis nor weight explain it: was the cell zeroed in air?", ""
+    return "; neither sign, unit, axis nor weight explain it: was the cell zeroed in air?", ""
 
 
 # --- the inertial sensor ---------------------------------------------------------------------------------------------

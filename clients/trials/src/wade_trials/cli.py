@@ -8,7 +8,7 @@ from pathlib import Path
 
 from . import __version__
 from .errors import TrialsError
-from .guess import guess
+from .guess import Known, guess
 from .mapping import MAPPING_FILE, Mapping
 from .readers import open_source
 from .run import Refused, Result, import_trials
@@ -110,16 +110,14 @@ def _inspect(options: argparse.Namespace) -> int:
 def _map(options: argparse.Namespace) -> int:
     if options.out.exists():
         raise TrialsError(options.out, "", "it is there already: remove it or name another file with --out")
-    mapping = guess(
-        options.files,
-        options.vehicle,
-        options.out,
+    known = Known(
         clock=Clock(options.time, options.time_unit),
         body_name=options.body,
         tracked_point_to_origin_m=options.point_to_origin,
         water_level_m=options.water_level,
         depth_m=options.depth,
     )
+    mapping = guess(options.files, options.vehicle, options.out, known)
     text = mapping_text(mapping, options.out.resolve().parent)
     options.out.write_text(text, encoding="utf-8")
     print(mapping_table(mapping))

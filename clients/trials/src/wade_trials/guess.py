@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from . import wade
 from .axes import PRESETS, parse_axes
 from .errors import TrialsError
-from .mapping import COLUMNS, Column, Imu, Mapping, Pose, Trial, Wrench
+from .mapping import COLUMNS, Column, Imu, Mapping, Pose, Trial, Triple, Wrench
 from .readers import open_source
 from .source import NO_CLOCK, Channel, Clock, Source
 from .units import canonical_unit, quantity_of, si_unit
@@ -51,28 +51,33 @@ def _group(names: dict[str, str], stems: Any) -> list[tuple[str, list[list[str]]
     return found
 
 
-def guess(
-    files: Sequence[Path],
-    vehicle: str,
-    path: Path,
-    *,
-    clock: Clock = NO_CLOCK,
-    body_name: str = "",
-    tracked_point_to_origin_m: tuple[float, float, float] | None = None,
-    water_level_m: float | None = None,
-    depth_m: float | None = None,
-) -> Mapping:
+@dataclass(frozen=True)
+class Known:
+    """What the caller states, so that it is no guess."""
+
+    clock: Clock = NO_CLOCK
+    #: Name of the tracked body, where there are several.
+    body_name: str = ""
+    tracked_point_to_origin_m: Triple | None = None
+    water_level_m: float | None = None
+    depth_m: float | None = None
+
+
+NOTHING_KNOWN = Known()
+
+
+def guess(files: Sequence[Path], vehicle: str, path: Path, known: Known = NOTHING_KNOWN) -> Mapping:
     """A mapping of files that have the same channels; ``path`` is where it will be written."""
-    source = open_source(files[0], clock)
+    source = open_source(files[0], known.clock)
     channels = source.channels()
-    mapping = Mapping(path=path.resolve(), vehicle=vehicle, trials={}, clock=clock)
-    _trials(mapping, files, water_level_m, depth_m)
+    mapping = Mapping(path=path.resolve(), vehicle=vehicle, trials={}, clock=known.clock)
+    _trials(mapping, files, known)
     try:
         mapping.body = wade.body(vehicle)
     except TrialsError as error:
         raise TrialsError(path, "body", f"the vehicle is not known: {error}") from None
     names = {channel.name.lower(): channel.name for channel in channels}
-    _pose(mapping, source, names, body_name, tracked_point_to_origin_m)
+    _pose(mapping, source, names, known)
     _wrench_and_imu(mapping, channels, names)
     _columns(mapping, channels)
     if mapping.pose is None and not mapping.columns:
@@ -87,27 +92,22 @@ def guess(
             if name not in mapping.columns:
                 mapping.columns[name] = Column(constant=0.0)
                 mapping.guesses[f"columns.{name}"] = "no channel has this name; 0 is that of a vehicle that was held"
-        if "depth" not in mapping.columns and "water_level" not in mapping.columns and depth_m is None:
+        if "depth" not in mapping.columns and "water_level" not in mapping.columns and known.depth_m is None:
             raise TrialsError(files[0], "depth", "no channel states it: give --depth, the water depth at rest [m]")
     return mapping
 
 
-def _trials(mapping: Mapping, files: Sequence[Path], level: float | None, depth: float | None) -> None:
+def _trials(mapping: Mapping, files: Sequence[Path], known: Known) -> None:
     for file in files:
         stem = file.name if file.is_dir() else file.stem
         name = re.sub(r"[^A-Za-z0-9_-]+", "-", stem).strip("-") or "trial"
         if name in mapping.trials:
             raise TrialsError(file, "", f"two files would become the trial {name}: rename one of them")
-        mapping.trials[name] = Trial(file=str(file.resolve()), water_level_m=level, depth_m=depth)
+        mapping.trials[name] = Trial(file=str(file.resolve()), water_level_m=known.water_level_m, depth_m=known.depth_m)
 
 
-def _pose(
-    mapping: Mapping,
-    source: Source,
-    names: dict[str, str],
-    body_name: str,
-    arm: tuple[float, float, float] | None,
-) -> None:
+def _pose(mapping: Mapping, source: Source, names: dict[str, str], known: Known) -> None:
+    body_name, arm = known.body_name, known.tracked_point_to_origin_m
     found: list[tuple[str, list[list[str]]]] = []
     for stems in POSES:
         for prefix, groups in _group(names, stems):

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: How far from 1 the length of a quaternion may be: what a few decimals lose, and no more.
 LENGTH_TOLERANCE = 0.02
+#: Samples of the grid that are processed at once.
+BLOCK = 50_000
 
 
 @dataclass(frozen=True)
@@ -101,20 +103,31 @@ def depth_of(level: float, altitude: Array, up: Array, pose: Pose, body: Body) -
     return np.asarray((level - origin) / up[:, 2] - body.ground_contact_z_m)
 
 
-def from_pose(
-    path: Path, track: Track, pose: Pose, body: Body, level: float | None, how: Processing
-) -> dict[str, Array]:
-    """Columns of the motion on the new grid. Pieces between holes are processed apart; those shorter than the filter's
-    window are left out."""
-    position, quaternion = track.in_our_axes(pose)
+@dataclass(frozen=True)
+class Rig:
+    """What the processing of a pose needs beside the recording."""
+
+    pose: Pose
+    body: Body
+    #: Altitude of the still water [m]; without it there is no depth.
+    water_level_m: float | None
+    how: Processing
+
+
+def from_pose(path: Path, track: Track, rig: Rig) -> dict[str, Array]:
+    """Columns of the motion on the new grid.
+
+    Pieces between holes are processed apart; those shorter than the filter's window are left out.
+    """
+    how = rig.how
     parts: list[dict[str, Array]] = []
     longest = 0
     for piece in pieces(track.t):
-        t = track.t[piece]
-        at = grid(t[0], t[-1], how.rate_hz)
+        part = Track(track.t[piece], track.position[piece], track.quaternion[piece])
+        at = grid(part.t[0], part.t[-1], how.rate_hz)
         longest = max(longest, len(at))
         if len(at) >= how.window:
-            parts.append(_piece(t, position[piece], quaternion[piece], at, pose, body, level, how))
+            parts.extend(_block(part, at, start, rig) for start in range(0, len(at), BLOCK))
     if not parts:
         raise TrialsError(
             path,
@@ -125,21 +138,26 @@ def from_pose(
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _piece(
-    t: Array,
-    position: Array,
-    quaternion: Array,
-    at: Array,
-    pose: Pose,
-    body: Body,
-    level: float | None,
-    how: Processing,
-) -> dict[str, Array]:
+def _block(track: Track, at: Array, start: int, rig: Rig) -> dict[str, Array]:
+    """A block of a piece's grid, processed with a window more on both sides, so that blocks leave no trace."""
+    end = min(start + BLOCK, len(at))
+    low, high = max(start - rig.how.window, 0), min(end + rig.how.window, len(at))
+    first = max(int(np.searchsorted(track.t, at[low], side="right")) - 1, 0)
+    last = int(np.searchsorted(track.t, at[high - 1], side="left")) + 1
+    rows = Track(track.t[first:last], track.position[first:last], track.quaternion[first:last])
+    return {name: values[start - low : end - low] for name, values in _columns(rows, at[low:high], rig).items()}
+
+
+def _columns(track: Track, at: Array, rig: Rig) -> dict[str, Array]:
+    """Resampled, smoothed, differentiated, and moved to the body origin."""
+    how, pose = rig.how, rig.pose
+
     def filtered(samples: Array, derivative: int) -> Array:
         return savitzky_golay(samples, how.window, how.order, derivative, 1 / how.rate_hz)
 
-    places = [np.interp(at, t, position[:, axis]) for axis in range(3)]
-    turns = without_sign_flips(slerp(t, quaternion, at))
+    position, quaternion = track.in_our_axes(pose)
+    places = [np.interp(at, track.t, position[:, axis]) for axis in range(3)]
+    turns = without_sign_flips(slerp(track.t, quaternion, at))
     smooth = np.stack([filtered(turns[:, i], 0) for i in range(4)], axis=1)
     omega = body_rate(smooth, np.stack([filtered(turns[:, i], 1) for i in range(4)], axis=1))
     rotation = rotations(smooth)
@@ -152,8 +170,8 @@ def _piece(
     columns["roll"] = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
     columns["pitch"] = -np.arcsin(np.clip(rotation[:, 2, 0], -1, 1))
     columns["yaw"] = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    if level is not None:
-        columns["depth"] = depth_of(level, filtered(places[2], 0), up, pose, body)
+    if rig.water_level_m is not None:
+        columns["depth"] = depth_of(rig.water_level_m, filtered(places[2], 0), up, pose, rig.body)
     return columns
 
 

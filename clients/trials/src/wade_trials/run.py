@@ -10,7 +10,7 @@ from typing import Any
 from .checks import CHECKS, Finding, check_clock, check_columns, check_frozen, check_imu, check_pose
 from .errors import TrialsError
 from .mapping import MAPPING_FILE, WRENCH, Mapping, Trial
-from .motion import add_columns, base_grid, from_pose, increasing, track_of, window
+from .motion import Rig, add_columns, base_grid, from_pose, increasing, track_of, window
 from .readers import open_source
 from .source import Progress, Series, unknown_channel
 from .write import mapping_text, toml_text, whole_folder, write_csv
@@ -96,17 +96,24 @@ def _columns(mapping: Mapping, name: str, trial: Trial, result: Result, report: 
     findings = result.findings
     check_clock(path, *next(iter(series.items())))
     findings.extend(check_frozen(name, mapping, {channel: window(own, trial) for channel, own in series.items()}))
+    is_checked = True
     if mapping.pose is not None:
         assert mapping.body is not None
         track = track_of(path, mapping, trial, series)
-        findings.extend(check_pose(name, mapping, trial, track))
-        columns = from_pose(path, track, mapping.pose, mapping.body, trial.water_level_m, mapping.processing)
+        of_pose, likely = check_pose(name, mapping, trial, track)
+        findings.extend(of_pose)
+        pose = mapping.pose
+        if any(f.level == "wrong" and f.check not in mapping.accept for f in of_pose):
+            # nothing will be written: the other checks go on with the reading that is likely right
+            pose, is_checked = likely or pose, likely is not None
+        columns = from_pose(path, track, Rig(pose, mapping.body, trial.water_level_m, mapping.processing))
     else:
         columns = {"t": base_grid(mapping, series)}
     add_columns(path, mapping, trial, series, columns)
-    if mapping.imu is not None:
+    if mapping.imu is not None and is_checked:
         findings.extend(check_imu(name, mapping.imu, trial, series, columns))
-    findings.extend(check_columns(name, mapping, trial, columns))
+    if is_checked:
+        findings.extend(check_columns(name, mapping, trial, columns))
     result.rows[name] = len(columns["t"])
     return columns
 

@@ -61,6 +61,9 @@ def mapping_table(mapping: Mapping) -> str:
                 columns = " ".join(WRENCH[at : at + 3])
                 shown = together(group)
                 fields = basis("wrench.axes", "wrench.force_unit", "wrench.force", "wrench.sign")
+                fields = (
+                    fields if at == 0 else basis("wrench.axes", "wrench.moment_unit", "wrench.sign", "wrench.point_m")
+                )
                 rows.append((shown, columns, unit, how, fields))
     if mapping.imu:
         imu = mapping.imu

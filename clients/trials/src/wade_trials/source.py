@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 #: Samples of one channel above which a file is refused: eight bytes each, for every channel that is read.
-MOST_SAMPLES = 50_000_000
+MOST_SAMPLES = 20_000_000
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import TrialsError
 from ..source import Channel, Conventions, Progress, Series
 from ..units import canonical_unit
-from .table import read_numbers, without_origin
+from .table import Layout, read_numbers, without_origin
 
 #: Lines in which the names must end.
 MOST_HEADER_LINES = 12
@@ -91,6 +91,6 @@ class MotiveSource:
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, Series]:
         at = [self.time, *(self.columns[name] for name in names)]
-        table = read_numbers(self.path, self.lines_before, ",", at, ["Time", *names], progress)
+        table = read_numbers(Layout(self.path, self.lines_before, ",", at, ["Time", *names]), progress)
         t = without_origin(self.path, "Time", table[0], 1.0)
         return {name: Series(t, values) for name, values in zip(names, table[1:], strict=True)}

@@ -4,6 +4,8 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -93,9 +95,8 @@ class TableSource:
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, Series]:
         wanted = [self.time, *names]
-        table = read_numbers(
-            self.path, self.lines_before, self.delimiter, [self.names.index(n) for n in wanted], wanted, progress
-        )
+        columns = [self.names.index(name) for name in wanted]
+        table = read_numbers(Layout(self.path, self.lines_before, self.delimiter, columns, wanted), progress)
         t = without_origin(self.path, self.time, table[0], self.factor)
         return {name: Series(t, values) for name, values in zip(names, table[1:], strict=True)}
 
@@ -108,75 +109,67 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def read_numbers(
-    path: Path, skip: int, delimiter: str, columns: Sequence[int], names: Sequence[str], progress: Progress
-) -> list[Array]:
+@dataclass(frozen=True)
+class Layout:
+    """Where the wanted columns of a text file stand."""
+
+    path: Path
+    #: Lines above the numbers.
+    skip: int
+    delimiter: str
+    columns: Sequence[int]
+    names: Sequence[str]
+
+
+def read_numbers(layout: Layout, progress: Progress) -> list[Array]:
     """Some columns of numbers; an empty cell is NaN. A chunk of the file is held at a time, and the numbers."""
+    path = layout.path
     size = max(path.stat().st_size, 1)
     parts: list[Array] = []
-    count, first_row, done = 0, skip + 1, 0
+    count, first_row, done = 0, layout.skip + 1, 0
     with path.open(encoding="utf-8-sig", errors="replace", newline=None) as file:
-        for _ in range(skip):
+        for _ in range(layout.skip):
             done += len(file.readline())
-        while lines := _lines(file):
+        while lines := list(islice(file, CHUNK)):
             done += sum(map(len, lines))
             rows = [line for line in lines if line.strip() and not line.startswith("#")]
             if rows:
-                parts.append(_parsed(path, lines, rows, first_row, delimiter, columns, names))
+                parts.append(_parsed(layout, lines, rows, first_row))
                 count += len(rows)
                 check_count(path, count)
             first_row += len(lines)
             progress(min(done / size, 1.0))
     if not parts:
         raise TrialsError(path, "", "there is no row of numbers below the header")
-    return [np.concatenate([part[:, at] for part in parts]) for at in range(len(columns))]
+    return [np.concatenate([part[:, at] for part in parts]) for at in range(len(layout.columns))]
 
 
-def _lines(file: io.TextIOWrapper) -> list[str]:
-    from itertools import islice
-
-    return list(islice(file, CHUNK))
-
-
-def _parsed(
-    path: Path,
-    lines: list[str],
-    rows: list[str],
-    first_row: int,
-    delimiter: str,
-    columns: Sequence[int],
-    names: Sequence[str],
-) -> Array:
-    text = "".join(rows)
+def _parsed(layout: Layout, lines: list[str], rows: list[str], first_row: int) -> Array:
+    text, delimiter = "".join(rows), layout.delimiter
     pair = delimiter * 2
     if pair in text or delimiter + "\n" in text or text.startswith(delimiter) or "\n" + delimiter in text:
         gap = f"{delimiter}nan{delimiter}"
         text = text.replace(pair, gap).replace(pair, gap)
         text = text.replace(delimiter + "\n", delimiter + "nan\n").replace("\n" + delimiter, "\nnan" + delimiter)
         text = "nan" + text if text.startswith(delimiter) else text
-        text = text + "nan" if text.endswith(delimiter) else text
+    text = text + "nan" if text.endswith(delimiter) else text
     try:
-        return np.loadtxt(io.StringIO(text), delimiter=delimiter, usecols=list(columns), ndmin=2, comments=None)
+        return np.loadtxt(io.StringIO(text), delimiter=delimiter, usecols=list(layout.columns), ndmin=2, comments=None)
     except (ValueError, IndexError):
-        raise _bad_cell(path, lines, first_row, delimiter, columns, names) from None
+        raise _bad_cell(layout, lines, first_row) from None
 
 
-def _bad_cell(
-    path: Path, lines: list[str], first_row: int, delimiter: str, columns: Sequence[int], names: Sequence[str]
-) -> TrialsError:
+def _bad_cell(layout: Layout, lines: list[str], first_row: int) -> TrialsError:
+    path = layout.path
     for number, line in enumerate(lines):
         if not line.strip() or line.startswith("#"):
             continue
-        cells = next(csv.reader([line], delimiter=delimiter))
-        for column, name in zip(columns, names, strict=True):
+        cells = next(csv.reader([line], delimiter=layout.delimiter))
+        for column, name in zip(layout.columns, layout.names, strict=True):
+            row = f"row {first_row + number}"
             if column >= len(cells):
-                return TrialsError(
-                    path, f"row {first_row + number}", f"it has {len(cells)} cells, so column {name} is missing"
-                )
+                return TrialsError(path, row, f"it has {len(cells)} cells, so column {name} is missing")
             if cells[column].strip() and not _is_number(cells[column]):
-                return TrialsError(
-                    path,
-                    f"row {first_row + number}, column {name}",
-                    f'"{cells[column]}" is no number: correct the cell, or leave it empty where nothing was measured',
-                )
+                message = "is no number: correct the cell, or leave it empty where nothing was measured"
+                return TrialsError(path, f"{row}, column {name}", f'"{cells[column].strip()}" {message}')
     return TrialsError(path, f"rows {first_row} to {first_row + len(lines) - 1}", "they are no table of numbers")
