@@ -105,6 +105,16 @@ def test_an_empty_cell_was_not_measured(tmp_path: Path) -> None:
     assert import_trials(Mapping.read(path), tmp_path / "out").rows["run"] > 500
 
 
+def test_semicolons_with_decimal_commas_and_quotes(tmp_path: Path) -> None:
+    file, path = _written(tmp_path)
+    import_trials(Mapping.read(path), tmp_path / "points")
+    head, *rows = file.read_text().splitlines()
+    cells = [[f'"{cell}"'.replace(".", ",") for cell in row.split(",")] for row in rows]
+    file.write_text("\n".join([head.replace(",", ";"), *(";".join(row) for row in cells)]), encoding="utf-8-sig")
+    import_trials(Mapping.read(path), tmp_path / "commas")
+    assert (tmp_path / "commas" / "run.csv").read_bytes() == (tmp_path / "points" / "run.csv").read_bytes()
+
+
 def test_time_that_goes_back(tmp_path: Path) -> None:
     file, path = _written(tmp_path)
     lines = file.read_text().splitlines()

@@ -144,8 +144,13 @@ def read_numbers(layout: Layout, progress: Progress) -> list[Array]:
     return [np.concatenate([part[:, at] for part in parts]) for at in range(len(layout.columns))]
 
 
+def _with_points(text: str, delimiter: str) -> str:
+    """Decimal commas as points, where commas do not separate cells."""
+    return text if delimiter == "," else text.replace(",", ".")
+
+
 def _parsed(layout: Layout, lines: list[str], rows: list[str], first_row: int) -> Array:
-    text, delimiter = "".join(rows), layout.delimiter
+    text, delimiter = _with_points("".join(rows), layout.delimiter), layout.delimiter
     pair = delimiter * 2
     if pair in text or delimiter + "\n" in text or text.startswith(delimiter) or "\n" + delimiter in text:
         gap = f"{delimiter}nan{delimiter}"
@@ -154,7 +159,9 @@ def _parsed(layout: Layout, lines: list[str], rows: list[str], first_row: int) -
         text = "nan" + text if text.startswith(delimiter) else text
     text = text + "nan" if text.endswith(delimiter) else text
     try:
-        return np.loadtxt(io.StringIO(text), delimiter=delimiter, usecols=list(layout.columns), ndmin=2, comments=None)
+        return np.loadtxt(
+            io.StringIO(text), delimiter=delimiter, usecols=list(layout.columns), ndmin=2, comments=None, quotechar='"'
+        )
     except (ValueError, IndexError):
         raise _bad_cell(layout, lines, first_row) from None
 
@@ -169,7 +176,7 @@ def _bad_cell(layout: Layout, lines: list[str], first_row: int) -> TrialsError:
             row = f"row {first_row + number}"
             if column >= len(cells):
                 return TrialsError(path, row, f"it has {len(cells)} cells, so column {name} is missing")
-            if cells[column].strip() and not _is_number(cells[column]):
+            if cells[column].strip() and not _is_number(_with_points(cells[column], layout.delimiter)):
                 message = "is no number: correct the cell, or leave it empty where nothing was measured"
                 return TrialsError(path, f"{row}, column {name}", f'"{cells[column].strip()}" {message}')
     return TrialsError(path, f"rows {first_row} to {first_row + len(lines) - 1}", "they are no table of numbers")
