@@ -10,7 +10,7 @@ import pytest
 from helpers import FORCES, NED, POSE, Y_UP, accepted, mapping_of, refusal
 
 from wade_trials import TrialsError, import_trials
-from wade_trials.checks import turned_about_up
+from wade_trials.axes import turned_about_up
 from wade_trials.mapping import Column, Imu, Trial, Wrench
 from wade_trials.source import Clock
 

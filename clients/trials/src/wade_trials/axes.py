@@ -12,6 +12,8 @@ PRESETS: dict[str, Axes] = {
     "y up": ("x", "-z", "y"),
     "NED": ("x", "-y", "-z"),
 }
+#: Right-handed axes with another axis up, beside the presets.
+SINGLE_TURNS: list[Axes] = [("y", "z", "x"), ("z", "y", "-x"), ("x", "z", "-y"), ("-x", "-y", "z")]
 #: Other names of the presets, in lower case.
 ALIASES = {"z up": "z up", "flu": "z up", "enu": "z up", "y up": "y up", "ned": "NED", "frd": "NED"}
 
@@ -55,6 +57,17 @@ def matrix(axes: Axes) -> Array:
 def is_left_handed(axes: Axes) -> bool:
     """True where one axis, or all three, are mirrored."""
     return bool(np.linalg.det(matrix(axes)) < 0)
+
+
+def opposite(axis: str) -> str:
+    """The other direction of a signed axis."""
+    return axis[1:] if axis.startswith("-") else "-" + axis
+
+
+def turned_about_up(axes: Axes, quarters: int) -> Axes:
+    """Body axes of a tracked body that was turned about its up axis by quarters of a turn."""
+    x, y, z = axes
+    return [(x, y, z), (y, opposite(x), z), (opposite(x), opposite(y), z), (opposite(y), x, z)][quarters]
 
 
 def rotations(quaternion: Array) -> Array:
