@@ -136,6 +136,13 @@ def test_a_channel_that_freezes(which: str, tmp_path: Path) -> None:
     accepted(mapping_of(file, trials={"run": trial}))
 
 
+def test_a_force_that_drops_to_zero(tmp_path: Path) -> None:
+    columns = generated.table(generated.record())
+    columns["fx"][900:] = 0.0
+    message = refusal(mapping_of(generated.write_csv(tmp_path / "run.csv", columns)))
+    assert "columns.fx" in message and "channel fx has been frozen from 7.5 s on" in message
+
+
 def test_a_channel_that_freezes_for_a_while(tmp_path: Path) -> None:
     columns = generated.table(generated.record())
     columns["fz"][400:520] = columns["fz"][400]

@@ -10,7 +10,7 @@ from .. import limits
 from ..errors import TrialsError
 from ..mapping import WRENCH, Mapping, Pose
 from ..source import Series
-from ..units import UNITS
+from ..units import UNITS, quantity_of
 from .finding import Finding
 
 Array = NDArray[np.float64]
@@ -51,8 +51,7 @@ def check_frozen(name: str, mapping: Mapping, series: dict[str, Series]) -> Iter
                 yield Finding("frozen", "wrong", name, field, message, 'the channel that was measured, or ""')
             continue
         span = frozen_run(own)
-        # wheels and carriages stand still at exactly 0
-        if span is None or (field.startswith("columns.") and own.values[np.searchsorted(own.t, span[0])] == 0):
+        if span is None or (_may_be_zero(field) and own.values[np.searchsorted(own.t, span[0])] == 0):
             continue
         # channels that stop together: one may move a sample longer than another
         near = [other for other in reported if np.allclose(other, span, atol=limits.DIFFERENCE)]
@@ -72,6 +71,13 @@ def check_frozen(name: str, mapping: Mapping, series: dict[str, Series]) -> Iter
             message = f"channel {names} {verb} been frozen from {start:.1f} s to {end:.1f} s"
             write = f"leave_out_s = [[{start:.3f}, {end:.3f}]] under [trials.{name}]"
         yield Finding("frozen", "wrong", name, mapping.field_of(channels[0]), message, write)
+
+
+def _may_be_zero(field: str) -> bool:
+    """True for columns of things that stand still at exactly 0, such as wheels, carriages and simulators."""
+    kind, _, rest = field.partition(".")
+    column = rest.split(".")[0]
+    return kind == "columns" and (column.startswith("sim_") or quantity_of(column) not in ("force", "moment"))
 
 
 def _is_rest(pose: Pose, series: dict[str, Series], start: float, end: float, channels: list[str]) -> bool:
