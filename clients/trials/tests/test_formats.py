@@ -111,3 +111,53 @@ def test_both_readers_of_mcap_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     slow = source.read(names, lambda share: None)
     for name in names:
         assert np.array_equal(fast[name].t, slow[name].t) and np.array_equal(fast[name].values, slow[name].values)
+
+
+HEADERS = {
+    "labels, a column with the time of day, and markers behind": (
+        """Format Version,1.25,Take Name,x,Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global
+
+,Type,,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Marker
+,Name,,"Hog, front","Hog, front","Hog, front","Hog, front","Hog, front","Hog, front","Hog, front","Hog, front",m
+,ID,,A,A,A,A,A,A,A,A,B
+,Parent,,,,,,,,,,
+,,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error,Position
+Frame,Time (Seconds),TimeCode,X,Y,Z,W,X,Y,Z,,X
+0,0.000000,15:26:46:12.02,0,0,0,1,10,20,30,0.1,5
+1,0.008333,15:26:46:12.03,0,0,0,1,11,20,30,0.1,
+""",
+        "Hog, front",
+        "mm",
+        [10.0, 11.0],
+    ),
+    "no labels": (
+        """Format Version,1.2,Take Name,x,Rotation Type,Quaternion,Length Units,Meters
+,,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body
+,,Hog,Hog,Hog,Hog,Hog,Hog,Hog
+,,1,1,1,1,1,1,1
+,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position
+Frame,Time,X,Y,Z,W,X,Y,Z
+0,0.0,0,0,0,1,1.5,2,3
+1,0.1,0,0,0,1,1.6,2,3
+""",
+        "Hog",
+        "m",
+        [1.5, 1.6],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", HEADERS)
+def test_the_headers_of_motive_s_versions(kind: str, tmp_path: Path) -> None:
+    from wade_trials.readers import open_source
+
+    text, body, unit, values = HEADERS[kind]
+    file = tmp_path / "take.csv"
+    file.write_text(text)
+    source = open_source(file)
+    assert {channel.name for channel in source.channels()} == {
+        f"{body}.{part}" for part in ("position.x", "position.y", "position.z", *(f"rotation.{c}" for c in "xyzw"))
+    }
+    assert source.conventions.stated["pose.position_unit"][0] == unit
+    found = source.read([f"{body}.position.x"], lambda share: None)[f"{body}.position.x"]
+    assert found.values.tolist() == values and found.t[0] == 0.0

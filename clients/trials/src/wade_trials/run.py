@@ -9,7 +9,7 @@ from typing import Any
 
 from .checks import CHECKS, Finding, check_clock, check_columns, check_frozen, check_imu, check_pose
 from .errors import TrialsError
-from .mapping import MAPPING_FILE, WRENCH, Mapping, Trial
+from .mapping import MAPPING_FILE, Mapping, Trial
 from .motion import Rig, add_columns, base_grid, from_pose, increasing, track_of, window
 from .readers import open_source
 from .source import Progress, Series, unknown_channel
@@ -163,8 +163,7 @@ def manifest_text(mapping: Mapping) -> str:
     if widths:
         table["channel_widths"] = widths
     measured = dict(mapping.manifest.get("measured", {}))
-    has_wrench = mapping.wrench is not None or any(name in WRENCH for name in mapping.columns)
-    if has_wrench and "method" not in measured:
+    if mapping.wrench is not None and "method" not in measured:
         measured["method"] = "load_cell"
     if measured:
         table["measured"] = measured

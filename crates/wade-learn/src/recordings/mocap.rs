@@ -219,11 +219,11 @@ pub fn trials_from_recordings(
         );
         let path = recordings.directory.join(format!("{name}.csv"));
         check_clock(recording, config.rate_hz).map_err(at(&path))?;
+        let kinematics = process(recording, &rig, config)
+            .map_err(|source| at(&path)(RecordingFault::Filter { rate_hz: config.rate_hz, source }))?;
         if let Some(measured) = file.recording[name].depth_m {
             check_depth(recording, &rig, measured).map_err(at(&path))?;
         }
-        let kinematics = process(recording, &rig, config)
-            .map_err(|source| at(&path)(RecordingFault::Filter { rate_hz: config.rate_hz, source }))?;
         write(&format!("{name}.csv"), &kinematics.to_csv())?;
     }
     write(MANIFEST_FILE, &manifest.to_toml())
