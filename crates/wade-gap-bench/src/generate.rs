@@ -242,7 +242,7 @@ impl Scene<'_> {
             trials.push(self.trial(recorded, predicted, Readings { kept, wrench, drive }));
         }
         truth.closure = closure(&trials, &truth, &self.setting.simulator);
-        Generated { trials: Trials { manifest, trials }, truth }
+        Generated { trials: Trials { manifest, trials, accelerations_were_rates: false }, truth }
     }
 
     fn reading(&self, wrench: Wrench6, scale: f64) -> Wrench6 {

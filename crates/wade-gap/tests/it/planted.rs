@@ -177,7 +177,7 @@ pub fn trials(motions: &[Vec<State>], added: &[Vec<[f64; 6]>], noise: &Noise, se
         }),
         ..Manifest::default()
     };
-    Trials { manifest, trials }
+    Trials { manifest, trials, accelerations_were_rates: false }
 }
 
 fn trial(name: &str, motion: &[State], added: &[[f64; 6]], noise: &Noise, random: &mut Random) -> Trial {

@@ -15,6 +15,7 @@ mod trial;
 mod units;
 mod write;
 
+use acceleration::settle_convention;
 pub use acceleration::{acceleration, derivative};
 pub use fault::Fault;
 use std::collections::BTreeSet;
@@ -63,6 +64,11 @@ pub enum Remark {
         /// The sample.
         glitch: Glitch,
     },
+    /// Accelerations that are rates of the components of the velocity.
+    #[error(
+        "ax, ay, az are the rates of vx, vy, vz: omega x v is added to them, for the acceleration in an inertial frame"
+    )]
+    Rates,
     /// Steps that look like another unit of time.
     #[error("{trial}: a step of {step} is long for seconds; is t in another unit?")]
     Clock {
@@ -80,6 +86,8 @@ pub struct Trials {
     pub manifest: Manifest,
     /// By file name.
     pub trials: Vec<Trial>,
+    /// True where the recorded accelerations were rates of the velocity's components, and `omega x v` was added.
+    pub accelerations_were_rates: bool,
 }
 
 impl Trials {
@@ -100,19 +108,21 @@ impl Trials {
             return Err(At::path(directory)(Fault::SameName { name }));
         }
         manifest.check(&files).map_err(At::path(&path))?;
-        let trials: Vec<Trial> =
+        let mut trials: Vec<Trial> =
             files.iter().map(|file| Trial::read(file, &manifest)).collect::<Result<_, _>>()?;
         let nowhere = |name: &&String| !trials.iter().any(|trial| trial.known_loads.contains_key(*name));
         if let Some(name) = manifest.measured.known_loads.iter().find(nowhere) {
             let key = "measured.known_loads";
             return Err(At::path(&path)(Fault::UnknownColumn { key, name: name.clone() }));
         }
-        Ok(Self { manifest, trials })
+        let accelerations_were_rates = settle_convention(&mut trials);
+        Ok(Self { manifest, trials, accelerations_were_rates })
     }
 
     /// What one should know about the data.
     pub fn remarks(&self) -> Vec<Remark> {
-        self.trials.iter().flat_map(Trial::remarks).collect()
+        let rates = self.accelerations_were_rates.then_some(Remark::Rates);
+        self.trials.iter().flat_map(Trial::remarks).chain(rates).collect()
     }
 }
 

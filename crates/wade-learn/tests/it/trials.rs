@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tempfile::TempDir;
 use wade_core::condition::GroundContact;
-use wade_learn::trials::{Fault, Method, Trial, TrialError, Trials};
+use wade_learn::trials::{Fault, Method, Remark, Trial, TrialError, Trials};
 
 const MANIFEST: &str = "vehicle = \"warthog\"\n";
 
@@ -153,6 +153,33 @@ fn measured_accelerations_are_kept() {
     let trial = trial_with_accelerometer(omega, 1.0, 0.0).expect("sound");
     assert!(trial.acceleration_is_measured);
     assert!((trial.acceleration[10].x - omega * (omega * 0.1).cos()).abs() < 1e-12);
+}
+
+#[test]
+fn accelerations_that_are_rates_of_the_components_get_what_the_turning_adds() {
+    // a slalom at 1 m/s: dv/dt along the axes is that of vx alone, and omega x v stands across
+    let turning = |t: f64| 0.8 * (2.0 * t).sin();
+    let slalom = |across: f64, noise: f64| {
+        let ay = move |t: f64| across * turning(t) + noise * (t * 400.0).sin();
+        let more: [(&str, &dyn Fn(f64) -> f64); 5] =
+            [("vx", &|_| 1.0), ("wz", &turning), ("ax", &|_| 0.0), ("ay", &ay), ("az", &|_| 0.0)];
+        read(MANIFEST, &[("run.csv", &table(&more, 200))]).expect("sound")
+    };
+    let says_so = |trials: &Trials| trials.remarks().iter().any(|remark| matches!(remark, Remark::Rates));
+    let across = |trials: &Trials| {
+        let trial = &trials.trials[0];
+        trial.t.iter().zip(&trial.acceleration).map(|(t, a)| (a.y - turning(*t)).abs()).fold(0.0, f64::max)
+    };
+    for (given, noise, is_rate) in
+        [(0.0, 0.0, true), (0.0, 0.05, true), (1.0, 0.0, false), (1.0, 0.05, false)]
+    {
+        let trials = slalom(given, noise);
+        assert_eq!(says_so(&trials), is_rate, "{given} {noise}");
+        assert!(across(&trials) <= noise + 1e-9, "{given} {noise}: {}", across(&trials));
+    }
+    // so much noise hides which it is: it stays as it is
+    let unclear = slalom(0.0, 2.0);
+    assert!(!says_so(&unclear) && across(&unclear) > 0.5);
 }
 
 /// The vehicle sways by sin(omega t); its accelerometer has a scale and an offset along z.
