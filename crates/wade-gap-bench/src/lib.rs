@@ -11,7 +11,8 @@
 //! Reading order: `profile` (a quantity over time), `track` (the exact motion of a trial), `schedule` (which trials),
 //! `hull` and `simulator` (the body and the prediction), `hidden` (effects), `noise` (what instruments make of it),
 //! `case` (what is hidden where), `generate` (trials of a case), `folder` (their files), `answer` (what a tool says),
-//! `score` and `baselines`; `real` turns published measurements into trials.
+//! `score` and `baselines`; `real` turns published measurements into trials; `motion` is a benchmark of its own, of a
+//! wrench that is inferred from the motion of a driven vehicle.
 
 pub mod answer;
 pub mod baselines;
@@ -21,6 +22,7 @@ pub mod generate;
 pub mod hidden;
 mod hull;
 mod invariance;
+pub mod motion;
 mod noise;
 mod profile;
 pub mod real;

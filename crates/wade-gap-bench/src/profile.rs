@@ -41,6 +41,14 @@ impl Profile {
         self
     }
 
+    /// Times a factor.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.constant *= factor;
+        self.steps.iter_mut().for_each(|step| step.by *= factor);
+        self.waves.iter_mut().for_each(|wave| wave.amplitude *= factor);
+        self
+    }
+
     /// Value, first and second derivative.
     pub fn at(&self, t: f64) -> [f64; 3] {
         let mut sum = [self.constant, 0.0, 0.0];

@@ -33,7 +33,7 @@ pub struct Compared {
 }
 
 impl Compared {
-    fn is_covered(&self) -> Option<bool> {
+    pub(super) fn is_covered(&self) -> Option<bool> {
         self.interval.map(|[low, high]| (low..=high).contains(&self.planted))
     }
 }
@@ -152,7 +152,11 @@ impl Judged {
 }
 
 /// The planted parameters that the tool states under a known name, in the same unit where it states one.
-fn compare(effect: &str, planted: &[Parameter], named: &super::answer::NamedEffect) -> Vec<Compared> {
+pub(super) fn compare(
+    effect: &str,
+    planted: &[Parameter],
+    named: &super::answer::NamedEffect,
+) -> Vec<Compared> {
     let found = |parameter: &Parameter| {
         let estimates = parameter.names.iter().filter_map(|name| named.parameters.get_key_value(*name));
         let same_unit = |unit: &str| {
@@ -202,7 +206,7 @@ fn overlap(gate: &Region, generated: &Generated, answer: &Answer) -> Option<f64>
 /// What a measure should reach.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-enum Reach {
+pub(super) enum Reach {
     AtLeast(f64),
     AtMost(f64),
     Within([f64; 2]),
@@ -333,16 +337,16 @@ fn common(cases: &[&Judged]) -> usize {
     cases.iter().map(|case| case.named.intersection(&case.hidden).count()).sum()
 }
 
-fn relative_error(compared: &Compared) -> f64 {
+pub(super) fn relative_error(compared: &Compared) -> f64 {
     (compared.estimated / compared.planted - 1.0).abs()
 }
 
-fn median(values: &[f64]) -> Option<f64> {
+pub(super) fn median(values: &[f64]) -> Option<f64> {
     signal::median(&mut values.to_vec())
 }
 
 /// A share with Wilson's interval.
-fn share(measure: &str, reach: Reach, holds: impl Iterator<Item = bool>) -> Row {
+pub(super) fn share(measure: &str, reach: Reach, holds: impl Iterator<Item = bool>) -> Row {
     let (yes, count) = holds.fold((0, 0), |(yes, count), holds| (yes + usize::from(holds), count + 1));
     let value = (count > 0).then(|| yes as f64 / count as f64);
     row(measure, reach, value, (count > 0).then(|| wilson(yes, count)), count)
@@ -358,7 +362,12 @@ pub fn wilson(yes: usize, count: usize) -> [f64; 2] {
 }
 
 /// A statistic with a percentile bootstrap over its values.
-fn bootstrap<T: Clone>(measure: &str, reach: Reach, values: &[T], of: impl Fn(&[T]) -> Option<f64>) -> Row {
+pub(super) fn bootstrap<T: Clone>(
+    measure: &str,
+    reach: Reach,
+    values: &[T],
+    of: impl Fn(&[T]) -> Option<f64>,
+) -> Row {
     if values.is_empty() {
         return row(measure, reach, None, None, 0);
     }

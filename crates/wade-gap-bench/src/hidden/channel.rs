@@ -55,13 +55,10 @@ fn around(setting: &Setting, width: f64, state: &State) -> Squeezed {
 }
 
 /// The drag along x at the velocity past the body instead of the speed.
-pub(super) fn blockage(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<Wrench6> {
-    let force = |state: &State| {
-        let more = around(setting, track.channel_width, state).faster.powi(2) - 1.0;
-        let drag = setting.simulator.drag_share(state);
-        Wrench6::new(drag[0], 0.0, 0.0, 0.0, drag[4], 0.0) * (hidden.size * more)
-    };
-    track.states.iter().map(force).collect()
+pub(super) fn blockage(hidden: &Hidden, setting: &Setting, width: f64, state: &State) -> Wrench6 {
+    let more = around(setting, width, state).faster.powi(2) - 1.0;
+    let drag = setting.simulator.drag_share(state);
+    Wrench6::new(drag[0], 0.0, 0.0, 0.0, drag[4], 0.0) * (hidden.size * more)
 }
 
 /// The buoyancy that the body loses where the surface drops, more so behind.

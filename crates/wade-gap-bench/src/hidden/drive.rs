@@ -5,7 +5,7 @@
 //! `a`.
 
 use super::{Effect, Hidden, Setting};
-use crate::{Track, Wrench6};
+use crate::{State, Track, Wrench6};
 use wade_core::frame::{GRAVITY, up_from_roll_pitch};
 
 /// Speed over which rolling resistance changes sign [m/s].
@@ -17,10 +17,7 @@ pub(super) fn change(hidden: &Hidden, setting: &Setting, track: &Track, wrench: 
     let change = track.states.iter().zip(wrench).map(|(state, water)| {
         let a = state.acceleration;
         match hidden.effect {
-            Effect::RollingResistance => {
-                let load = (mass * GRAVITY - water[2]).max(0.0);
-                Wrench6::x() * (-hidden.size * load * (state.velocity.x / STICK).tanh())
-            }
+            Effect::RollingResistance => rolling_resistance(hidden.size, mass * GRAVITY - water[2], state),
             // D' = D / (1 + e)
             Effect::DriveGain => {
                 let drive = mass * a.x - water[0];
@@ -35,13 +32,17 @@ pub(super) fn change(hidden: &Hidden, setting: &Setting, track: &Track, wrench: 
     change.collect()
 }
 
+/// A share of the load on the wheels [N] against the way in which they roll.
+pub(crate) fn rolling_resistance(coefficient: f64, load: f64, state: &State) -> Wrench6 {
+    Wrench6::x() * (-coefficient * load.max(0.0) * (state.velocity.x / STICK).tanh())
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::super::tests_support::*;
     use super::*;
-    use crate::State;
     use wade_core::frame::Vec3;
 
     #[test]

@@ -6,9 +6,9 @@ use crate::{Track, Wrench6};
 use wade_core::frame::Vec3;
 
 /// Draft at which the kernel is as stated; it is proportional to the draft [m].
-pub(super) const DRAFT: f64 = 0.2;
+pub(crate) const DRAFT: f64 = 0.2;
 /// Sway and heave over surge.
-pub(super) const RATIO: [f64; 3] = [1.0, 1.5, 1.2];
+pub(crate) const RATIO: [f64; 3] = [1.0, 1.5, 1.2];
 
 /// Retardation function `exp(-a t) (cos b t - a / b sin b t)`, whose integral is 0: steady motion radiates nothing.
 pub(super) fn kernel(t: f64, a: f64, b: f64) -> f64 {

@@ -16,9 +16,12 @@ mod wheels;
 
 use serde::Serialize;
 
+pub(super) use drive::rolling_resistance;
+pub(super) use memory::{DRAFT as MEMORY_DRAFT, RATIO as MEMORY_RATIO};
 pub use truth::{Parameter, parameters};
 
-use super::{Simulator, Track, Wrench6};
+use super::{Hull, Simulator, State, Track, Wrench6};
+use wade_core::frame::Vec3;
 use wade_learn::random::Random;
 
 /// Something that can be hidden.
@@ -219,16 +222,15 @@ impl Hidden {
         use Effect::*;
         match self.effect {
             AddedMass => strips::added_mass(self, setting, track),
-            LinearDamping => strips::linear_damping(self, setting, track),
-            DragCoefficientError => strips::drag(self, setting, track),
+            LinearDamping | DragCoefficientError | Current | ChannelBlockage => {
+                track.states.iter().map(|state| self.load(setting, track.channel_width, state)).collect()
+            }
             Rotation => strips::rotation(self, setting, track),
-            Current => water::current(self, setting, track),
             WaterLevelOffset => water::level(self, setting, track),
             DensityError => water::density(self, setting, track),
             HullFlooding => water::flooding(self, setting, track),
             WaterEntrySlamming => water::slamming(self, setting, track),
             WaveMemory => memory::convolution(self, setting, track),
-            ChannelBlockage => channel::blockage(self, setting, track),
             Squat => channel::squat(self, setting, track),
             WheelPaddleThrust => wheels::paddles(self, setting, track),
             BedMotion => wheels::moving_bed(self, setting, track),
@@ -241,6 +243,22 @@ impl Hidden {
             }
         }
     }
+
+    /// The load of an effect that depends on the velocity and the depth of the instant alone; 0 of any other.
+    pub(super) fn load(&self, setting: &Setting, channel_width: f64, state: &State) -> Wrench6 {
+        match self.effect {
+            Effect::LinearDamping => strips::linear_damping(self, setting, state),
+            Effect::DragCoefficientError => strips::drag(self, setting, state),
+            Effect::Current => water::current(self, setting, state),
+            Effect::ChannelBlockage => channel::blockage(self, setting, channel_width, state),
+            _ => Wrench6::zeros(),
+        }
+    }
+}
+
+/// Linear and angular momentum of the water that moves with the body by strip theory, about its center of mass.
+pub(super) fn momenta(hull: &Hull, state: &State) -> (Vec3, Vec3) {
+    strips::momenta(&hull.strips(state, 0.0), state)
 }
 
 /// Share of the largest standardized magnitude from which on an effect is said to act.
@@ -275,7 +293,7 @@ pub fn strength(changes: &[Vec<Wrench6>], floor: &Wrench6, measured: &[bool; 6])
 #[cfg(test)]
 mod tests_support {
     use super::*;
-    use crate::{Hull, Prediction, State};
+    use crate::Prediction;
 
     pub fn hidden(effect: Effect, size: f64) -> Hidden {
         Hidden { effect, size, shape: [0.0; 3] }

@@ -39,7 +39,7 @@ pub(super) fn added_mass(hidden: &Hidden, setting: &Setting, track: &Track) -> V
 }
 
 /// Linear and angular momentum of the water that moves with the body, about its center of mass.
-fn momenta(strips: &[Strip], state: &State) -> (Vec3, Vec3) {
+pub(super) fn momenta(strips: &[Strip], state: &State) -> (Vec3, Vec3) {
     let (v, omega) = (state.velocity, state.angular_velocity);
     let mut sum = (Vec3::zeros(), Vec3::zeros());
     for strip in strips {
@@ -56,29 +56,23 @@ fn momenta(strips: &[Strip], state: &State) -> (Vec3, Vec3) {
 }
 
 /// `-b T (v + r x)` on each strip, and as much along x over the width.
-pub(super) fn linear_damping(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<Wrench6> {
+pub(super) fn linear_damping(hidden: &Hidden, setting: &Setting, state: &State) -> Wrench6 {
     let hull = setting.simulator.hull;
-    let force = |state: &State| {
-        let (v, r) = (state.velocity, state.angular_velocity.z);
-        let mut sum = Wrench6::zeros();
-        for strip in hull.strips(state, 0.0) {
-            let per_length = hidden.size * strip.draft * strip.dx;
-            let side = -per_length * (v.y + r * strip.x);
-            let along = -per_length * hull.width / hull.length * v.x;
-            sum += wrench(Vec3::new(along, side, 0.0), Vec3::new(strip.x, 0.0, strip.z));
-        }
-        sum
-    };
-    track.states.iter().map(force).collect()
+    let (v, r) = (state.velocity, state.angular_velocity.z);
+    let mut sum = Wrench6::zeros();
+    for strip in hull.strips(state, 0.0) {
+        let per_length = hidden.size * strip.draft * strip.dx;
+        let side = -per_length * (v.y + r * strip.x);
+        let along = -per_length * hull.width / hull.length * v.x;
+        sum += wrench(Vec3::new(along, side, 0.0), Vec3::new(strip.x, 0.0, strip.z));
+    }
+    sum
 }
 
 /// A share of what the prediction makes of the motion, of its forces in the plane.
-pub(super) fn drag(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<Wrench6> {
-    let force = |state: &State| {
-        let share = setting.simulator.drag_share(state) * hidden.size;
-        Wrench6::new(share[0], share[1], 0.0, share[3], share[4], share[5])
-    };
-    track.states.iter().map(force).collect()
+pub(super) fn drag(hidden: &Hidden, setting: &Setting, state: &State) -> Wrench6 {
+    let share = setting.simulator.drag_share(state) * hidden.size;
+    Wrench6::new(share[0], share[1], 0.0, share[3], share[4], share[5])
 }
 
 /// Cross-flow drag with the local velocity of each strip, less that with the velocity of the center.

@@ -17,24 +17,21 @@ const DEADRISE: f64 = 0.35;
 
 /// A current that is fixed in the world and grows from the bed up with the seventh root of the height, of a mean of
 /// `size` towards `shape[0]` [rad from world x]: the mean of what is predicted in five layers, less that in still water.
-pub(super) fn current(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<Wrench6> {
+pub(super) fn current(hidden: &Hidden, setting: &Setting, state: &State) -> Wrench6 {
     let simulator = &setting.simulator;
-    let force = |state: &State| {
-        if state.depth <= 0.0 {
-            return Wrench6::zeros();
-        }
-        // world from body is a turn by yaw about z but for small roll and pitch
-        let angle = hidden.shape[0] - state.attitude[2];
-        let towards = Vec3::new(angle.cos(), angle.sin(), 0.0);
-        let moved: Wrench6 = (0..LAYERS)
-            .map(|layer| {
-                let water = towards * (hidden.size * layer_speed(layer));
-                simulator.predict_moving(state, &(state.velocity - water))
-            })
-            .sum();
-        moved / LAYERS as f64 - simulator.predict(state)
-    };
-    track.states.iter().map(force).collect()
+    if state.depth <= 0.0 {
+        return Wrench6::zeros();
+    }
+    // world from body is a turn by yaw about z but for small roll and pitch
+    let angle = hidden.shape[0] - state.attitude[2];
+    let towards = Vec3::new(angle.cos(), angle.sin(), 0.0);
+    let moved: Wrench6 = (0..LAYERS)
+        .map(|layer| {
+            let water = towards * (hidden.size * layer_speed(layer));
+            simulator.predict_moving(state, &(state.velocity - water))
+        })
+        .sum();
+    moved / LAYERS as f64 - simulator.predict(state)
 }
 
 /// Mean of `(1 + n) s^n` over a layer, so that the mean over the depth is 1.
