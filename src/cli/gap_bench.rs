@@ -1,7 +1,7 @@
 //! `wade gap bench`.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -14,6 +14,7 @@ use wade_gap_bench::answer::Answer;
 use wade_gap_bench::baselines::Method;
 use wade_gap_bench::case::{Case, Family, cases};
 use wade_gap_bench::generate::generate;
+use wade_gap_bench::motion;
 use wade_gap_bench::real::{falling_balls, kvlcc2, rm2_rotor};
 use wade_gap_bench::score::{Row, rows, table};
 use wade_gap_bench::{
@@ -31,6 +32,7 @@ use super::emit;
   wade gap bench --cases 69 --seed 1 --out bench/
   wade gap bench --cases 6 --families null,single --size slice --out bench/
   wade gap bench --cases 69 --only squat --no-baselines --keep --out bench/
+  wade gap bench --motion --copies 5 --seed 1 --out bench/
   wade gap bench --tool 'mytool --trials {trials} --out {out}' --out bench/
   wade gap bench import kvlcc2 --from kvlcc2_roll_decay/ --out trials/
 
@@ -84,6 +86,9 @@ impl Import {
     }
 }
 
+/// What every result says of its data.
+const GENERATED: &str = "all trials are generated; nothing of them was measured";
+
 /// A number of cases that a machine can hold.
 fn count() -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(..=10_000)
@@ -103,6 +108,12 @@ struct Bench {
     /// Only the cases whose name holds this
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
+    /// Infer the wrench from the motion of a driven vehicle: other cases, of another table
+    #[arg(long, conflicts_with_all = ["cases", "families", "size", "invariance"])]
+    motion: bool,
+    /// How often each effect stands among those of --motion; 5 make 210 cases
+    #[arg(long, value_name = "N", default_value_t = 5, requires = "motion", value_parser = count())]
+    copies: usize,
     /// Length and number of the trials of a case
     #[arg(long, value_enum, default_value_t = Size::Full)]
     size: Size,
@@ -174,6 +185,9 @@ impl GapBench {
 impl Bench {
     fn run(self) -> Result<ExitCode> {
         let Some(out) = &self.out else { super::usage_error("--out DIR is needed") };
+        if self.motion {
+            return self.run_motion(out);
+        }
         let hull = Hull::generated_box();
         let simulator = Simulator { hull: &hull, prediction: Prediction::Analytic, vehicle: "generated-box" };
         let warthog = shipped::warthog()?.vehicle()?;
@@ -197,6 +211,54 @@ impl Bench {
         let json = self.json(&outcomes)?;
         std::fs::write(out.join("results.json"), &json).with_context(|| out.display().to_string())?;
         emit(&if self.json { json } else { text(&outcomes) })?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// The benchmark of a wrench that is inferred from motion; the plain regressions need a measured one.
+    fn run_motion(&self, out: &Path) -> Result<ExitCode> {
+        let mut cases = motion::cases(self.seed, self.copies);
+        if let Some(text) = &self.only {
+            cases.retain(|case| case.name.contains(text.as_str()));
+        }
+        if self.keep {
+            for case in &cases {
+                let (place, generated) = (out.join("cases").join(&case.name), motion::generate(case));
+                let key = serde_json::to_string_pretty(&generated.key)? + "\n";
+                let keys = out.join("keys");
+                folder::write(&place, &generated.trials)
+                    .and_then(|()| std::fs::create_dir_all(&keys))
+                    .and_then(|()| std::fs::write(keys.join(format!("{}.json", case.name)), key))
+                    .with_context(|| place.display().to_string())?;
+            }
+        }
+        let command = self.tool.as_deref().map(command_tool);
+        let mut tools: Vec<(&str, &Tool)> = vec![("wade gap", &workflow)];
+        tools.extend(command.as_ref().map(|tool| ("tool", tool as &Tool)));
+        let (bar, names) = (bar(), tools.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<_>>());
+        let outcomes = motion::run(&cases, &tools, &mut |progress| show(&bar, progress));
+        bar.finish_and_clear();
+        let outcomes: BTreeMap<String, Vec<motion::Graded>> = names.into_iter().zip(outcomes).collect();
+        let rows: BTreeMap<String, Vec<Row>> =
+            outcomes.iter().map(|(name, graded)| (name.clone(), motion::rows(graded))).collect();
+        let tools: BTreeMap<&String, serde_json::Value> = outcomes
+            .iter()
+            .map(|(name, graded)| {
+                (name, serde_json::json!({"measures": rows[name.as_str()], "cases": graded}))
+            })
+            .collect();
+        let results = serde_json::json!({
+            "generated": GENERATED,
+            "commit": env!("WADE_COMMIT"),
+            "motion": true,
+            "copies": self.copies,
+            "seed": self.seed,
+            "tool": self.tool,
+            "tools": tools,
+        });
+        let json = serde_json::to_string_pretty(&results)? + "\n";
+        std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+        std::fs::write(out.join("results.json"), &json).with_context(|| out.display().to_string())?;
+        emit(&if self.json { json } else { format!("{GENERATED}\n{}", table(&rows)) })?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -226,15 +288,7 @@ impl Bench {
         let borrowed: Vec<(&str, &Tool)> =
             tools.iter().map(|(name, tool)| (name.as_str(), tool.as_ref())).collect();
         let bar = bar();
-        let mut show = |progress: Progress| {
-            bar.set_length(progress.done[1] as u64);
-            bar.set_position(progress.done[0] as u64);
-            bar.set_message(progress.case.to_owned());
-            // in a log, a line a case
-            if bar.is_hidden() && !progress.case.is_empty() {
-                eprintln!("{}/{} {}", progress.done[0], progress.done[1], progress.case);
-            }
-        };
+        let mut show = |progress: Progress| show(&bar, progress);
         let outcomes =
             run(cases, Setup { schedule, simulator, invariance: self.invariance }, &borrowed, &mut show);
         bar.finish_and_clear();
@@ -249,7 +303,7 @@ impl Bench {
             })
             .collect();
         let results = serde_json::json!({
-            "generated": "all trials are generated; nothing of them was measured",
+            "generated": GENERATED,
             "commit": env!("WADE_COMMIT"),
             "cases_of_each_family": self.cases,
             "seed": self.seed,
@@ -282,6 +336,16 @@ fn text(outcomes: &BTreeMap<String, Outcome>) -> String {
         );
     }
     text
+}
+
+fn show(bar: &ProgressBar, progress: Progress) {
+    bar.set_length(progress.done[1] as u64);
+    bar.set_position(progress.done[0] as u64);
+    bar.set_message(progress.case.to_owned());
+    // in a log, a line a case
+    if bar.is_hidden() && !progress.case.is_empty() {
+        eprintln!("{}/{} {}", progress.done[0], progress.done[1], progress.case);
+    }
 }
 
 fn bar() -> ProgressBar {

@@ -16,7 +16,7 @@ use wade_core::frame::{GRAVITY, Vec3};
 /// Pictures a second [Hz].
 pub(super) const CAMERA_RATE: f64 = 111.0;
 /// Steps of the integration from picture to picture.
-pub(super) const SUBSTEPS: usize = 8;
+pub(super) const SUBSTEPS: usize = 4;
 /// Force against sideways motion of the tires [N s/m]: chosen, so that a turn at 0.5 rad/s slips by a few degrees.
 const SIDE_CREEP: f64 = 2000.0;
 /// Distance of the driven wheels from the middle [m].
@@ -48,6 +48,42 @@ pub(super) struct Vehicle<'a> {
     pub friction: f64,
 }
 
+/// What does not change in a trial.
+struct Fixed<'a> {
+    command: &'a Command,
+    /// Load that the wheels bear: the weight less the buoyancy of the prediction [N].
+    wheel_load: f64,
+    /// Force of the blockage by surge velocity [N].
+    blockage: Option<Table>,
+}
+
+/// A function of the surge velocity, cubic between even velocities (Catmull and Rom).
+///
+/// One-dimensional flow past a body chokes with an infinite slope, on which no step of an integration is small enough.
+struct Table(Vec<f64>);
+
+/// Largest velocity of a table, and its step [m/s].
+const TABLE: [f64; 2] = [4.0, 0.04];
+
+impl Table {
+    fn new(of: impl Fn(f64) -> f64) -> Self {
+        let [most, step] = TABLE;
+        let count = (2.0 * most / step).round() as usize + 1;
+        Self((0..count).map(|i| of(i as f64 * step - most)).collect())
+    }
+
+    fn at(&self, velocity: f64) -> f64 {
+        let [most, step] = TABLE;
+        let place = ((velocity + most) / step).clamp(1.0, self.0.len() as f64 - 2.0 - 1e-9);
+        let (below, s) = (place as usize, place.fract());
+        let [p0, p1, p2, p3] = [0, 1, 2, 3].map(|i| self.0[below + i - 1]);
+        0.5 * (2.0 * p1
+            + (p2 - p0) * s
+            + (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) * (s * s)
+            + (3.0 * p1 - p0 - 3.0 * p2 + p3) * (s * s * s))
+    }
+}
+
 /// What acts in an instant.
 struct Acting {
     drive: [f64; 2],
@@ -64,13 +100,13 @@ impl Vehicle<'_> {
     pub fn drive(&self, command: &Command, substeps: usize) -> Vec<Instant> {
         let step = 1.0 / (CAMERA_RATE * substeps as f64);
         let count = (command.duration * CAMERA_RATE) as usize * substeps + 1;
-        let weight = self.wheel_load(command.depth);
+        let fixed = self.fixed(command);
         let mut motion = self.start(command);
         let mut instants = Vec::with_capacity(count);
         for index in 0..count {
             let t = index as f64 * step;
-            instants.push(self.instant(command, weight, t, &motion));
-            let rate = |t: f64, motion: &Motion| self.rate(command, weight, t, motion);
+            instants.push(self.instant(&fixed, t, &motion));
+            let rate = |t: f64, motion: &Motion| self.rate(&fixed, t, motion);
             let k1 = rate(t, &motion);
             let k2 = rate(t + 0.5 * step, &(motion + k1 * (0.5 * step)));
             let k3 = rate(t + 0.5 * step, &(motion + k2 * (0.5 * step)));
@@ -88,10 +124,20 @@ impl Vehicle<'_> {
         self.planted.iter().find(|planted| planted.cause == Cause::WaveMemory)
     }
 
-    /// Load that the wheels bear: the weight less the buoyancy of the prediction [N].
-    fn wheel_load(&self, depth: f64) -> f64 {
-        let level = State { depth, ..State::default() };
-        self.simulator.hull.mass * GRAVITY - self.simulator.predict(&level)[2]
+    fn fixed<'b>(&self, command: &'b Command) -> Fixed<'b> {
+        let level = State { depth: command.depth, ..State::default() };
+        let setting = self.setting(command);
+        let blockage = self.planted.iter().find(|planted| planted.cause == Cause::ChannelBlockage);
+        let blockage = blockage.and_then(Planted::hidden).map(|hidden| {
+            let at = |velocity: f64| State { velocity: Vec3::x() * velocity, ..level };
+            Table::new(|velocity| hidden.load(&setting, CHANNEL, &at(velocity))[0])
+        });
+        let wheel_load = self.simulator.hull.mass * GRAVITY - self.simulator.predict(&level)[2];
+        Fixed { command, wheel_load, blockage }
+    }
+
+    fn setting(&self, command: &Command) -> Setting<'_> {
+        Setting { simulator: self.simulator, session: command.duration }
     }
 
     fn start(&self, command: &Command) -> Motion {
@@ -122,15 +168,19 @@ impl Vehicle<'_> {
         }
     }
 
-    fn acting(&self, command: &Command, wheel_load: f64, state: &State, motion: &Motion) -> Acting {
-        let hull = self.simulator.hull;
+    fn acting(&self, fixed: &Fixed, state: &State, motion: &Motion) -> Acting {
+        let (hull, command) = (self.simulator.hull, fixed.command);
         let commanded = command.drive_at(state.t);
         let is_late = self.size_of(Cause::DriveLag).is_some();
         let drive = if is_late { [motion[LAG], motion[LAG + 1]] } else { commanded };
-        let setting = Setting { simulator: self.simulator, session: command.duration };
+        let setting = self.setting(command);
         let mut water = planar(&self.simulator.drag_share(state));
-        for hidden in self.planted.iter().filter_map(Planted::hidden) {
-            water += planar(&hidden.load(&setting, CHANNEL, state));
+        match &fixed.blockage {
+            Some(blockage) => water.x += blockage.at(state.velocity.x),
+            None => {
+                let hidden = self.planted.iter().filter_map(Planted::hidden);
+                hidden.for_each(|hidden| water += planar(&hidden.load(&setting, CHANNEL, state)));
+            }
         }
         if let Some(planted) = self.memory() {
             water += remembered(planted, command.depth, motion);
@@ -139,7 +189,7 @@ impl Vehicle<'_> {
         water += bias;
         let mut load = water + Vector3::new(drive[0], -SIDE_CREEP * state.velocity.y, drive[1]);
         if let Some(coefficient) = self.size_of(Cause::RollingResistance) {
-            load.x += rolling_resistance(coefficient, wheel_load, state)[0];
+            load.x += rolling_resistance(coefficient, fixed.wheel_load, state)[0];
         }
         load.x += rolling_resistance(1.0, self.friction, state)[0];
         let (m, v, r) = (hull.mass, state.velocity, state.angular_velocity.z);
@@ -178,9 +228,10 @@ impl Vehicle<'_> {
         (Matrix3::from_columns(&[unit(0), unit(1), unit(2)]), bias)
     }
 
-    fn rate(&self, command: &Command, wheel_load: f64, t: f64, motion: &Motion) -> Motion {
+    fn rate(&self, fixed: &Fixed, t: f64, motion: &Motion) -> Motion {
+        let command = fixed.command;
         let state = self.state(command, t, motion);
-        let acting = self.acting(command, wheel_load, &state, motion);
+        let acting = self.acting(fixed, &state, motion);
         let (sine, cosine) = motion[2].sin_cos();
         let v = state.velocity;
         let mut rate = Motion::zeros();
@@ -203,9 +254,9 @@ impl Vehicle<'_> {
         rate
     }
 
-    fn instant(&self, command: &Command, wheel_load: f64, t: f64, motion: &Motion) -> Instant {
-        let state = self.state(command, t, motion);
-        let acting = self.acting(command, wheel_load, &state, motion);
+    fn instant(&self, fixed: &Fixed, t: f64, motion: &Motion) -> Instant {
+        let state = self.state(fixed.command, t, motion);
+        let acting = self.acting(fixed, &state, motion);
         let (rate, v, r) = (acting.rate, state.velocity, state.angular_velocity.z);
         let water = acting.water - acting.added * rate;
         Instant {
