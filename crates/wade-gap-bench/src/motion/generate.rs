@@ -31,7 +31,7 @@ pub struct Generated {
     pub trials: Trials,
     /// What it may not.
     pub key: Key,
-    /// The exact change of fx [N] and mz [N m], by trial in water and sample.
+    /// The exact change of fx [N] and mz [N m], by trial in water and sample, less that of the dry twin.
     pub change: Vec<Vec<[f64; 2]>>,
 }
 
@@ -51,9 +51,8 @@ pub fn generate(case: &Case) -> Generated {
     let noise = random.fork();
     let runs = drive(case, &commands, &case.planted, simulator, &mut noise.clone());
     let without = drive(case, &commands, &[], simulator, &mut noise.clone());
-    let floor = floor(&without, &simulator);
-    let wet = || runs.iter().filter(|run| run.command.depth > 0.0);
-    let change: Vec<Vec<[f64; 2]>> = wet().map(|run| run.record.change.clone()).collect();
+    let floor = root_mean_square(&less_twin(case, &without, |run| run.gap(case, &simulator)));
+    let change = less_twin(case, &runs, |run| run.record.change.clone());
     let only_fx = |change: &[f64; 2]| Wrench6::x() * change[0];
     let changes: Vec<Vec<Wrench6>> =
         change.iter().map(|change| change.iter().map(only_fx).collect()).collect();
@@ -62,7 +61,8 @@ pub fn generate(case: &Case) -> Generated {
         true => 0.0,
         false => strength(&changes, &(Wrench6::x() * floor[0]), &[true, false, false, false, false, false]),
     };
-    let tracks: Vec<Track> = wet().map(track).collect();
+    let wet = runs.iter().filter(|run| run.command.depth > 0.0);
+    let tracks: Vec<Track> = wet.map(track).collect();
     let parameters = case.planted.iter().map(|planted| parameters_of(planted, simulator, &tracks)).collect();
     let key = Key::new(case, strength, floor, parameters);
     Generated { trials: trials(case, &runs, simulator), key, change }
@@ -102,22 +102,43 @@ fn stated_mass(planted: &[Planted]) -> f64 {
     MASS + error.map_or(0.0, |planted| planted.size)
 }
 
-/// Root mean square of the recorded gap of fx [N] and mz [N m] over the trials in water.
-fn floor(runs: &[Run], simulator: &Simulator) -> [f64; 2] {
-    let mass = [simulator.hull.mass, yaw_inertia(simulator.hull)];
-    let (mut sum, mut count) = ([0.0; 2], 0.0);
-    for run in runs.iter().filter(|run| run.command.depth > 0.0) {
-        for (i, state) in run.record.states.iter().enumerate() {
+impl Run {
+    /// Recorded gap of fx [N] and mz [N m], with the mass as it is.
+    fn gap(&self, case: &Case, simulator: &Simulator) -> Vec<[f64; 2]> {
+        let mass = [simulator.hull.mass, yaw_inertia(simulator.hull)];
+        let gap = |(i, state): (usize, &State)| {
             let predicted = simulator.predict(state);
             let rates = [state.acceleration.x, state.angular_acceleration.z];
-            for (axis, component) in [0, 5].into_iter().enumerate() {
-                let gap = mass[axis] * rates[axis] - run.record.drive[axis][i] - predicted[component];
-                sum[axis] += gap * gap;
-            }
-            count += 1.0;
-        }
+            let drive = self.record.drive.each_ref().map(|drive| drive[i]);
+            let drive = if case.plan.is_without_drive() { [0.0; 2] } else { drive };
+            [0, 1].map(|axis| mass[axis] * rates[axis] - drive[axis] - predicted[[0, 5][axis]])
+        };
+        self.record.states.iter().enumerate().map(gap).collect()
     }
-    sum.map(|sum| (sum / f64::max(count, 1.0)).sqrt())
+}
+
+/// A quantity of each trial in water, less that of its dry twin where it has one.
+fn less_twin(case: &Case, runs: &[Run], of: impl Fn(&Run) -> Vec<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
+    let twin = |wet: &Run| {
+        runs.iter().find(|run| case.plan.has_twins() && run.command.name == wet.command.dry().name)
+    };
+    let less = |wet: &Run| {
+        let mut values = of(wet);
+        if let Some(dry) = twin(wet) {
+            for (value, dry) in values.iter_mut().zip(of(dry)) {
+                *value = [value[0] - dry[0], value[1] - dry[1]];
+            }
+        }
+        values
+    };
+    runs.iter().filter(|run| run.command.depth > 0.0).map(less).collect()
+}
+
+/// Root mean square over all trials and samples.
+fn root_mean_square(values: &[Vec<[f64; 2]>]) -> [f64; 2] {
+    let all = || values.iter().flatten();
+    let square = |axis: usize| all().map(|value| value[axis] * value[axis]).sum::<f64>();
+    [0, 1].map(|axis| (square(axis) / all().count().max(1) as f64).sqrt())
 }
 
 fn track(run: &Run) -> Track {

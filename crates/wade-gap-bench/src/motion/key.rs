@@ -171,10 +171,11 @@ impl Allowed {
             _ => Vec::new(),
         };
         let is_identity = planted.len() > 1;
+        let equal = equal_sets(planted);
         let mut right = vec![rule(Answered::Names(truth.clone()), "what is hidden, and nothing else")];
         let mut abstained = Vec::new();
         let held = Answered::Ambiguous(truth.clone());
-        if is_identity || !twins.is_empty() {
+        if !equal.is_empty() || !twins.is_empty() {
             right.push(rule(held, "these trials cannot separate what is hidden from others"));
         } else {
             abstained.push(rule(held, "what is hidden is held possible, but these trials separate it"));
@@ -184,22 +185,18 @@ impl Allowed {
             abstained.push(rule(Answered::Part(truth), "only a part of what is hidden"));
         }
         abstained.push(rule(Answered::NothingMissing, "the effect is not found"));
-        let no_fit = match planted.iter().all(|planted| planted.cause.effect().is_none()) {
+        let has_no_name = |planted: &Planted| {
+            matches!(planted.cause, Cause::DriveLag | Cause::DriveDelay | Cause::PoseDelay)
+        };
+        let no_fit = match planted.iter().all(has_no_name) {
             true => "a gap is found; a library without this effect can say no more",
             false => "a gap is found, but no name",
         };
         abstained.push(rule(Answered::NoCandidateFits, no_fit));
-        let equal = |names: &[&'static str]| Answered::Names(names.iter().map(|name| vec![*name]).collect());
-        let wrong = if is_identity {
-            let singles =
-                ["density_error", "sensor_gain", "drag_coefficient_error"].map(|name| equal(&[name]));
-            let pairs =
-                [["mass_error", "density_error"], ["drive_gain", "density_error"]].map(|pair| equal(&pair));
-            singles.into_iter().chain(pairs).map(|answer| rule(answer, EQUAL_SET)).collect()
-        } else {
-            let of = |twin: &Twin| rule(Answered::Names(vec![twin.names.to_vec()]), twin.reason);
-            twins.iter().map(of).collect()
-        };
+        let set = |names: &[&'static str]| Answered::Names(names.iter().map(|name| vec![*name]).collect());
+        let of_set = equal.into_iter().map(|names| rule(set(names), EQUAL_SET));
+        let of_twin = |twin: &Twin| rule(Answered::Names(vec![twin.names.to_vec()]), twin.reason);
+        let wrong = twins.iter().map(of_twin).chain(of_set).collect();
         Self { right, abstained, wrong, otherwise: "another effect is named, or what is hidden is ruled out" }
     }
 
@@ -233,6 +230,30 @@ pub(super) fn names(cause: Cause, plan: Plan) -> &'static [&'static str] {
         Cause::DriveGain => &["drive_gain"],
         Cause::DriveOffset => &["drive_offset", "sensor_bias"],
         Cause::DriveLag | Cause::DriveDelay | Cause::PoseDelay => TIMING,
+    }
+}
+
+/// Sets of names whose sum is the same wrench in any motion on a level bed: `m a = D + F` with the drive's force D and the
+/// prediction F, so that a share of one is the same share of the other two.
+fn equal_sets(planted: &[Planted]) -> Vec<&'static [&'static str]> {
+    match planted {
+        [Planted { cause: Cause::DragCoefficientError, .. }] => vec![&["mass_error", "drive_gain"]],
+        [Planted { cause: Cause::DriveGain, .. }] => {
+            vec![&["mass_error", "density_error"], &["mass_error", "drag_coefficient_error"]]
+        }
+        [Planted { cause: Cause::MassError | Cause::DrivetrainInertia, .. }] => {
+            vec![&["drive_gain", "density_error"], &["drive_gain", "drag_coefficient_error"]]
+        }
+        [_, _, ..] => vec![
+            &["density_error"],
+            &["sensor_gain"],
+            &["drag_coefficient_error"],
+            &["mass_error", "density_error"],
+            &["drive_gain", "density_error"],
+            &["mass_error", "drag_coefficient_error"],
+            &["drive_gain", "drag_coefficient_error"],
+        ],
+        _ => Vec::new(),
     }
 }
 

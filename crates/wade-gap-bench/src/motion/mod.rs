@@ -7,7 +7,8 @@
 //!
 //! Words: the *change* of a trial is the wrench inferred from its exact motion less the prediction for the exact state.
 //! The *floor* is the root mean square of the recorded gap of the same trials with nothing hidden in them; the *strength*
-//! is that of the change over the floor (`hidden::strength`). Both are of fx: `trials.toml` states no yaw inertia.
+//! is that of the change over the floor (`hidden::strength`). Both are of fx, since `trials.toml` states no yaw inertia, and
+//! both less the dry twin's where there is one.
 //!
 //! Reading order: `cause` (what is hidden), `command` (what the drive is asked for), `dynamics` (the exact motion),
 //! `capture` (what cameras and the drive record), `case` (what is hidden where), `generate`, `key` (what is true and which
