@@ -122,7 +122,7 @@ impl Instruments<'_> {
     }
 
     fn drive(&self, command: &Command, times: &[f64], random: &mut Random) -> [Vec<f64>; 2] {
-        let channels = [0, 1].map(|axis| {
+        [0, 1].map(|axis| {
             let mut gaussian = Gaussian::new(random.fork());
             let (size, memory) = COLORED;
             let is_colored = self.flaw == Flaw::ColoredDrive;
@@ -139,8 +139,7 @@ impl Instruments<'_> {
                 Flaw::QuantizedDrive => values.map(|v| rounded(v, QUANTUM * DRIVE_NOISE[axis])).collect(),
                 _ => values.collect::<Vec<_>>(),
             }
-        });
-        channels
+        })
     }
 
     /// The exact change at a time, linear between steps of the integration.

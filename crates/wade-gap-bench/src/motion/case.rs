@@ -52,11 +52,11 @@ impl MarkerNoise {
 }
 
 wade_core::named_enum! {
-    /// What else ails the instruments.
+    /// Error of the instruments besides white noise.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
     #[serde(rename_all = "snake_case")]
     pub enum Flaw {
-        /// Nothing: white noise.
+        /// None.
         White => "white",
         /// The drive's noise has a memory, and is larger.
         ColoredDrive => "colored_drive",
@@ -82,13 +82,13 @@ pub struct Case {
     pub planted: Vec<Planted>,
     /// Noise of the cameras.
     pub marker: MarkerNoise,
-    /// What else ails the instruments.
+    /// Error of the instruments besides white noise.
     pub flaw: Flaw,
     /// The trials.
     pub plan: Plan,
 }
 
-/// The effects, but for rolling resistance, which takes turns with the blockage.
+/// The effects; rolling resistance stands in the place of the blockage in every other round.
 const EFFECTS: [Cause; 8] = [
     Cause::AddedMass,
     Cause::DrivetrainInertia,
@@ -108,8 +108,8 @@ const WITH_TWINS: [Option<Cause>; 4] =
     [None, Some(Cause::AddedMass), Some(Cause::RollingResistance), Some(Cause::MassError)];
 const WITH_WHEELS: [Option<Cause>; 4] =
     [None, Some(Cause::AddedMass), Some(Cause::DragCoefficientError), Some(Cause::LinearDamping)];
-/// Errors of mass and of recorded drive force of the identities, shares: alike, so that all that is inferred is as much too
-/// large, and apart.
+/// Errors of mass and of recorded drive force of the identities [1]: equal, so that the inferred force is too large by the
+/// same share, and unequal.
 const IDENTITIES: [[f64; 2]; 2] = [[0.1, 0.1], [0.12, -0.06]];
 
 /// Each effect at each noise, 8 nulls and 8 faults, `copies` times, and ten others: 210 cases at 5 copies.

@@ -1,4 +1,4 @@
-//! What the drive is asked for: accelerate, cruise, brake and coast; straight, in turns and in slaloms.
+//! The commands of the drive: accelerate, cruise, brake and coast; straight, in turns and in slaloms.
 
 use serde::Serialize;
 
@@ -30,7 +30,7 @@ enum Maneuver {
     Turn,
     /// Turns one way and the other.
     Slalom,
-    /// Set off by hand and left to itself.
+    /// Released at a speed, without drive.
     Released,
 }
 
@@ -39,9 +39,9 @@ wade_core::named_enum! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "snake_case")]
     pub enum Plan {
-        /// All ways of driving at all depths, headed anywhere.
+        /// All ways of driving at all depths, with random headings.
         Rich => "rich",
-        /// Straight ahead at one depth, headed one way.
+        /// Straight ahead at one depth, with one heading.
         OneDepth => "one_depth",
         /// Straight, backward and coasting, each with a dry twin.
         DryTwins => "dry_twins",

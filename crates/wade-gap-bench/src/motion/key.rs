@@ -24,7 +24,7 @@ pub struct Key {
     pub plan: Plan,
     /// Standard deviation of a coordinate in a picture [mm], and of an angle [mrad].
     pub marker_noise: f64,
-    /// What else ails the instruments.
+    /// Error of the instruments besides white noise.
     pub flaw: Flaw,
     /// What is hidden.
     pub hidden: Vec<Planted>,

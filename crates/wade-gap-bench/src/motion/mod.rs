@@ -10,7 +10,7 @@
 //! is that of the change over the floor (`hidden::strength`). Both are of fx, since `trials.toml` states no yaw inertia, and
 //! both less the dry twin's where there is one.
 //!
-//! Reading order: `cause` (what is hidden), `command` (what the drive is asked for), `dynamics` (the exact motion),
+//! Reading order: `cause` (what is hidden), `command` (what the drive does), `dynamics` (the exact motion),
 //! `capture` (what cameras and the drive record), `case` (what is hidden where), `generate`, `key` (what is true and which
 //! answers are allowed), `score`.
 
