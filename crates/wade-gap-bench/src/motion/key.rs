@@ -174,7 +174,9 @@ impl Allowed {
         let equal = equal_sets(planted);
         let mut right = vec![rule(Answered::Names(truth.clone()), "what is hidden, and nothing else")];
         let mut abstained = Vec::new();
-        let held = Answered::Ambiguous(truth.clone());
+        // among what is held possible any name of the same wrench will do
+        let of_wrench = planted.iter().map(|planted| names(planted.cause, Plan::Rich).to_vec());
+        let held = Answered::Ambiguous(of_wrench.collect());
         if !equal.is_empty() || !twins.is_empty() {
             right.push(rule(held, "these trials cannot separate what is hidden from others"));
         } else {

@@ -256,6 +256,7 @@ fn answers_are_graded_by_what_trials_can_tell() {
     let inertia = [Cause::DrivetrainInertia];
     assert_eq!(grade(&inertia, Plan::Rich, &named(&["mass_error"])), Right);
     assert_eq!(grade(&inertia, Plan::OneDepth, &named(&["mass_error"])), Wrong);
+    assert_eq!(grade(&inertia, Plan::OneDepth, &open(&[&["added_mass"], &["mass_error"]])), Right);
     // a share of the drag is the same share of mass and drive
     let drag = [Cause::DragCoefficientError];
     assert_eq!(grade(&drag, Plan::Rich, &named(&["drive_gain", "mass_error"])), Wrong);
