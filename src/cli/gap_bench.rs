@@ -108,7 +108,7 @@ struct Bench {
     /// Only the cases whose name holds this
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
-    /// Infer the wrench from the motion of a driven vehicle: other cases, of another table
+    /// Cases of a driven vehicle whose wrench is inferred from poses and drive force, with a table of their own
     #[arg(long, conflicts_with_all = ["cases", "families", "size", "invariance"])]
     motion: bool,
     /// How often each effect stands among those of --motion; 5 make 210 cases
@@ -126,7 +126,7 @@ struct Bench {
     /// Ask again with the trials shuffled and mirrored in every N-th case; 0 for never
     #[arg(long, value_name = "N", default_value_t = 10)]
     invariance: usize,
-    /// Write the trials of each case to OUT/cases
+    /// Write the trials of each case to OUT/cases, and with --motion what is hidden in them to OUT/keys
     #[arg(long)]
     keep: bool,
     /// Folder for results.json
