@@ -12,7 +12,7 @@ use wade_gap_bench::generate::{gap, generate, predicted};
 use wade_gap_bench::hidden::{Effect, Hidden};
 use wade_gap_bench::real::{kvlcc2, rm2_rotor};
 use wade_gap_bench::score::{Judged, rows};
-use wade_gap_bench::{Hull, NoiseKind, Prediction, Schedule, Setup, Simulator, Tool, folder, run};
+use wade_gap_bench::{Hull, NoiseKind, Prediction, Schedule, Setup, Simulator, Tool, folder, motion, run};
 use wade_learn::trials::Trials;
 
 fn schedule() -> Schedule {
@@ -315,6 +315,25 @@ fn a_ship_model_rolls_with_more_damping_than_an_inviscid_simulation() {
     let report = said_of(&trials, 3);
     assert!(report.effects.iter().any(|effect| effect.name == "linear_damping"), "{}", report.summary);
     assert_eq!(report.verdict, Verdict::Ambiguous, "{}", report.summary);
+}
+
+#[test]
+fn a_strong_effect_is_named_from_motion_alone_and_a_null_is_none() {
+    let is_chosen = |case: &motion::Case| {
+        let is_strong = case.group == motion::Group::Effect
+            && ["added_mass", "linear_damping", "current"].contains(&case.planted[0].cause.name());
+        case.marker == motion::MarkerNoise::Tenth && (is_strong || case.group == motion::Group::Null)
+    };
+    let mut cases = motion::cases(1, 1);
+    cases.retain(is_chosen);
+    assert_eq!(cases.len(), 6);
+    for case in &cases {
+        let generated = motion::generate(case);
+        let report = said_of(&generated.trials, Config::default().least_trials);
+        let answer = Answer::from_report(&serde_json::to_value(&report).unwrap()).unwrap();
+        let (grade, reason) = generated.key.allowed.grade(&answer);
+        assert_eq!(grade, motion::Grade::Right, "{}: {reason}: {}", case.name, report.summary);
+    }
 }
 
 /// What the workflow says of trials with another simulator's prediction.
