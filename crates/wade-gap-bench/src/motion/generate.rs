@@ -153,12 +153,17 @@ fn track(run: &Run) -> Track {
 
 /// Parameters of what is hidden, as a tool may state them.
 fn parameters_of(planted: &Planted, simulator: Simulator, tracks: &[Track]) -> Vec<Parameter> {
-    if let Some(hidden) = planted.hidden() {
+    if let Some(hidden) = planted.hidden().filter(|_| planted.cause != Cause::MassError) {
         return parameters(&hidden, &Setting { simulator, session: 0.0 }, tracks);
     }
     let size = planted.size;
     let one = |names, unit, value| Parameter { names, unit, value };
     match planted.cause {
+        // what is stated is too much; a share is one of what is stated
+        Cause::MassError => vec![
+            one(&["mass", "error", "difference"], "kg", size),
+            one(&["relative_error"], "1", -size / (simulator.hull.mass + size)),
+        ],
         Cause::DrivetrainInertia => vec![
             one(&["mass", "inertia", "equivalent_mass"], "kg", size),
             one(&["relative_error"], "1", size / simulator.hull.mass),
