@@ -25,6 +25,8 @@ const DELAY_ARM: f64 = 0.15;
 
 /// Froude numbers at which one-dimensional flow in a channel ends.
 const FADED_AT: [f64; 2] = [0.7, 1.0];
+/// Froude numbers at which the depression in open water ends to grow.
+const HELD_AT: [f64; 4] = [0.4, 0.55, 0.7, 1.0];
 
 /// Coefficient of a gain that all channels share.
 const ALL_CHANNELS: usize = 6;
@@ -113,7 +115,9 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::Squat => {
             let walls = FADED_AT.into_iter().filter(|_| setting.in_channel);
             let open = [Squat::Bernoulli, Squat::Tuck].into_iter();
-            open.chain(walls.map(|faded_at| Squat::Channel { faded_at })).map(Shape::Squat).collect()
+            let held = HELD_AT.map(|faded_at| Squat::Held { faded_at });
+            let walls = walls.map(|faded_at| Squat::Channel { faded_at });
+            open.chain(held).chain(walls).map(Shape::Squat).collect()
         }
         Effect::ChannelBlockage => {
             let falling = FADED_AT.map(|faded_at| ChannelBlockage::FallingSurface { faded_at });

@@ -101,7 +101,7 @@ mod tests {
             (Effect::WaterEntrySlamming, &[[0.2, 0.0, 0.0]]),
             (Effect::WaveMemory, &[[0.8, 0.0, 0.0], [0.8, 2.0, 1.0]]),
             (Effect::ChannelBlockage, &[[0.7, 0.0, 0.0]]),
-            (Effect::Squat, &[[0.0, 1.0, 0.0], [0.7, 0.0, 0.0]]),
+            (Effect::Squat, &[[0.0, 1.0, 0.0], [0.7, 0.0, 0.0], [0.7, 2.0, 0.0]]),
             (Effect::WheelPaddleThrust, &[[1.0, 0.0, 0.0]]),
             (Effect::BedMotion, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
             (Effect::SensorDelay, &[[0.1, 0.0, 0.0]]),
@@ -132,7 +132,8 @@ mod tests {
             (Effect::DragCoefficientError, [3.0, 0.0, 0.0], "shape[0] must be 0 or 1 or 2"),
             (Effect::DragCoefficientError, [f64::NAN, 0.0, 0.0], "shape[0] must be 0 or 1 or 2"),
             (Effect::LinearDamping, [0.0, 0.0, 0.1], "shape[2] must be 0"),
-            (Effect::Squat, [0.7, 1.0, 0.0], "shape[1] must be 0"),
+            (Effect::Squat, [0.7, 1.0, 0.0], "shape[1] must be 0 or 2"),
+            (Effect::Squat, [0.0, 2.0, 0.0], "shape[0] must be greater than 0"),
             (Effect::HullFlooding, [-0.1, 0.0, 0.0], "shape[0] must be finite and 0 or greater"),
             (Effect::Current, [0.0, f64::INFINITY, 0.0], "shape[1] must be finite"),
         ] {
@@ -195,6 +196,7 @@ mod tests {
             let shape = match effect {
                 Effect::HullFlooding => Shape::from_numbers(effect, [0.01, 0.0, 0.0]).unwrap(),
                 Effect::WaveMemory => Shape::from_numbers(effect, [0.8, 2.0, 0.0]).unwrap(),
+                Effect::Squat => Shape::from_numbers(effect, [0.3, 2.0, 0.0]).unwrap(),
                 _ => effect.plain(),
             };
             let whole = loads(&shape, &body, None);
@@ -208,5 +210,25 @@ mod tests {
                 assert_eq!(changes, says, "{}: {}", effect.name(), quantity.name());
             }
         }
+    }
+
+    #[test]
+    fn a_held_squat_is_a_level_that_is_lower() {
+        let body = Body::of_vehicle(&shipped::husky().unwrap().vehicle().unwrap());
+        let sum = |effect, numbers| {
+            let shape = Shape::from_numbers(effect, numbers).unwrap();
+            let own = loads(&shape, &body, None).into_iter().filter(|(coefficient, _)| *coefficient == 0);
+            own.fold(Wrench::default(), |mut sum, (_, load)| {
+                sum += load;
+                sum
+            })
+        };
+        // 0.73 m/s over 0.17 m of water is Fr_h = 0.57
+        let lower = sum(Effect::WaterLevelOffset, [0.0; 3]) * (-0.5 * 0.3 * 0.3 * 0.17);
+        let held = sum(Effect::Squat, [0.3, 2.0, 0.0]);
+        assert!((held.force - lower.force).norm() < 1e-9 * lower.force.norm(), "{held:?} {lower:?}");
+        assert!(held.force.z < 0.0 && held.force.x > 0.0, "less lift and less drag: {held:?}");
+        let below = sum(Effect::Squat, [0.9, 2.0, 0.0]);
+        assert!(below.force.z < 3.0 * held.force.z, "{below:?}");
     }
 }

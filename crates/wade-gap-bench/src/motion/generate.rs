@@ -206,7 +206,8 @@ fn trials(case: &Case, runs: &[Run], simulator: Simulator) -> Trials {
         }),
         ..Manifest::default()
     };
-    Trials { manifest, trials: runs.iter().map(|run| trial(run, has_drive, &simulator)).collect() }
+    let trials = runs.iter().map(|run| trial(run, has_drive, &simulator)).collect();
+    Trials { manifest, trials, accelerations_were_rates: false }
 }
 
 fn trial(run: &Run, has_drive: bool, simulator: &Simulator) -> Trial {
