@@ -144,7 +144,8 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         share_of_gap: effect.share_of_gap,
         shape: effect.shape,
         base_drag: effect.base_drag,
-        channel_width: trials.manifest.channel_width.or_else(|| narrowest(&trials.manifest)),
+        channel_width: (trials.manifest.channel_width.filter(|width| width.is_finite()))
+            .or_else(|| narrowest(&trials.manifest)),
         coefficients: effect.coefficients.iter().map(|name| (*name).to_owned()).collect(),
         covariance: effect.covariance.clone(),
         parameters: nonlinear.chain(parameters).collect::<BTreeMap<_, _>>(),

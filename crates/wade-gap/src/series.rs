@@ -55,7 +55,7 @@ pub(super) struct Series {
     pub bins: Vec<Range<usize>>,
     /// Bins of each run without a hole.
     pub runs: Vec<Range<usize>>,
-    /// Width of the channel [m].
+    /// Width of the channel [m]; none in open water.
     pub channel_width: Option<f64>,
 }
 
@@ -255,7 +255,7 @@ fn of_trial(
         name: trial.name.clone(),
         gap: gap.collect(),
         other,
-        channel_width: trials.manifest.channel_width_of(&trial.name),
+        channel_width: trials.manifest.channel_width_of(&trial.name).filter(|width| width.is_finite()),
         wetting_rate,
         inertia: motion.as_ref().map(|motion| inertia(&trial.t, &pieces, motion)),
         dry_rolling: motion.map_or_else(|| vec![0.0; count], |motion| motion.dry_rolling),

@@ -37,7 +37,7 @@ pub struct Manifest {
     /// Fluid density [kg/m3]; fresh water where neither this nor a column states it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fluid_density: Option<f64>,
-    /// Width of the channel [m].
+    /// Width of the channel [m]; `inf` is open water.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel_width: Option<f64>,
     /// Mass of the vehicle as it was tested [kg].
@@ -158,6 +158,22 @@ impl Manifest {
         toml::to_string(self).expect("plain numbers, strings and tables are always TOML")
     }
 
+    /// Trials are named as their files are, with or without `.csv`.
+    pub(super) fn without_extensions(&mut self) {
+        fn bare(name: &str) -> String {
+            name.strip_suffix(".csv").unwrap_or(name).to_owned()
+        }
+        fn by_trial<T>(table: &mut BTreeMap<String, T>) {
+            *table = std::mem::take(table).into_iter().map(|(name, value)| (bare(&name), value)).collect();
+        }
+        by_trial(&mut self.nominal_depth);
+        by_trial(&mut self.channel_widths);
+        by_trial(&mut self.trial_offsets);
+        self.measured.repeats.iter_mut().flatten().for_each(|name| *name = bare(name));
+        let twins = std::mem::take(&mut self.measured.dry_twins);
+        self.measured.dry_twins = twins.into_iter().map(|(wet, dry)| (bare(&wet), bare(&dry))).collect();
+    }
+
     /// Names must be those of files and components, and numbers must be numbers.
     pub(super) fn check(&self, files: &[PathBuf]) -> Result<(), Fault> {
         let trials: Vec<String> = files.iter().map(|file| stem(file)).collect();
@@ -242,7 +258,6 @@ impl Manifest {
             self.nominal_depth.iter().map(|(name, value)| (format!("nominal_depth.{name}"), *value, DEPTH));
         let positive = stated("fluid_density", self.fluid_density, DENSITY)
             .into_iter()
-            .chain(stated("channel_width", self.channel_width, WIDTH))
             .chain(stated("mass", self.mass, MASS))
             .chain(depths)
             .chain(of_body);
@@ -252,8 +267,10 @@ impl Manifest {
             }
             within(key, value, bounds)?;
         }
-        for (name, &value) in &self.channel_widths {
-            let key = format!("channel_widths.{name}");
+        let widths =
+            self.channel_widths.iter().map(|(name, &value)| (format!("channel_widths.{name}"), value));
+        for (key, value) in widths.chain(self.channel_width.map(|value| ("channel_width".to_owned(), value)))
+        {
             if value.is_nan() || value <= 0.0 {
                 return Err(Fault::Number { key, value, expected: "positive, or inf for open water" });
             }

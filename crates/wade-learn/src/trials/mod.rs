@@ -98,7 +98,8 @@ impl Trials {
             std::io::ErrorKind::NotFound if directory.is_dir() => At::path(directory)(Fault::NoManifest),
             _ => At::path(&path)(error.into()),
         })?;
-        let manifest: Manifest = toml::from_str(&text).map_err(|error| At::path(&path)(error.into()))?;
+        let mut manifest: Manifest = toml::from_str(&text).map_err(|error| At::path(&path)(error.into()))?;
+        manifest.without_extensions();
         let files = csv_files(directory).map_err(|error| At::path(directory)(error.into()))?;
         if files.is_empty() {
             return Err(At::path(directory)(Fault::NoTrial));

@@ -69,12 +69,12 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
         [channel_widths]
         b = inf
         [nominal_depth]
-        a = 0.2032
+        "a.csv" = 0.2032
         [measured]
         columns = ["fx", "my"]
         method = "load_cell"
-        repeats = [["a", "b"]]
-        dry_twins = { a = "b" }
+        repeats = [["a", "b.csv"]]
+        dry_twins = { a = "b.csv" }
         other_forces = ["drive_fx"]
         known_loads = ["hung_fz"]
         [sensor_noise]
@@ -104,6 +104,11 @@ fn a_full_folder_is_read_in_the_terms_of_the_body_frame() {
     assert_eq!(read.manifest.nominal_depth["a"], 0.2032);
     let widths = ["a", "b"].map(|trial| read.manifest.channel_width_of(trial));
     assert_eq!(widths, [Some(6.0), Some(f64::INFINITY)]);
+    let open = manifest.replace("channel_width = 6.0", "channel_width = inf");
+    assert!(self::read(&open, &files).is_ok(), "open water is a width as well");
+    // trials are named with or without the extension of their files
+    assert_eq!(read.manifest.measured.repeats, [["a", "b"]]);
+    assert_eq!(read.manifest.measured.dry_twins["a"], "b");
     let offsets =
         [("a", "fx"), ("b", "fx"), ("b", "fy")].map(|(trial, c)| read.manifest.trial_offset_of(trial, c));
     assert_eq!(offsets, [2.0, 3.0, 0.0]);
@@ -406,6 +411,7 @@ fn numbers_of_the_manifest_beyond_any_measure_are_refused() {
         ("vehicle = \"w\"\nfluid_density = 1e300".to_owned(), "must be between 1.1 and 3000 kg/m3"),
         ("vehicle = \"w\"\nfluid_density = 1.0".to_owned(), "fluid_density = 1 must be between 1.1"),
         ("vehicle = \"w\"\nmass = 1e20".to_owned(), "must be between 1e-6 and 1e8 kg"),
+        ("vehicle = \"w\"\nchannel_width = -inf".to_owned(), "channel_width = -inf must be positive, or inf"),
         ("vehicle = \"w\"\nchannel_width = 1e9".to_owned(), "channel_width = 1000000000 must be between"),
         ("vehicle = \"w\"\n[nominal_depth]\nrun = 200.0".to_owned(), "nominal_depth.run = 200 must be"),
         ("vehicle = \"w\"\n[sensor_noise]\nfx = 1e9".to_owned(), "sensor_noise.fx = 1000000000 must be"),
