@@ -239,7 +239,17 @@ def _array(name: str, value: ArrayLike) -> NDArray[np.float32]:
         with np.errstate(over="ignore"):
             return np.asarray(value, dtype=np.float32)
     except (TypeError, ValueError):
+        if row := _odd_row(value):
+            raise _wrong(name, f"state {row[0]} of the batch has {row[1]} values, state 0 has {row[2]}") from None
         raise _wrong(name, f"must be numbers, got {_describe(value)}") from None
+
+
+def _odd_row(value: Any) -> tuple[int, int, int] | None:
+    """The first row that is not as long as row 0: its place, its length, and that of row 0."""
+    if not isinstance(value, list | tuple) or not all(isinstance(row, list | tuple) for row in value):
+        return None
+    lengths = [len(row) for row in value]
+    return next(((at, own, lengths[0]) for at, own in enumerate(lengths) if own != lengths[0]), None)
 
 
 def _describe(value: Any) -> str:
