@@ -11,31 +11,36 @@ const ORDER: usize = 2;
 /// Acceleration in an inertial frame, in the axes of the body: `dv/dt + omega x v` [m/s2].
 pub fn acceleration(times: &[f64], velocity: &[Vec3], angular_velocity: &[Vec3]) -> Vec<Vec3> {
     let rates = derivative(times, velocity).into_iter();
-    rates.zip(angular_velocity.iter().zip(velocity)).map(|(rate, (omega, v))| rate + omega.cross(v)).collect()
+    rates.zip(turning(velocity, angular_velocity)).map(|(rate, turn)| rate + turn).collect()
+}
+
+/// What turning adds to the rates of the components of a velocity: `omega x v` [m/s2].
+fn turning<'a>(velocity: &'a [Vec3], angular_velocity: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
+    angular_velocity.iter().zip(velocity).map(|(omega, v)| omega.cross(v))
 }
 
 /// Adds `omega x v` to recorded accelerations that are the rates of the velocity's components, and true where that was so.
 /// Both conventions are in use, and a recording tells which is its own: `r = a - dv/dt` is 0 in one and
 /// `omega x v` in the other. What hardly turns tells neither, and stays as it is.
 pub(super) fn settle_convention(trials: &mut [Trial]) -> bool {
-    /// How many times larger than what is left of `r` the turning must be, as the root of the sums of squares: noise that
-    /// hangs together over some ten samples reaches 3.
+    /// How many times larger than what is left of `r` the turning must be, as the root of the sums of squares: noise that is
+    /// correlated over some ten samples reaches 3.
     const CLEAR: f64 = 10.0;
-    let (mut as_rates, mut as_inertial, mut turning, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let (mut as_rates, mut as_inertial, mut turned, mut count) = (0.0, 0.0, 0.0, 0.0);
     for trial in trials.iter().filter(|trial| trial.acceleration_is_measured) {
         let rates = derivative(&trial.t, &trial.velocity);
-        let turns = trial.angular_velocity.iter().zip(&trial.velocity).map(|(omega, v)| omega.cross(v));
+        let turns = turning(&trial.velocity, &trial.angular_velocity);
         for ((recorded, rate), turn) in trial.acceleration.iter().zip(rates).zip(turns) {
             as_rates += (recorded - rate).norm_squared();
             as_inertial += (recorded - rate - turn).norm_squared();
-            turning += turn.norm_squared();
+            turned += turn.norm_squared();
             count += 1.0;
         }
     }
     let noise = f64::min(as_rates, as_inertial) / f64::max(3.0 * count, 1.0);
-    let are_rates = as_rates < as_inertial && turning > CLEAR * CLEAR * noise;
+    let are_rates = as_rates < as_inertial && turned > CLEAR * CLEAR * noise;
     for trial in trials.iter_mut().filter(|trial| are_rates && trial.acceleration_is_measured) {
-        let turns = trial.angular_velocity.iter().zip(&trial.velocity).map(|(omega, v)| omega.cross(v));
+        let turns = turning(&trial.velocity, &trial.angular_velocity);
         trial.acceleration.iter_mut().zip(turns).for_each(|(recorded, turn)| *recorded += turn);
     }
     are_rates

@@ -72,7 +72,7 @@ def figures(track: Track, pose: Pose, trial: Trial, body: Body) -> Figures:
 
 
 def faults(found: Figures, trial: Trial, max_speed: float) -> list[str]:
-    """The checks that a reading fails, the most telling one last."""
+    """The checks that a reading fails, the most specific one last."""
     out = []
     if found.speed > max_speed:
         out.append("speed")
