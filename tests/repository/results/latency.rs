@@ -37,7 +37,7 @@ fn machine(soak: &Value) -> String {
 /// README's one table of speed and accuracy.
 pub fn summary() -> String {
     let mut rows = Vec::new();
-    let mut machines = Vec::new();
+    let mut runs = Vec::new();
     let (mut sent, mut failed) = (0.0, 0.0);
     for (transport, name) in SUMMARY.map(|index| TRANSPORTS[index]) {
         let soak = soak_of(transport);
@@ -49,24 +49,25 @@ pub fn summary() -> String {
         }
         sent += number(&soak["sent"]);
         failed += number(&soak["errors"]) + number(&soak["lost"]);
-        machines.push(machine(&soak));
+        runs.push(format!("commit {}, {}", word(&soak["commit"]), machine(&soak)));
     }
-    let (_, queries) = csv(newest("query.csv"));
+    let (comments, queries) = csv(newest("query.csv"));
     let query =
         queries.iter().find(|row| row["subject"] == "husky query avx512").expect("the query is measured");
     let cell = |name| cell(query, name);
     let title = "one query in process, AVX-512 [us]".to_owned();
     rows.push(vec![title, cell("p50_us"), String::new(), cell("p99_us"), cell("p99_9_us")]);
     rows.extend(super::accuracy::summary());
-    machines.dedup();
+    runs.dedup();
     let table = markdown(
         &["300 s at 1 kHz, Husky, server and client on a core each", "p50", "p95", "p99", "p99.9"],
         rows,
     );
     let condition = wrapped(&format!(
-        "The 300 s runs: {}; {failed} of {sent} queries failed. Response time counts from the moment a query was due. \
+        "Runs: {}; {failed} of {sent} queries failed, each timed from when it was due. Query: {}. \
          MAE: mean absolute error against CFD.",
-        machines.join("; ")
+        runs.join("; "),
+        condition(&comments)
     ));
     format!("{table}\n{condition}\n")
 }
