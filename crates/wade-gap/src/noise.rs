@@ -1,6 +1,6 @@
 //! The noise floor: what no effect can explain.
 //!
-//! From repeats, where there are any; else from the part of the gap that changes within a tenth of a second; never below the
+//! From the part of the gap that changes within a tenth of a second, scaled by what repeats show beyond that; never below the
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
 use super::design::RowNoise;
@@ -68,8 +68,8 @@ pub(super) fn floors(
             return floor;
         }
         floor.sample = high_frequency(naming.iter().map(|&trial| &all[trial]), component);
-        if let Some(repeats) = repeats(all, manifest, component) {
-            floor = Floor { sample: repeats, source: FloorSource::Repeats, ..floor };
+        if let Some(ratio) = repeats(all, manifest, component) {
+            floor = Floor { sample: ratio * floor.sample, source: FloorSource::Repeats, ..floor };
         }
         if let Some(stated) = stated.filter(|&stated| stated > floor.sample) {
             floor = Floor { sample: stated, source: FloorSource::Stated, ..floor };
@@ -134,19 +134,22 @@ pub(super) fn floors_of(
     own
 }
 
-/// Half the variance of the difference of two trials that repeat each other, at the same time since their start.
+/// Noise of trials that repeat each other over its high-frequency part in these trials, as a ratio of standard deviations: the
+/// median over pairs of half the variance of their difference, at the same time since their start, over that part. A ratio,
+/// since the repeated trials may be quieter or louder than the others.
 fn repeats(all: &[Series], manifest: &Manifest, component: usize) -> Option<f64> {
-    let mut variances = Vec::new();
+    let mut ratios = Vec::new();
     for group in &manifest.measured.repeats {
         let group: Vec<&Series> =
             group.iter().filter_map(|name| all.iter().find(|series| series.name == *name)).collect();
         for (index, a) in group.iter().enumerate() {
             for b in &group[index + 1..] {
-                variances.push(half_difference(a, b, component));
+                let fast = 0.5 * (sample_noise(a, component).powi(2) + sample_noise(b, component).powi(2));
+                ratios.push(half_difference(a, b, component) / fast.max(f64::MIN_POSITIVE));
             }
         }
     }
-    (!variances.is_empty()).then(|| median(&mut variances).sqrt())
+    (!ratios.is_empty()).then(|| median(&mut ratios).sqrt())
 }
 
 fn half_difference(a: &Series, b: &Series, component: usize) -> f64 {

@@ -765,6 +765,24 @@ fn trials_that_repeat_each_other_tell_a_noise_that_is_slow() {
 }
 
 #[test]
+fn quiet_repeats_do_not_hide_the_noise_of_the_other_trials() {
+    const LOUD: f64 = 4.0;
+    let mut motions = pushes(TRIALS, SAMPLES, 28);
+    motions[1] = motions[0].clone();
+    let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| vec![[0.0; 6]; motion.len()]).collect();
+    let mut trials = trials(&motions, &nothing, &Noise::white(NOISE), 28);
+    let mut random = Random::new(28);
+    for value in trials.trials[2..].iter_mut().filter_map(|trial| trial.measured[0].as_mut()).flatten() {
+        *value += (LOUD * LOUD - 1.0).sqrt() * NOISE[0] * gaussian(&mut random);
+    }
+    trials.manifest.measured.repeats = vec![vec!["run00".into(), "run01".into()]];
+    let floor = run(&trials).gap.floors["fx"];
+    assert_eq!(floor.source, wade_gap::FloorSource::Repeats);
+    // at least nine in ten of the trials that name are loud
+    assert!((0.9 * LOUD..1.1 * LOUD).contains(&(floor.sample / NOISE[0])), "{floor:?}");
+}
+
+#[test]
 fn trials_that_repeat_each_other_are_kept_back_together_and_two_have_no_interval() {
     let (mut trials, _) = with(&["squat"], 3.0, 18);
     let pair = |index: usize| vec![format!("run{index:02}"), format!("run{:02}", index + 10)];
