@@ -20,7 +20,7 @@ use super::sentences::{summary, unexplained};
 use super::series::Series;
 use super::statistics::quantile;
 use super::verdict::Found;
-use super::{Named, plausible};
+use super::{Named, measurement, plausible};
 use wade_core::condition::Condition;
 use wade_core::digest::hexadecimal;
 use wade_core::effects::{self, Effect, Kind};
@@ -102,6 +102,7 @@ pub(super) fn compose(
             "the sim_ columns are a control: the gap is what differs from it, not that of the vehicle's model".into(),
         );
     }
+    said.extend(measurement::remarks(trials, setting.mass));
     said.extend(outside(all));
     if !setting.computed {
         said.extend(plausible::remarks(all, &setting.components));

@@ -213,6 +213,14 @@ pub enum GapError {
         /// Folds.
         folds: usize,
     },
+    /// No trial is in the water.
+    #[error(
+        "no sample of any trial is in the water: the largest depth is {depth:.3} m, and depth counts upwards from the plane on which the vehicle stands"
+    )]
+    Dry {
+        /// Largest depth [m].
+        depth: f64,
+    },
     /// A twin that is not there.
     #[error("{trial}.csv has the dry twin {twin}, which is not there")]
     NoTwin {

@@ -6,7 +6,7 @@
 //! since the start, and so is its part in all that the wrench was inferred from: an error of the mass or of the drive
 //! stands in both.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::GapError;
 use super::rates::mean_step;
@@ -64,6 +64,30 @@ pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<M
     };
     let wrench = [force(0), force(1), force(2), None, None, None];
     Ok(Measurement { wrench, motion: Some(motion), other })
+}
+
+/// What a wrench that is inferred from the motion rests on, where the trials leave it open; `mass` is the one that is used [kg].
+pub(super) fn remarks(trials: &Trials, mass: f64) -> Vec<String> {
+    let mut said = Vec::new();
+    if !trials.trials.iter().any(|trial| is_inferred_here(trials, trial)) {
+        return said;
+    }
+    if trials.manifest.mass.is_none() {
+        said.push(format!(
+            "trials.toml states no mass: the wrench is inferred with the vehicle's, {mass} kg"
+        ));
+    }
+    let forces = || trials.trials.iter().flat_map(|trial| &trial.other_forces);
+    for name in forces().map(|(name, _)| name).collect::<BTreeSet<_>>() {
+        let is_zero =
+            || forces().filter(|(other, _)| *other == name).all(|(_, f)| f.iter().all(|f| *f == 0.0));
+        if component_of(name).is_some_and(|component| component >= 3) {
+            said.push(format!("column {name} is not used: moments are not inferred from the motion"));
+        } else if is_zero() {
+            said.push(format!("column {name} is 0 in every row: no such force acts on the vehicle"));
+        }
+    }
+    said
 }
 
 /// Which way wheels roll: the sign of the speed ahead [m/s], 0 at rest.

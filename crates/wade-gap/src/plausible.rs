@@ -4,6 +4,7 @@ use super::GapError;
 use super::noise::sample_noise;
 use super::series::Series;
 use super::statistics::quantile;
+use wade_core::effects::Immersion;
 use wade_learn::trials::WRENCH;
 
 /// Fewest samples in which a channel that never changes is told from one that happens not to.
@@ -44,9 +45,16 @@ struct Channel<'a> {
 /// Measured and expected [N or N m].
 type Pair = [f64; 2];
 
-/// Refuses trials of the same samples, and measured channels that never change where they should, stop short of it, stand in
+/// Refuses trials without water, trials of the same samples, and measured channels that never change where they should, stop short of it, stand in
 /// for each other, have their sign reversed or are in another unit.
 pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Result<(), GapError> {
+    let is_wet = |immersion: &Immersion| {
+        immersion.volume > 0.0 || immersion.panels.iter().any(|panel| panel.fraction > 0.0)
+    };
+    if !all.iter().flat_map(|series| &series.immersions).any(is_wet) {
+        let depths = all.iter().flat_map(|series| &series.conditions).map(|condition| condition.depth);
+        return Err(GapError::Dry { depth: depths.fold(f64::NEG_INFINITY, f64::max) });
+    }
     for (index, series) in all.iter().enumerate() {
         let is_same = |other: &&Series| {
             series.t.len() >= ENOUGH && other.gap == series.gap && other.seen == series.seen

@@ -40,7 +40,7 @@ impl Law for HullFlooding {
         inputs: &[Quantity::Session],
         needs_its_first: true,
         has_memory: true,
-        not_excited: "no trial is in the water",
+        not_excited: "no trial is in the water for long enough to fill the hull",
         experiment: "stand still in the deepest water for two minutes from the moment of entry, then empty the hull",
         ..EffectSpec::COMMON
     };

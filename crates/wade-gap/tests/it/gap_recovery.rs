@@ -281,6 +281,31 @@ fn errors_of_mass_and_drive_and_rolling_are_found_in_wrenches_less_those_of_dry_
 }
 
 #[test]
+fn a_report_says_what_an_inferred_wrench_rests_on_where_the_trials_leave_it_open() {
+    let remarks = |change: &dyn Fn(&mut Trials)| {
+        let mut trials = with_dry_twins(1.0, 1.0, 0.0);
+        change(&mut trials);
+        run(&trials).remarks.join("\n")
+    };
+    let stated = remarks(&|_| ());
+    assert!(!stated.contains("mass") && !stated.contains("column"), "{stated}");
+    let open = remarks(&|trials| {
+        trials.manifest.mass = None;
+        for trial in &mut trials.trials {
+            let zero = vec![0.0; trial.len()];
+            trial.other_forces.extend([("brake_fx".into(), zero.clone()), ("drive_mz".into(), zero)]);
+        }
+    });
+    for said in [
+        "trials.toml states no mass: the wrench is inferred with the vehicle's, 280 kg",
+        "column brake_fx is 0 in every row: no such force acts on the vehicle",
+        "column drive_mz is not used: moments are not inferred from the motion",
+    ] {
+        assert!(open.contains(said), "{open}");
+    }
+}
+
+#[test]
 fn an_effect_of_all_trials_is_not_provisional_for_a_part_of_it_that_two_show() {
     let mut motions = pushes(TRIALS, SAMPLES, 24);
     for motion in &mut motions[4..6] {
@@ -1042,6 +1067,9 @@ fn bad_input_is_named() {
     let mut other = good.clone();
     other.manifest.vehicle = "boat".into();
     assert!(matches!(run(&other), GapError::Vehicle { .. }));
+    let mut dry = good.clone();
+    dry.trials.iter_mut().for_each(|trial| trial.still_water = StillWater::Depth(vec![-0.3; trial.len()]));
+    assert_eq!(run(&dry), GapError::Dry { depth: -0.3 });
     let mut mixed = good.clone();
     mixed.trials[4].simulated = Default::default();
     assert_eq!(run(&mixed), GapError::Predictions { trial: "run04".into(), other: "run00".into() });
