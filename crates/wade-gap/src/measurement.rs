@@ -6,7 +6,7 @@
 //! since the start, and so is its part in all that the wrench was inferred from: an error of the mass or of the drive
 //! stands in both.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::GapError;
 use super::rates::mean_step;
@@ -77,13 +77,11 @@ pub(super) fn remarks(trials: &Trials, mass: f64) -> Vec<String> {
             "trials.toml states no mass: the wrench is inferred with the vehicle's, {mass} kg"
         ));
     }
-    let forces = || trials.trials.iter().flat_map(|trial| &trial.other_forces);
-    for name in forces().map(|(name, _)| name).collect::<BTreeSet<_>>() {
-        let is_zero =
-            || forces().filter(|(other, _)| *other == name).all(|(_, f)| f.iter().all(|f| *f == 0.0));
+    for name in &trials.manifest.measured.other_forces {
+        let mut rows = trials.trials.iter().filter_map(|trial| trial.other_forces.get(name)).flatten();
         if component_of(name).is_some_and(|component| component >= 3) {
             said.push(format!("column {name} is not used: moments are not inferred from the motion"));
-        } else if is_zero() {
+        } else if rows.all(|force| *force == 0.0) {
             said.push(format!("column {name} is 0 in every row: no such force acts on the vehicle"));
         }
     }

@@ -145,7 +145,8 @@ fn repeats(all: &[Series], manifest: &Manifest, component: usize) -> Option<f64>
         for (index, a) in group.iter().enumerate() {
             for b in &group[index + 1..] {
                 let fast = 0.5 * (sample_noise(a, component).powi(2) + sample_noise(b, component).powi(2));
-                ratios.push(half_difference(a, b, component) / fast.max(f64::MIN_POSITIVE));
+                // a pair without noise says nothing about that of others
+                ratios.extend((fast > 0.0).then(|| half_difference(a, b, component) / fast));
             }
         }
     }

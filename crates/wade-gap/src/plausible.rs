@@ -45,8 +45,8 @@ struct Channel<'a> {
 /// Measured and expected [N or N m].
 type Pair = [f64; 2];
 
-/// Refuses trials without water, trials of the same samples, and measured channels that never change where they should, stop short of it, stand in
-/// for each other, have their sign reversed or are in another unit.
+/// Refuses trials without water, trials of the same samples, and measured channels that never change where they should, stop
+/// short of it, stand in for each other, have their sign reversed or are in another unit.
 pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Result<(), GapError> {
     let is_wet = |immersion: &Immersion| {
         immersion.volume > 0.0 || immersion.panels.iter().any(|panel| panel.fraction > 0.0)
