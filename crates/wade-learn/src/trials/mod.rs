@@ -4,9 +4,11 @@
 //! are finite, time increases, angles are radians and accelerations m/s2 without gravity, as far as that can be told.
 //!
 //! Reading order: `manifest` (`trials.toml`), `table` (a CSV file), `units` (limits, and columns that contradict each
-//! other), `glitch` (samples that stand alone), `acceleration` (where none was measured), `trial`, `write`.
+//! other), `glitch` (samples that stand alone), `acceleration` (where none was measured), `trial`, `averaged` (means over
+//! windows), `write`.
 
 mod acceleration;
+mod averaged;
 mod fault;
 mod glitch;
 mod manifest;

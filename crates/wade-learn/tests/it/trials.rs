@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tempfile::TempDir;
 use wade_core::condition::GroundContact;
-use wade_learn::trials::{Fault, Method, Remark, Trial, TrialError, Trials};
+use wade_learn::trials::{Fault, Method, Remark, Trial, TrialError, Trials, acceleration, derivative};
 
 const MANIFEST: &str = "vehicle = \"warthog\"\n";
 
@@ -539,4 +539,23 @@ fn depth_and_level_are_given_once_and_the_bed_is_where_it_can_be() {
     assert!(level.contains("row 7, column water_level: \"NaN\" is no finite number"), "{level}");
     let level = message(&with_level(&|t| if t == 0.05 { 203.0 } else { 0.0 }, &[]));
     assert!(level.contains("row 7, column water_level: 203 lies outside"), "{level}");
+}
+
+#[test]
+fn accelerations_of_means_are_derivatives_of_means_unless_they_were_measured() {
+    let speed = |t: f64| (3.0 * t).sin();
+    let windows: Vec<_> = (0..20).map(|window| 10 * window..10 * (window + 1)).collect();
+    let derived = trial(&[("vx", &speed), ("wz", &|t| 0.2 * t)]).averaged(&windows);
+    let rates = acceleration(&derived.t, &derived.velocity, &derived.angular_velocity);
+    assert_eq!(derived.acceleration, rates);
+    assert_eq!(derived.angular_acceleration, derivative(&derived.t, &derived.angular_velocity));
+    let recorded =
+        trial(&[("vx", &speed), ("ax", &|t| 3.0 * (3.0 * t).cos()), ("ay", &|_| 0.0), ("az", &|_| 0.0)]);
+    let means = recorded.averaged(&windows);
+    let first = recorded.acceleration[..10].iter().map(|a| a.x).sum::<f64>() / 10.0;
+    assert!((means.acceleration[0].x - first).abs() < 1e-12);
+    assert_eq!((means.len(), means.rows[1]), (20, recorded.rows[10]));
+    // a window of one sample is the sample, and what has no window is left out
+    let some = recorded.averaged(&[3..4, 5..6]);
+    assert_eq!(some.velocity, [recorded.velocity[3], recorded.velocity[5]]);
 }
