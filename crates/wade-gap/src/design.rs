@@ -117,29 +117,39 @@ pub(super) fn to_rows(
 ) -> Vec<f64> {
     let mut out = Vec::with_capacity(rows.rows.len());
     for &trial in trials {
-        let series = &all[trial];
-        let column = of(trial);
-        let pace = noise.model[trial].iter().any(|std| *std > 0.0).then(|| pace(series));
-        let by_component: Vec<Vec<f64>> = components
-            .iter()
-            .map(|&component| {
-                let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
-                let bin = noise.bin[component];
-                let model = noise.model[trial][component] / bin;
-                let zero = (noise.offset[trial][component] / bin).hypot(model);
-                values.iter_mut().for_each(|value| *value /= bin);
-                match &pace {
-                    Some(pace) => whiten(&mut values, pace, [zero, model]),
-                    None => center(&mut values, zero),
-                }
-                values
-            })
-            .collect();
-        for bin in 0..series.bins.len() {
-            out.extend(by_component.iter().map(|values| values[bin]));
-        }
+        rows_of_trial(&all[trial], trial, components, noise, &of(trial), &mut out);
     }
     out
+}
+
+/// Adds the rows of one trial to those of the trials before it.
+fn rows_of_trial(
+    series: &Series,
+    trial: usize,
+    components: &[usize],
+    noise: &RowNoise,
+    column: &Column,
+    out: &mut Vec<f64>,
+) {
+    let pace = noise.model[trial].iter().any(|std| *std > 0.0).then(|| pace(series));
+    let by_component: Vec<Vec<f64>> = components
+        .iter()
+        .map(|&component| {
+            let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
+            let bin = noise.bin[component];
+            let model = noise.model[trial][component] / bin;
+            let zero = (noise.offset[trial][component] / bin).hypot(model);
+            values.iter_mut().for_each(|value| *value /= bin);
+            match &pace {
+                Some(pace) => whiten(&mut values, pace, [zero, model]),
+                None => center(&mut values, zero),
+            }
+            values
+        })
+        .collect();
+    for bin in 0..series.bins.len() {
+        out.extend(by_component.iter().map(|values| values[bin]));
+    }
 }
 
 /// Takes off the mean in the share that a zero of this deviation has in it, beside noise of 1 a value.
@@ -262,9 +272,24 @@ impl Design {
         self.trials.iter().position(|&t| t == trial).unwrap_or_default()
     }
 
-    /// Columns of each trial, a value a sample.
-    fn raw_columns(&self, all: &[Series], setting: &Setting, shape: &Shape) -> Vec<Vec<Column>> {
-        self.trials.iter().map(|&trial| columns(shape, &all[trial], trial, setting)).collect()
+    /// The rows of each coefficient of a shape. A trial's values by sample are gone before the next trial's are computed:
+    /// they take several times as much room as its rows.
+    fn rows_of_shape(
+        &self,
+        all: &[Series],
+        setting: &Setting,
+        shape: &Shape,
+        noise: &RowNoise,
+    ) -> Vec<Vec<f64>> {
+        let count = shape.effect().coefficients().len();
+        let mut rows = vec![Vec::with_capacity(self.rows.rows.len()); count];
+        for &trial in &self.trials {
+            let columns = columns(shape, &all[trial], trial, setting);
+            for (rows, column) in rows.iter_mut().zip(&columns) {
+                rows_of_trial(&all[trial], trial, &setting.components, noise, column, rows);
+            }
+        }
+        rows
     }
 
     fn candidate_columns(
@@ -273,11 +298,9 @@ impl Design {
         setting: &Setting,
         shape: &Shape,
     ) -> Vec<(usize, Vec<f64>, f64)> {
-        let raw = self.raw_columns(all, setting, shape);
         let mut found = Vec::new();
-        for (coefficient, _) in shape.effect().coefficients().iter().enumerate() {
-            let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
-            let mut column = to_rows(all, &self.rows, &self.trials, &setting.components, &self.noise, of);
+        let rows = self.rows_of_shape(all, setting, shape, &self.noise);
+        for (coefficient, mut column) in rows.into_iter().enumerate() {
             let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();
             if scale > 1e-9 && scale.is_finite() {
                 column.iter_mut().for_each(|value| *value /= scale);
@@ -294,8 +317,12 @@ impl Design {
         setting: &Setting,
         of: &dyn Fn(usize) -> Column,
     ) -> DVector<f64> {
-        let noise = RowNoise { smoothing: Smoothing::default(), ..self.noise.clone() };
+        let noise = self.unsmoothed_noise();
         DVector::from_vec(to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of))
+    }
+
+    fn unsmoothed_noise(&self) -> RowNoise {
+        RowNoise { smoothing: Smoothing::default(), ..self.noise.clone() }
     }
 
     /// Columns that were not smoothed, in the units of those that were.
@@ -312,10 +339,10 @@ impl Design {
             if own.is_empty() {
                 continue;
             }
-            let raw = self.raw_columns(all, setting, &candidate.shape);
+            let mut rows = self.rows_of_shape(all, setting, &candidate.shape, &self.unsmoothed_noise());
             for (place, (column, coefficient)) in own {
-                let of = |trial: usize| raw[self.place(trial)][coefficient].clone();
-                found[place] = self.unsmoothed(all, setting, &of) / self.scale[column];
+                let rows = DVector::from_vec(std::mem::take(&mut rows[coefficient]));
+                found[place] = rows / self.scale[column];
             }
         }
         found

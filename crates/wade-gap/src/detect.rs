@@ -13,7 +13,7 @@ use super::series::Series;
 use super::smoothing::bins;
 use super::statistics::{median, quantile, white_variance};
 use super::{Config, Named, noise::Floor};
-use wade_core::effects::{Effect, Rate};
+use wade_core::effects::{Effect, Rate, Shape};
 use wade_learn::random::Random;
 use wade_learn::trials::{Manifest, WRENCH};
 
@@ -141,14 +141,13 @@ fn of_effect(
         return found;
     };
     let candidate = &design.candidates[form];
-    let raw: Vec<Vec<Column>> =
-        all.iter().enumerate().map(|(rank, s)| columns(&candidate.shape, s, rank, setting)).collect();
+    let signals = signals(&candidate.shape, all, setting, design);
     let coherent = is_coherent(effect, all, &setting.components);
     let changes = if effect == Effect::SensorDelay { change_signal(all, &setting.components) } else { 1.0 };
     let mut plausible = false;
     let mut excited = false;
     for &(column, coefficient) in &candidate.columns {
-        let (signal, trials) = signal(&raw, coefficient, all, setting, design);
+        let (signal, trials) = signals[coefficient].share();
         let smooth = if coherent { signal.min(changes).max(0.0) } else { 0.0 };
         found.trials = found.trials.max(if smooth > LEAST_SIGNAL { trials } else { 0 });
         excited |= smooth > LEAST_SIGNAL;
@@ -185,34 +184,51 @@ fn mean_bin(design: &Design, setting: &Setting) -> f64 {
 /// Length of the running means after which a column is looked at trial by trial [s].
 const EVEN: f64 = 0.25;
 
-/// Share of signal, not noise of the kinematics, in the bins of a column, and the number of trials that excite it.
-fn signal(
-    raw: &[Vec<Column>],
-    coefficient: usize,
-    all: &[Series],
-    setting: &Setting,
-    design: &Design,
-) -> (f64, usize) {
-    let (mut noise, mut total) = (0.0, 0.0);
-    let mut by_trial = vec![0.0; all.len()];
-    for (trial, series) in all.iter().enumerate() {
+/// What there is of a coefficient in the bins of all trials.
+#[derive(Clone, Default)]
+struct Signal {
+    /// Sum of the squares that noise of the kinematics makes, and of all.
+    noise: f64,
+    total: f64,
+    by_trial: Vec<f64>,
+}
+
+impl Signal {
+    /// Adds the bins of a trial.
+    fn add(&mut self, column: &Column, series: &Series, setting: &Setting, design: &Design) {
+        let mut energy = 0.0;
         for &component in &setting.components {
-            let value = |sample: usize| raw[trial][coefficient][sample][component];
+            let value = |sample: usize| column[sample][component];
             let (values, smooth) = (series.binned(value), bins(series, EVEN, value));
             let weight = design.noise.bin[component].powi(-2);
             for run in series.runs.iter().filter(|run| run.len() >= 6) {
                 let values = &values[run.clone()];
                 if !setting.computed {
-                    noise += weight * white_variance(values) * values.len() as f64;
+                    self.noise += weight * white_variance(values) * values.len() as f64;
                 }
-                total += weight * values.iter().map(|v| v * v).sum::<f64>();
-                by_trial[trial] += weight * mean_square(&smooth[run.clone()]);
+                self.total += weight * values.iter().map(|v| v * v).sum::<f64>();
+                energy += weight * mean_square(&smooth[run.clone()]);
             }
         }
+        self.by_trial.push(energy);
     }
-    let most = by_trial.iter().copied().fold(0.0, f64::max);
-    let trials = by_trial.iter().filter(|e| **e > EXCITED * most && **e > 0.0).count();
-    (if total > 0.0 { 1.0 - noise / total } else { 0.0 }, trials)
+
+    /// Share of signal, not noise of the kinematics, and the number of trials that excite it.
+    fn share(&self) -> (f64, usize) {
+        let most = self.by_trial.iter().copied().fold(0.0, f64::max);
+        let trials = self.by_trial.iter().filter(|e| **e > EXCITED * most && **e > 0.0).count();
+        (if self.total > 0.0 { 1.0 - self.noise / self.total } else { 0.0 }, trials)
+    }
+}
+
+/// What there is of each coefficient of a shape.
+fn signals(shape: &Shape, all: &[Series], setting: &Setting, design: &Design) -> Vec<Signal> {
+    let mut signals = vec![Signal::default(); shape.effect().coefficients().len()];
+    for (rank, series) in all.iter().enumerate() {
+        let columns = columns(shape, series, rank, setting);
+        signals.iter_mut().zip(&columns).for_each(|(sum, column)| sum.add(column, series, setting, design));
+    }
+    signals
 }
 
 /// True where a rate that an effect lives on hangs together for longer than the filter that made it: what is left of the
