@@ -229,14 +229,24 @@ fn signal(series: &Series, recorded: &[f64], length: f64) -> Autocovariance {
     Autocovariance::new(mean_step(&series.t), &pieces, recorded, longest.unwrap_or_default())
 }
 
-/// Samples of a window over which a record is smoothed.
+/// Samples of a window over which a record is smoothed: no more than a run without a hole has.
 fn window_of(series: &Series, window_s: Option<f64>) -> usize {
-    window_s.map_or(1, |window_s| window(window_s, mean_step(&series.t)))
+    let odd = (longest_run(series) - 1) / 2 * 2 + 1;
+    window_s.map_or(1, |window_s| window(window_s, mean_step(&series.t)).min(odd))
+}
+
+/// Samples to either side of a running mean: no more than a run without a hole has.
+fn half_of(series: &Series, length: f64) -> usize {
+    half(length, mean_step(&series.t)).min(longest_run(series))
+}
+
+fn longest_run(series: &Series) -> usize {
+    series.pieces().map(|piece| piece.len()).max().unwrap_or(1)
 }
 
 /// Samples that the product of two smoothed bins reaches to either side, and the window beyond.
 fn both_ways(series: &Series, window: Option<f64>, length: f64) -> usize {
-    samples_of_bin(series) + 4 * half(length, mean_step(&series.t)) + window_of(series, window) / 2
+    samples_of_bin(series) + 4 * half_of(series, length) + window_of(series, window) / 2
 }
 
 /// Mean product of what the signal and the signal smoothed over a window become.
@@ -249,7 +259,7 @@ fn lasting(series: &Series, signal: &Autocovariance, window: Option<f64>, length
         covariances = smoothed;
     }
     // two running means over both are four over one
-    let half = half(length, mean_step(&series.t));
+    let half = half_of(series, length);
     (0..4).for_each(|_| running_mean(&mut covariances, half));
     let pairs = (0..samples).flat_map(|i| (0..samples).map(move |j| (i, j)));
     pairs.map(|(i, j)| covariances[middle + i - j]).sum::<f64>() / (samples * samples) as f64
