@@ -3,7 +3,7 @@
 //!
 //! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
 //!
-//! Reading order: `config`, `measurement`, `rates` and `series` (trials to samples with a gap), `plausible` (what
+//! Reading order: `config`, `sampling`, `measurement`, `rates` and `series` (trials to samples with a gap), `plausible` (what
 //! cannot be), `noise` (the floor), `candidates` (the
 //! library as columns), `base_drag`, `split` (held-out trials, and folds), `design` (the regression), `robust` (errors that
 //! hold), `judge` (the gates), `select` and `rivals` (which effects), `shared` (noise of the motion in both), `nonlinear`,
@@ -44,6 +44,7 @@ mod report;
 mod rivals;
 mod robust;
 mod run;
+mod sampling;
 mod select;
 mod sentences;
 mod series;

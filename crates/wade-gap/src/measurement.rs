@@ -36,13 +36,25 @@ pub(super) struct Motion {
     pub dry_rolling: Vec<f64>,
 }
 
-pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<Measurement, GapError> {
+/// The dry twin of a trial, where it has one.
+pub(super) fn twin<'a>(trials: &'a Trials, trial: &Trial) -> Result<Option<&'a Trial>, GapError> {
+    let Some(name) = trials.manifest.measured.dry_twins.get(&trial.name) else { return Ok(None) };
+    if !is_inferred_here(&trials.manifest, trial) {
+        return Err(GapError::TwinOfMeasured { trial: trial.name.clone() });
+    }
+    let missing = || GapError::NoTwin { trial: trial.name.clone(), twin: name.clone() };
+    trials.trials.iter().find(|other| other.name == *name).ok_or_else(missing).map(Some)
+}
+
+/// What was measured of a trial beside its dry twin, or inferred with a mass where the manifest states none [kg].
+pub(super) fn measurement(
+    manifest: &Manifest,
+    trial: &Trial,
+    twin: Option<&Trial>,
+    mass: f64,
+) -> Result<Measurement, GapError> {
     let own = of_columns(&trial.other_forces, trial.len());
-    let twin = trials.manifest.measured.dry_twins.get(&trial.name);
-    if !is_inferred_here(trials, trial) {
-        if twin.is_some() {
-            return Err(GapError::TwinOfMeasured { trial: trial.name.clone() });
-        }
+    if !is_inferred_here(manifest, trial) {
         return Ok(Measurement { wrench: trial.measured.clone(), motion: None, other: own });
     }
     let mut other = own;
@@ -51,12 +63,10 @@ pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<M
         up: (0..trial.len()).map(|sample| trial.up(sample).into_inner()).collect(),
         dry_rolling: vec![0.0; trial.len()],
     };
-    if let Some(name) = twin {
-        let missing = || GapError::NoTwin { trial: trial.name.clone(), twin: name.clone() };
-        let twin = trials.trials.iter().find(|other| other.name == *name).ok_or_else(missing)?;
+    if let Some(twin) = twin {
         take_off(&mut motion, &mut other, trial, twin)?;
     }
-    let mass = trials.manifest.mass.unwrap_or(mass);
+    let mass = manifest.mass.unwrap_or(mass);
     let force = |axis: usize| {
         sum_on(axis, &trial.other_forces)?;
         let inertia = motion.acceleration.iter().zip(&motion.up).map(|(a, up)| a[axis] + GRAVITY * up[axis]);
@@ -69,7 +79,7 @@ pub(super) fn measurement(trials: &Trials, trial: &Trial, mass: f64) -> Result<M
 /// What a wrench that is inferred from the motion rests on, where the trials leave it open; `mass` is the one that is used [kg].
 pub(super) fn remarks(trials: &Trials, mass: f64) -> Vec<String> {
     let mut said = Vec::new();
-    if !trials.trials.iter().any(|trial| is_inferred_here(trials, trial)) {
+    if !trials.trials.iter().any(|trial| is_inferred_here(&trials.manifest, trial)) {
         return said;
     }
     if trials.manifest.mass.is_none() {
@@ -104,9 +114,8 @@ pub(super) fn is_inferred(manifest: &Manifest) -> bool {
 }
 
 /// True where the wrench is inferred from the trial's own motion; false where it was measured, or comes inferred.
-fn is_inferred_here(trials: &Trials, trial: &Trial) -> bool {
-    trials.manifest.measured.method == Some(Method::InverseDynamics)
-        && trial.measured.iter().all(Option::is_none)
+fn is_inferred_here(manifest: &Manifest, trial: &Trial) -> bool {
+    manifest.measured.method == Some(Method::InverseDynamics) && trial.measured.iter().all(Option::is_none)
 }
 
 /// Known forces on each component; 0 where no column acts on it.

@@ -60,7 +60,7 @@ pub(super) fn floors(
     let model = model_error(&naming.iter().map(|&trial| &all[trial]).collect::<Vec<_>>());
     std::array::from_fn(|component| {
         let name = WRENCH[component];
-        let stated = manifest.sensor_noise.get(name).copied();
+        let stated = manifest.sensor_noise.get(name).map(|std| std * noise_kept(all, naming));
         let offsets = naming.iter().map(|&trial| manifest.trial_offset_of(&all[trial].name, name));
         let offset = (offsets.map(|o| o * o).sum::<f64>() / naming.len().max(1) as f64).sqrt();
         let mut floor = Floor { sample: 0.0, offset, model: 0.0, source: FloorSource::HighFrequency };
@@ -77,6 +77,12 @@ pub(super) fn floors(
         floor.model = model[component];
         floor
     })
+}
+
+/// Share of the standard deviation of white noise that means of samples keep in some trials, root mean square.
+fn noise_kept(all: &[Series], trials: &[usize]) -> f64 {
+    let kept = trials.iter().map(|&trial| all[trial].averaged.recip());
+    (kept.sum::<f64>() / trials.len().max(1) as f64).sqrt()
 }
 
 /// Root mean square of what the model states of itself over the samples of some trials [N or N m]: those in states that it
@@ -146,23 +152,27 @@ fn repeats(all: &[Series], manifest: &Manifest, component: usize) -> Option<f64>
             for b in &group[index + 1..] {
                 let fast = 0.5 * (sample_noise(a, component).powi(2) + sample_noise(b, component).powi(2));
                 // a pair without noise says nothing about that of others
-                ratios.extend((fast > 0.0).then(|| half_difference(a, b, component) / fast));
+                let slow = half_difference(a, b, component).filter(|_| fast > 0.0);
+                ratios.extend(slow.map(|slow| slow / fast));
             }
         }
     }
     (!ratios.is_empty()).then(|| median(&mut ratios).sqrt())
 }
 
-fn half_difference(a: &Series, b: &Series, component: usize) -> f64 {
+/// Half the variance of the difference of two trials where both have samples; `None` where they never do.
+fn half_difference(a: &Series, b: &Series, component: usize) -> Option<f64> {
     let gap = |series: &Series| series.gap.iter().map(|gap| gap[component]).collect::<Vec<f64>>();
     let since: Vec<f64> = a.t.iter().map(|t| t - a.t[0] + b.t[0]).collect();
     let other = interpolate(&b.t, &gap(b), &since);
-    let last = b.t[b.t.len() - 1];
-    let differences: Vec<f64> =
-        gap(a).iter().zip(&other).zip(&since).filter(|(_, t)| **t <= last).map(|((a, b), _)| a - b).collect();
-    let mean = differences.iter().sum::<f64>() / differences.len().max(1) as f64;
-    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
-    0.5 * variance / differences.len().max(1) as f64
+    let pieces: Vec<[f64; 2]> = b.pieces().map(|piece| [b.t[piece.start], b.t[piece.end - 1]]).collect();
+    let in_both = |t: f64| pieces.iter().any(|[first, last]| (*first..=*last).contains(&t));
+    let pairs = gap(a).into_iter().zip(&other).zip(&since).filter(|(_, t)| in_both(**t));
+    let differences: Vec<f64> = pairs.map(|((a, b), _)| a - b).collect();
+    let count = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / count;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / count;
+    (!differences.is_empty()).then_some(0.5 * variance)
 }
 
 /// Noise of the rows, for weights: of bins by their own high-frequency part, of trials by what the manifest states.

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use super::measurement::{Measurement, Motion, is_computed, measurement, of_columns};
+use super::measurement::{Measurement, Motion, is_computed, measurement, of_columns, twin};
 use super::rates::{Coherence, mean_step, rates, smooth_rates, wetting_rate};
+use super::sampling::{MOST_SAMPLES, Sampled, Sampling, samplings};
 use super::{Asked, Config, GapError, Predicted};
 use wade_core::condition::{Condition, LEAST_UPRIGHT};
 use wade_core::effects::{Body, Immersion, Input};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::wrench::Wrench;
-use wade_learn::signal::pieces;
 use wade_learn::trials::{SimIs, Trial, Trials, WRENCH};
 
 /// Nothing wades where the water is as many times as deep as its hull is high.
@@ -57,6 +57,8 @@ pub(super) struct Series {
     pub runs: Vec<Range<usize>>,
     /// Width of the channel [m]; none in open water.
     pub channel_width: Option<f64>,
+    /// Recorded samples in the mean that stands for one.
+    pub averaged: f64,
 }
 
 impl Series {
@@ -114,8 +116,9 @@ pub(super) fn series(
     if let Some(trial) = used.iter().find(|trial| simulated(trial) != simulated(used[0])) {
         return Err(GapError::Predictions { trial: trial.name.clone(), other: used[0].name.clone() });
     }
-    for trial in used {
-        let (series, present) = of_trial(trials, trial, body, predict, config)?;
+    let sampled = samplings(&used, body, config.bin_s, MOST_SAMPLES);
+    for (trial, sampling) in used.into_iter().zip(sampled) {
+        let (series, present) = of_trial(trials, sampling.apply(trial), body, predict, config)?;
         if !present.contains(&true) {
             return Err(GapError::NothingMeasured { trial: trial.name.clone() });
         }
@@ -164,12 +167,14 @@ fn by_number<'a>(name: &'a str) -> Vec<(usize, &'a [u8])> {
 
 fn of_trial(
     trials: &Trials,
-    trial: &Trial,
+    Sampled { trial, pieces, bins, runs, averaged }: Sampled,
     body: &Body,
     predict: &mut dyn FnMut(&Asked<'_>) -> Predicted,
     config: &Config,
 ) -> Result<(Series, [bool; 6]), GapError> {
-    let Measurement { wrench: measured, motion, other } = measurement(trials, trial, body.mass)?;
+    let twin = twin(trials, &trial)?.map(|twin| Sampling::new(twin, body, config.bin_s).apply(twin).trial);
+    let Measurement { wrench: measured, motion, other } =
+        measurement(&trials.manifest, &trial, twin.as_deref(), body.mass)?;
     let simulated = trial.simulated.iter().any(Option::is_some);
     let mut present: [bool; 6] = std::array::from_fn(|c| measured[c].is_some());
     if simulated {
@@ -191,7 +196,6 @@ fn of_trial(
         immersion
     };
     let immersions = conditions.iter().map(immersion).collect();
-    let pieces = pieces(&trial.t);
     // the motion of a computed flow is prescribed: what changes within a sample is no noise
     let exact = is_computed(&trials.manifest);
     // before anything is smoothed, or noise would hang together as well
@@ -250,7 +254,6 @@ fn of_trial(
             _ => 0.0,
         })
     });
-    let (bins, runs) = bins(&trial.t, &pieces, config.bin_s);
     let series = Series {
         name: trial.name.clone(),
         gap: gap.collect(),
@@ -275,6 +278,7 @@ fn of_trial(
         outside,
         bins,
         runs,
+        averaged,
     };
     Ok((series, present))
 }
@@ -286,23 +290,6 @@ fn inertia(t: &[f64], pieces: &[Range<usize>], motion: &Motion) -> Vec<Vec3> {
     let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(moves(axis))));
     let of = |(acceleration, up): (&Vec3, &Vec3)| acceleration.component_mul(&accelerated) + up * GRAVITY;
     motion.acceleration.iter().zip(&motion.up).map(of).collect()
-}
-
-/// Bins of about `length` within each run without a hole; at least one sample each.
-fn bins(t: &[f64], pieces: &[Range<usize>], length: f64) -> (Vec<Range<usize>>, Vec<Range<usize>>) {
-    let (mut bins, mut runs) = (Vec::new(), Vec::new());
-    for piece in pieces {
-        let first = bins.len();
-        let mut start = piece.start;
-        while start < piece.end {
-            let end =
-                (start + 1..piece.end).find(|&i| t[i] - t[start] >= length * 0.999).unwrap_or(piece.end);
-            bins.push(start..end);
-            start = end;
-        }
-        runs.push(first..bins.len());
-    }
-    (bins, runs)
 }
 
 #[cfg(test)]

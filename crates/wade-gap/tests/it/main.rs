@@ -5,3 +5,4 @@
 mod planted;
 
 mod gap_recovery;
+mod sampling;

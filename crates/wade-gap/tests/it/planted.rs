@@ -51,15 +51,20 @@ pub fn gaussian(random: &mut Random) -> f64 {
 
 /// A run of trials: speeds in steps and ramps at three depths, some that turn, some that enter by a ramp.
 pub fn motions(count: usize, samples: usize, seed: u64) -> Vec<Vec<State>> {
+    motions_at(RATE, count, samples, seed)
+}
+
+/// The same motions at another rate [Hz].
+pub fn motions_at(rate: f64, count: usize, samples: usize, seed: u64) -> Vec<Vec<State>> {
     (0..count)
         .map(|index| {
             let mut random = Random::new(seed * 1000 + index as u64);
-            motion(index, samples, &mut random)
+            motion(index, rate, samples, &mut random)
         })
         .collect()
 }
 
-fn motion(index: usize, samples: usize, random: &mut Random) -> Vec<State> {
+fn motion(index: usize, sampled_at: f64, samples: usize, random: &mut Random) -> Vec<State> {
     let level = [0.1, 0.2, 0.25][index % 3];
     let turns = index % 4 == 1;
     let enters = index.is_multiple_of(2);
@@ -79,11 +84,11 @@ fn motion(index: usize, samples: usize, random: &mut Random) -> Vec<State> {
     let mut yaw = heading;
     (0..samples)
         .map(|i| {
-            let t = i as f64 / RATE;
+            let t = i as f64 / sampled_at;
             let w = Vec3::new(0.0, 0.0, yaw_rate(t));
             let v = Vec3::new(speed(t), side(t), -diff(&depth, t));
             let vd = Vec3::new(diff(&speed, t), diff(&side, t), 0.0);
-            yaw += w.z / RATE;
+            yaw += w.z / sampled_at;
             let al = Vec3::new(0.0, 0.0, diff(&yaw_rate, t));
             State { t, v, w, a: vd + w.cross(&v), al, depth: depth(t), depth_rate: diff(&depth, t), yaw }
         })
