@@ -17,6 +17,7 @@ mod evaluate;
 mod gap_apply;
 mod gap_bench;
 mod gap_cli;
+mod gap_served;
 mod grpc;
 mod http;
 mod import;
