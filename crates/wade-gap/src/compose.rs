@@ -10,8 +10,9 @@ use super::design::Design;
 use super::detect::{self, Excitation};
 use super::effects_file::remarks;
 use super::experiment::separating;
+use super::explanations::{Weighed, stated, suspected};
 use super::fit::{Fit, Parameter, fit};
-use super::holdout::{as_naming_saw_it, closures, explained, worse};
+use super::holdout::{Closure, as_naming_saw_it, closures, explained, worse};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
@@ -46,10 +47,15 @@ pub(super) fn compose(
     trials: &Trials,
     judge: &Judge,
     mut found: Found,
+    weighed: &[Weighed],
     held: Vec<usize>,
     library: &[Effect],
 ) -> Report {
     let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
+    let size = detect::sizes(all.iter(), judge.floors, setting, config);
+    if found.verdict == Verdict::NothingMissing && size.values().any(|size| size.above_floor) {
+        found.verdict = Verdict::NoCandidateFits;
+    }
     // nothing that does not fit is applied or shown as if it did
     let fits = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
     let fitted = if fits { fit(design, &found.members, all, setting, config) } else { None };
@@ -59,7 +65,7 @@ pub(super) fn compose(
     let mut held_out = closures_of(&named);
     let is_fault = found.members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
     let seen = held_out.get("all").map(|closure| as_naming_saw_it(*closure, &named, all, &held, judge));
-    let grows = held_out.get("all").and_then(|all| all.disproof(0.0, false));
+    let grows = disproved(&held_out, judge.floors);
     let disproof = seen.and_then(|closure| closure.disproof(config.coverage, is_fault)).or(grows);
     // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows; a fault is
     // exact or is none
@@ -103,16 +109,18 @@ pub(super) fn compose(
         );
     }
     said.extend(measurement::remarks(trials, setting.mass));
+    said.extend(sampled(trials, all));
     said.extend(outside(all));
     if !setting.computed {
         said.extend(plausible::remarks(all, &setting.components));
     }
     said.extend(remarks(&effects));
     said.extend(unpublished(&effects));
+    let explanations = stated(weighed);
     let unexplained = unexplained(judge, &found, disproof);
     let gap = GapReport {
         held_out,
-        size: detect::sizes(all.iter(), judge.floors, &setting.components, config),
+        size,
         shares: shares(judge, &found),
         floors: setting.components.iter().map(|&c| (WRENCH[c], judge.floors[c])).collect(),
         worse_regions: worse(&named, all, &held, setting, judge.floors, &regions),
@@ -127,6 +135,8 @@ pub(super) fn compose(
         rejected: rejected(judge, &found, library, holds),
         effects,
         alternatives,
+        suspected: suspected(&explanations, holds),
+        explanations,
         separating_experiment,
         not_testable,
         regions,
@@ -145,6 +155,23 @@ pub(super) fn compose(
     report
 }
 
+/// Share of the squared gap that effects explain of the trials kept back, where it grows with them or leaves far more than noise and
+/// the model's own error in a component that they act on.
+fn disproved(held_out: &BTreeMap<&'static str, Closure>, floors: &[Floor; 6]) -> Option<f64> {
+    /// Floors that may be left: a law that is there leaves some per cent, and a floor may be a fifth too low.
+    const LEFT: f64 = 2.0;
+    let all = held_out.get("all")?;
+    let share = all.explained();
+    let leaves = |(name, floor): (&&str, &Floor)| {
+        held_out.get(name).is_some_and(|of| {
+            let floor = of.noise_floor.hypot(floor.model);
+            (of.before.powi(2) - of.after.powi(2)).abs() > floor.powi(2) && of.after > LEFT * floor
+        })
+    };
+    let grows = all.closure.is_some_and(|closure| closure < 0.0);
+    (grows || WRENCH.iter().zip(floors).any(leaves)).then_some(share)
+}
+
 /// Values of which not even the interval reaches into the band of what is published.
 fn unpublished(effects: &[NamedEffect]) -> Vec<String> {
     let all = effects.iter().flat_map(|effect| effect.parameters.iter().map(move |of| (effect, of)));
@@ -157,6 +184,29 @@ fn unpublished(effects: &[NamedEffect]) -> Vec<String> {
         ))
     });
     beyond.collect()
+}
+
+/// How much of what was recorded the report rests on, where that is not every sample by itself.
+fn sampled(trials: &Trials, all: &[Series]) -> Option<String> {
+    let recorded: usize = all
+        .iter()
+        .filter_map(|series| trials.trials.iter().find(|trial| trial.name == series.name))
+        .map(|trial| trial.len())
+        .sum();
+    let used: usize = all.iter().map(|series| series.t.len()).sum();
+    let averaged = all.iter().map(|series| series.averaged).fold(1.0, f64::max);
+    let held: f64 = all.iter().map(|series| series.averaged * series.t.len() as f64).sum();
+    // windows at the ends of bins hold some samples more or less
+    let is_cut = held < 0.9 * recorded as f64;
+    match (averaged > 1.0, is_cut) {
+        (false, false) => None,
+        (true, false) => Some(format!(
+            "samples were averaged, up to {averaged:.0} in one: {used} means stand for {recorded} samples, and noise is that of the means"
+        )),
+        (_, true) => Some(format!(
+            "the trials are long: {used} samples or means of the start, the quickest changes and even distances of each trial stand for {recorded} samples"
+        )),
+    }
 }
 
 /// The trials in which the model answers for states that it did not learn.

@@ -35,7 +35,7 @@ pub struct GapSize {
     pub interval: [f64; 2],
     /// What noise alone would show.
     pub noise_floor: f64,
-    /// True where the interval lies above the floor.
+    /// True where the interval lies above the floor, and above all noise that a floor of its source may have missed.
     pub above_floor: bool,
 }
 
@@ -43,7 +43,7 @@ pub struct GapSize {
 pub(super) fn sizes<'a>(
     trials: impl Iterator<Item = &'a Series> + Clone,
     floors: &[Floor; 6],
-    components: &[usize],
+    setting: &Setting,
     config: &Config,
 ) -> BTreeMap<&'static str, GapSize> {
     let of = |&component: &usize| {
@@ -64,11 +64,17 @@ pub(super) fn sizes<'a>(
             .collect();
         let interval = [quantile(&mut draws.clone(), 0.05), quantile(&mut draws, 0.95)];
         let noise_floor = floors[component].with_model();
-        let size =
-            GapSize { rms: rms(&squares), interval, noise_floor, above_floor: interval[0] > noise_floor };
+        // a computed wrench has no noise that had to be estimated
+        let seen = if setting.computed { 1.0 } else { floors[component].source.least_seen() };
+        let size = GapSize {
+            rms: rms(&squares),
+            interval,
+            noise_floor,
+            above_floor: seen * interval[0] > noise_floor,
+        };
         (WRENCH[component], size)
     };
-    components.iter().map(of).collect()
+    setting.components.iter().map(of).collect()
 }
 
 /// What the trials say about one effect of the library, whether it is there or not.

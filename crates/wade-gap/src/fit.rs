@@ -24,7 +24,7 @@ const Z90: f64 = 1.645;
 const ENOUGH_TRIALS: f64 = 8.0;
 /// Share of a load of the water that its formula leaves open, one standard deviation: no law of the library holds to
 /// better than some per cent on a hull, and no number of trials shows it.
-const FORMULA: f64 = 0.05;
+pub(super) const FORMULA: f64 = 0.05;
 /// The same of a delay, whose shift in time is a difference over a few tenths of a second here.
 const DELAY: f64 = 0.02;
 /// Fewer trials than this, in effect: one condition.

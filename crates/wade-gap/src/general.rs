@@ -42,6 +42,8 @@ pub(super) struct Structure {
     pub loss: f64,
     /// The gain over its standard error from trial to trial.
     pub deviate: f64,
+    /// The gain in each trial.
+    pub gains: Vec<f64>,
     /// Functions that say most by themselves, with the share of the rows' squares.
     pub strongest: Vec<(String, f64)>,
 }
@@ -100,7 +102,7 @@ impl General {
         let count = used.len() as f64;
         let mean = used.iter().sum::<f64>() / count;
         let variance = used.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        let shares = &whole.shares;
+        let shares = whole.shares;
         let mut order: Vec<usize> = (0..shares.len()).collect();
         order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
         let squares = target.norm_squared().max(f64::MIN_POSITIVE);
@@ -110,6 +112,7 @@ impl General {
             gain: gain.max(0.0),
             loss: 0.5 * (whole.loss + target.norm_squared() - gain),
             deviate: mean / (variance / count).sqrt().max(f64::MIN_POSITIVE),
+            gains: whole.gains,
             strongest: strongest.map(|i| (self.columns[i].name.clone(), shares[i] / squares)).collect(),
         }
     }

@@ -44,6 +44,12 @@ pub struct Closure {
 }
 
 impl Closure {
+    /// Share of the squared gap above noise and the model's own error that is explained; of all components together, in floors.
+    pub(super) fn explained(&self) -> f64 {
+        let [before, after] = [self.before, self.after].map(|size| size * size);
+        (before - after) / (before - 1.0).max(f64::MIN_POSITIVE)
+    }
+
     /// Share of the squared gap above noise and the model's own error that is explained of all components, where what was named
     /// does not hold on trials that nobody looked at: less than `least` is explained and what is left is loud; or it names a
     /// fault of a sensor, which is exact, and closes too little even at the upper end of the interval.
@@ -52,8 +58,7 @@ impl Closure {
         const LOUD: f64 = 2.0;
         /// Closure that a fault must reach.
         const EXACT: f64 = 0.7;
-        let [before, after] = [self.before, self.after].map(|size| size * size);
-        let share = (before - after) / (before - 1.0).max(f64::MIN_POSITIVE);
+        let share = self.explained();
         let inexact = is_fault && self.interval.is_some_and(|[_, high]| high < EXACT);
         (inexact || self.after > LOUD && share < least).then_some(share)
     }

@@ -121,6 +121,16 @@ fn products(rows: &[f64], component: usize, width: usize) -> Products {
     Products { lags: std::array::from_fn(of), count: values.len() as f64 }
 }
 
+/// By how much rows count for less than independent ones: `sum rho` of a residual that has the rows of the design.
+pub(super) fn memory_of(design: &Design, residual: &DVector<f64>) -> f64 {
+    let width = design.rows.width;
+    let of = |rows: &std::ops::Range<usize>| -> Vec<Products> {
+        let rows = &residual.as_slice()[rows.clone()];
+        (0..width).map(|component| products(rows, component, width)).collect()
+    };
+    memory(&design.rows.of_trial.iter().map(of).collect::<Vec<_>>())
+}
+
 /// `sum rho` over the lags that noise may reach, of the middle one of all trials and components.
 fn memory(trials: &[Vec<Products>]) -> f64 {
     let of = |lag: usize| {

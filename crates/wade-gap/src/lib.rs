@@ -4,11 +4,11 @@
 //! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
 //!
 //! Reading order: `config`, `sampling`, `measurement`, `rates` and `series` (trials to samples with a gap), `plausible` (what
-//! cannot be), `noise` (the floor), `candidates` (the
-//! library as columns), `base_drag`, `split` (held-out trials, and folds), `design` (the regression), `robust` (errors that
-//! hold), `judge` (the gates), `select` and `rivals` (which effects), `shared` (noise of the motion in both), `nonlinear`,
-//! `general` and `lasting` (structure without a name), `features`, `gated`, `locate` and `carriers` (where), `verdict`, `fit`, `holdout`,
-//! `detect` (what would have shown), `experiment`, `report`, `compose`, `sentences`, `page` and `effects_file`; `run` calls them.
+//! cannot be), `noise` (the floor), `candidates` (the library as columns), `base_drag`, `split` (held-out trials, and folds),
+//! `design` (the regression), `robust` (errors that hold), `judge` (the gates), `select` and `rivals` (which effects), `shared`
+//! (noise of the motion in both), `nonlinear`, `general` and `lasting` (structure without a name), `features`, `gated`, `locate`
+//! and `carriers` (where), `verdict`, `explanations` (how probable each is), `fit`, `holdout`, `detect` (what would have shown),
+//! `experiment`, `report`, `compose`, `sentences`, `page` and `effects_file`; `run` calls them.
 
 #![allow(
     clippy::too_many_arguments,
@@ -26,6 +26,7 @@ mod detect;
 mod effects_file;
 mod error;
 mod experiment;
+mod explanations;
 mod features;
 mod fit;
 mod gated;
@@ -59,6 +60,7 @@ pub use config::Config;
 pub use detect::{Detectable, Excitation, GapSize};
 pub use effects_file::{NotApplicable, effects_file};
 pub use error::GapError;
+pub use explanations::{Explanation, NOTHING, OUTSIDE_LIBRARY};
 pub use fit::Parameter;
 pub use holdout::{Closure, Worse};
 pub use judge::Refusal;

@@ -7,7 +7,7 @@ use super::design::RowNoise;
 use super::rates::mean_step;
 use super::series::Series;
 use super::smoothing::Smoothing;
-use super::statistics::{median, noise_variance, white_variance};
+use super::statistics::{SEEN_OF_COLORED_NOISE, SEEN_OF_SLOW_NOISE, median, noise_variance, white_variance};
 use serde::Serialize;
 use wade_learn::signal::interpolate;
 use wade_learn::trials::{Manifest, WRENCH};
@@ -22,6 +22,17 @@ pub enum FloorSource {
     HighFrequency,
     /// Stated in `trials.toml`.
     Stated,
+}
+
+impl FloorSource {
+    /// Least share of the noise that a floor of this source holds. What changes quickly says little of a slow noise, and repeats and
+    /// stated figures hold all of it but for the error of an estimate.
+    pub(super) fn least_seen(self) -> f64 {
+        match self {
+            Self::HighFrequency => SEEN_OF_SLOW_NOISE,
+            Self::Repeats | Self::Stated => SEEN_OF_COLORED_NOISE,
+        }
+    }
 }
 
 /// The floor of one component, one standard deviation of a sample [N or N m].

@@ -42,6 +42,7 @@ impl Report {
             );
         }
         body += &shares(self);
+        body += &explanations(self);
         body += &effects(self);
         body += &held_out(self);
         body += &worst(self)?;
@@ -121,6 +122,25 @@ fn shares(report: &Report) -> String {
         let _ = writeln!(text, "<p>Left without a name: {}.</p>", escape(left));
     }
     text
+}
+
+fn explanations(report: &Report) -> String {
+    let rows = report.explanations.iter().map(|e| vec![prose(&e.in_words()), probability(e.probability)]);
+    let heads = [prose("explanation"), "probability".to_owned()];
+    format!(
+        "<h2>Explanations</h2>{}<p class=\"small\">By how well each predicts parts of the trials that its fit left out, over a \
+         Bayesian bootstrap of the trials. A name also has to pass every check below.</p>\n",
+        table(&[&heads[0], &heads[1]], NO_PAPER, rows)
+    )
+}
+
+/// A probability with two digits, or a bound where these would be 0.00 or 1.00.
+pub(super) fn probability(probability: f64) -> String {
+    match probability {
+        p if p < 0.005 => "below 0.01".to_owned(),
+        p if p > 0.995 => "above 0.99".to_owned(),
+        p => format!("{p:.2}"),
+    }
 }
 
 fn effects(report: &Report) -> String {
@@ -336,7 +356,7 @@ fn rivals(report: &Report) -> String {
     format!("<h2>Rejected alternatives</h2>{}", table(&heads, NO_PAPER, rows))
 }
 
-fn refusal(why: Refusal) -> &'static str {
+pub(super) fn refusal(why: Refusal) -> &'static str {
     match why {
         Refusal::NotSignificant => "not significant in addition to the named effects",
         Refusal::OutOfBounds => "physically impossible value",

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::detect::{Excitation, GapSize};
+use super::explanations::Explanation;
 use super::fit::Parameter;
 use super::holdout::{Closure, Worse};
 use super::judge::Refusal;
@@ -144,6 +145,10 @@ pub struct Report {
     pub effects: Vec<NamedEffect>,
     /// Sets of names that explain as much.
     pub alternatives: Vec<Vec<&'static str>>,
+    /// Explanations of the gap with their probabilities, the most probable first.
+    pub explanations: Vec<Explanation>,
+    /// Effects that probably act, though none is named; empty where the verdict names any.
+    pub suspected: Vec<&'static str>,
     /// Trial that tells the alternatives apart.
     pub separating_experiment: Option<String>,
     /// Effects that these trials could not have shown.

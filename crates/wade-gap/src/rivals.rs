@@ -205,6 +205,15 @@ impl Judge<'_> {
         Some(DVector::from_fn(design.y.len(), |row, _| of(row)))
     }
 
+    /// What a set leaves of each trial by the fits without the rows' folds.
+    pub fn losses(&self, set: &[Member]) -> Option<Vec<f64>> {
+        let predicted = self.predictions(set)?;
+        let of = |rows: &std::ops::Range<usize>| {
+            rows.clone().map(|row| (self.design.y[row] - predicted[row]).powi(2)).sum()
+        };
+        Some(self.design.rows.of_trial.iter().map(of).collect())
+    }
+
     fn effects(&self, set: &[Member]) -> Vec<Effect> {
         set.iter().map(|member| self.effect(member)).collect()
     }

@@ -5,6 +5,7 @@ use super::calibrate::calibrate;
 use super::candidates::{Setting, shapes, unavailable};
 use super::compose::compose;
 use super::design::{Design, Rows};
+use super::explanations::weigh;
 use super::general::General;
 use super::judge::Judge;
 use super::measurement::{is_computed, is_inferred};
@@ -94,8 +95,10 @@ pub fn run(
     // what stood in for a shape that was not yet right has no place any more
     let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
     members = judge.confirmed(&members);
-    let found = Found::of(&judge, &members, &library, &general, &gap_structure);
-    Ok(compose(trials, &judge, found, held, &library))
+    let mut found = Found::of(&judge, &members, &library, &general, &gap_structure);
+    let weighed = weigh(&judge, &found, &library);
+    found.heed(&weighed);
+    Ok(compose(trials, &judge, found, &weighed, held, &library))
 }
 
 /// Refuses trials kept back that repeat trials which are not.

@@ -1,10 +1,12 @@
 //! What was found, in sentences.
 
 use super::detect::GapSize;
+use super::explanations::{Explanation, NOTHING, OUTSIDE_LIBRARY};
 use super::gated::Gated;
 use super::judge::Judge;
 use super::locate;
 use super::noise::Floor;
+use super::page::{probability, refusal};
 use super::report::{NamedEffect, Report, Verdict};
 use super::verdict::{Found, STRUCTURE, Unfit};
 
@@ -47,6 +49,10 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
             Unfit::Imitates => {
                 format!("; the closest candidate is {names}, but one effect in a region explains more")
             }
+            Unfit::Unlikely(p) => format!(
+                "; the closest candidate is {names}, but that none of the library explains the gap is more probable ({})",
+                probability(p)
+            ),
             Unfit::Leaves => format!("; the closest candidate is {names}, but serial correlation remains"),
         };
     }
@@ -109,8 +115,49 @@ fn hidden(report: &Report) -> Option<String> {
     })
 }
 
+/// How near the next explanation was to the one that the verdict states, or what is suspected and why it is not named.
+fn nearest(report: &Report) -> String {
+    if !report.suspected.is_empty() {
+        let (names, p) =
+            (report.suspected.join(" and ").replace('_', " "), report.explanations[0].probability);
+        let why = report.suspected.iter().find_map(|name| {
+            report.rejected.iter().find(|rejected| rejected.name == *name).and_then(|rejected| rejected.why)
+        });
+        let why = why.map_or_else(String::new, |why| format!(": {}", refusal(why)));
+        return format!(
+            " {names} is suspected, with a probability of {}, but not named{why}.",
+            probability(p)
+        );
+    }
+    let mut stated: Vec<&str> = report.effects.iter().map(|effect| effect.name).collect();
+    stated.sort_unstable();
+    let is_stated = |explanation: &&Explanation| {
+        let mut names = explanation.effects.clone();
+        names.sort_unstable();
+        match report.verdict {
+            Verdict::NothingMissing => names == [NOTHING],
+            Verdict::NoCandidateFits => names == [OUTSIDE_LIBRARY],
+            _ => names == stated,
+        }
+    };
+    match report.explanations.iter().find(|explanation| !is_stated(explanation)) {
+        Some(next) => format!(
+            " The nearest other explanation, {}, has a probability of {}.",
+            next.in_words(),
+            probability(next.probability)
+        ),
+        None => String::new(),
+    }
+}
+
 /// The verdict.
 pub(super) fn summary(report: &Report, gated: Option<Gated>) -> String {
+    let mut text = verdict(report, gated);
+    text.push_str(&nearest(report));
+    text
+}
+
+fn verdict(report: &Report, gated: Option<Gated>) -> String {
     let names = |effects: &[NamedEffect]| {
         effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
     };

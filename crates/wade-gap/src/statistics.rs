@@ -37,6 +37,14 @@ pub(super) fn quiet_white_variance(values: &[f64]) -> f64 {
     median(&mut squares.collect::<Vec<_>>()) / (20.0 * MEDIAN)
 }
 
+/// Least share of the standard deviation of colored noise that [`noise_variance`] sees: that of a mean of five samples, whose
+/// spectrum is steep, in the limit of many samples.
+pub(super) const SEEN_OF_COLORED_NOISE: f64 = 0.82;
+
+/// The same of the slowest noise that sensors have, an Ornstein-Uhlenbeck process with a correlation time of half a second, where
+/// the octaves end at 0.08 s.
+pub(super) const SEEN_OF_SLOW_NOISE: f64 = 0.25;
+
 /// Variance of noise on an otherwise smooth signal, be it colored down to `2^scales` samples: motion that is filtered before
 /// something is predicted from it leaves noise in which neighbors agree, and [`white_variance`] hardly sees that.
 ///
@@ -139,6 +147,27 @@ mod tests {
     }
 
     #[test]
+    fn of_noise_that_is_correlated_for_half_a_second_a_quarter_is_seen() {
+        for (rate, scales) in [(37.0, 1), (100.0, 3), (400.0, 5)] {
+            let mut random = wade_learn::random::Random::new(3);
+            let kept = f64::exp(-2.0 / rate);
+            let mut state = 0.0;
+            let values: Vec<f64> = (0..200_000)
+                .map(|_| {
+                    let white = (random.unit() - 0.5) * 12_f64.sqrt();
+                    state = kept * state + (1.0 - kept * kept).sqrt() * white;
+                    state
+                })
+                .collect();
+            let seen = noise_variance(&values, scales).sqrt();
+            assert!(
+                (SEEN_OF_SLOW_NOISE - 0.05..SEEN_OF_SLOW_NOISE + 0.05).contains(&seen),
+                "{rate} Hz: {seen}"
+            );
+        }
+    }
+
+    #[test]
     fn noise_that_a_filter_has_colored_keeps_its_size() {
         // the mean of five, as a filter of motion leaves it, on a slow wave
         let mut random = wade_learn::random::Random::new(2);
@@ -150,6 +179,6 @@ mod tests {
         assert!(white_variance(&values).sqrt() < 0.6 * exact);
         // in the limit of many samples 0.848: w_0 to w_3 of a mean of five by their autocovariances
         let colored = noise_variance(&values, 3).sqrt() / exact;
-        assert!((0.82..0.88).contains(&colored), "{colored}");
+        assert!((SEEN_OF_COLORED_NOISE..0.88).contains(&colored), "{colored}");
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::design::Design;
 use super::detect::sizes;
+use super::explanations::Weighed;
 use super::features::{energy, without_zeros};
 use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
@@ -68,6 +69,8 @@ pub(super) enum Unfit {
     Imitates,
     /// Much of what lasts is still there.
     Leaves,
+    /// That nothing of the library explains the gap is more probable, with this probability.
+    Unlikely(f64),
 }
 
 impl Found {
@@ -121,6 +124,28 @@ impl Found {
         let of_gap = gap_structure.clone();
         Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, of_gap, loss, unfit }
     }
+
+    /// Names nothing against the weight of the evidence: explanations that are clearly more probable stand beside what was found, and
+    /// where one of them is none of the library, it is not named.
+    pub fn heed(&mut self, weighed: &[Weighed]) {
+        /// Odds from which evidence is substantial (Jeffreys, Theory of Probability, appendix B).
+        const SUBSTANTIAL: f64 = 3.162;
+        let Some(own) = weighed.iter().find(|weighed| weighed.set == self.members) else { return };
+        let least = SUBSTANTIAL * own.explanation.probability;
+        let before: Vec<&Weighed> =
+            weighed.iter().filter(|weighed| weighed.explanation.probability > least).collect();
+        if before.is_empty() || self.verdict != Verdict::Named {
+            return;
+        }
+        if let Some(first) = before.iter().find(|weighed| !weighed.explanation.is_of_library()) {
+            self.verdict = Verdict::NoCandidateFits;
+            self.unfit = Some(Unfit::Unlikely(first.explanation.probability));
+            self.left = self.of_gap.clone();
+        } else {
+            self.verdict = Verdict::Ambiguous;
+            self.alternatives = before.iter().map(|weighed| weighed.set.clone()).collect();
+        }
+    }
 }
 
 /// True where much of what lasts of the gap is still there after the named effects, beyond what the zeros of the trials leave: a
@@ -158,8 +183,7 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     let moving = lasting(design, &without_zeros(design, &design.y));
     // a load that was computed has no noise that hangs together and could pass for a gap
     let naming = design.trials.iter().map(|&trial| &all[trial]);
-    let above =
-        || sizes(naming.clone(), judge.floors, &setting.components, config).values().any(|s| s.above_floor);
+    let above = || sizes(naming.clone(), judge.floors, setting, config).values().any(|s| s.above_floor);
     setting.computed && above()
         || structure.deviate > STRUCTURE && size > least
         || deviate > bar && energy > 2.0 * least.max(0.5)

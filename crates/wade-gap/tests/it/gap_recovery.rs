@@ -3,7 +3,9 @@
 //!
 //! Effects are planted by formulas of `common/planted.rs`, on a box with another simulator's prediction.
 
-use crate::planted::{self, Noise, State, gaussian, motions, planted as plant, pushes, rms, trials};
+use crate::planted::{
+    self, Noise, State, gaussian, motions, planted as plant, pushes, rms, run_with, trials,
+};
 use wade_core::effects::Effect;
 use wade_core::frame::Vec3;
 use wade_core::wrench::Wrench;
@@ -36,11 +38,6 @@ fn with(names: &[&str], strength: f64, seed: u64) -> (Trials, Vec<f64>) {
 
 fn run(trials: &Trials) -> Report {
     run_with(trials, &Config::default())
-}
-
-fn run_with(trials: &Trials, config: &Config) -> Report {
-    let body = wade_gap::body_of(trials).expect("a body");
-    wade_gap::run(trials, &body, &mut |_| Predicted::default(), config).expect("runs")
 }
 
 fn names(report: &Report) -> Vec<&'static str> {
@@ -357,7 +354,9 @@ fn run_outside(mut trials: Trials, deepest: f64) -> Report {
         let wrench = Wrench { force: Vec3::new(fx, fy, fz), moment: Vec3::new(mx, my, mz) };
         Predicted { wrench, uncertainty: NOISE.map(|noise| 6.0 * noise), outside: condition.depth > deepest }
     };
-    wade_gap::run(&trials, &body, &mut model, &Config::default()).expect("runs")
+    let report = wade_gap::run(&trials, &body, &mut model, &Config::default()).expect("runs");
+    planted::check(&report);
+    report
 }
 
 #[test]
@@ -583,7 +582,14 @@ fn where_nothing_is_missing_nothing_is_named() {
         let nothing: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
         let noise = Noise { colored, offset, ..Noise::white(NOISE) };
         let report = run(&trials(&motions, &nothing, &noise, seed));
-        assert_eq!(report.verdict, Verdict::NothingMissing, "{}", report.summary);
+        assert_eq!(
+            report.verdict,
+            Verdict::NothingMissing,
+            "{} {:?} {:?}",
+            report.summary,
+            report.gap.size,
+            report.gap.floors
+        );
         assert!(report.effects.is_empty() && report.regions.is_empty());
         let smallest = report.excitation.iter().find(|e| e.name == "added_mass").expect("looked for");
         assert!(smallest.minimum_detectable["surge"].value < 0.1, "{smallest:?}");

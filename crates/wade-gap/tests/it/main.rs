@@ -4,5 +4,6 @@
 
 mod planted;
 
+mod explanations;
 mod gap_recovery;
 mod sampling;

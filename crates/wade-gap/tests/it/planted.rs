@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use wade_core::frame::Vec3;
+use wade_gap::{Config, NOTHING, OUTSIDE_LIBRARY, Predicted, Report, Verdict};
 use wade_learn::random::Random;
 use wade_learn::trials::{Body, Manifest, Measured, Method, StillWater, Trial, Trials};
 
@@ -338,4 +339,42 @@ pub fn planted(name: &str, motion: &[State]) -> Vec<[f64; 6]> {
         }
     }
     out
+}
+
+/// The report on trials with another simulator's prediction.
+pub fn run_with(trials: &Trials, config: &Config) -> Report {
+    let body = wade_gap::body_of(trials).expect("a body");
+    let report = wade_gap::run(trials, &body, &mut |_| Predicted::default(), config).expect("runs");
+    check(&report);
+    report
+}
+
+/// What must hold of every report, from the numbers that it states: a verdict that they contradict is none.
+pub fn check(report: &Report) {
+    let said = &report.summary;
+    let (gap, named) = (&report.gap, report.verdict == Verdict::Named);
+    if report.verdict == Verdict::NothingMissing {
+        assert!(gap.size.values().all(|size| !size.above_floor), "{said} {:?}", gap.size);
+    }
+    if named {
+        let names: Vec<&str> = report.effects.iter().map(|effect| effect.name).collect();
+        let own = report.explanations.iter().find(|e| e.effects == names).map_or(0.0, |e| e.probability);
+        assert!(report.explanations[0].probability <= 3.162 * own, "{said} {:?}", report.explanations);
+        assert!(gap.held_out["all"].closure.is_none_or(|closure| closure >= 0.0), "{said}");
+        for (name, held) in gap.held_out.iter().filter(|(name, _)| **name != "all") {
+            let floor = held.noise_floor.hypot(gap.floors[name].model);
+            let acts = (held.before.powi(2) - held.after.powi(2)).abs() > floor.powi(2);
+            assert!(!acts || held.after <= 2.0 * floor, "{said} {name}: {held:?}, {floor}");
+        }
+    }
+    let all = &report.explanations;
+    assert!(all.is_sorted_by(|a, b| a.probability >= b.probability), "{all:?}");
+    assert!(all.iter().map(|e| e.probability).sum::<f64>() < 1.0 + 1e-9, "{all:?}");
+    for name in [NOTHING, OUTSIDE_LIBRARY] {
+        assert_eq!(all.iter().filter(|e| e.effects == [name]).count(), 1, "{name}: {all:?}");
+    }
+    let holds = matches!(report.verdict, Verdict::Named | Verdict::Ambiguous);
+    assert_eq!(report.effects.is_empty(), !holds, "{said}");
+    assert!(report.suspected.is_empty() || !holds, "{said}");
+    assert!(!said.contains("explains 0 %"), "{said}");
 }

@@ -43,6 +43,8 @@ fn means_of_fast_samples_name_the_effect_that_the_samples_name_with_the_same_num
     let rows = |trials: &Trials| trials.trials.iter().map(Trial::len).sum::<usize>();
     assert_eq!(full.samples, rows(&slow), "the control is not averaged");
     assert!(averaged.samples * 8 < rows(&fast), "{} of {}", averaged.samples, rows(&fast));
+    let says = |report: &Report| report.remarks.iter().any(|remark| remark.contains("samples were averaged"));
+    assert!(says(&averaged) && !says(&full), "{:?}", averaged.remarks);
     let (own, control) = (surge(&averaged), surge(&full));
     for (name, found) in [("means", own), ("samples", control)] {
         let [low, high] = found.interval;

@@ -1,0 +1,201 @@
+//! How probable each explanation of a gap is.
+//!
+//! An explanation is a set of effects, `nothing`, or a load that is in no library, for which smooth functions of the state stand.
+//! Its weight is how well it predicts blocks of trials that its fit left out, averaged over a Bayesian bootstrap of the trials, so
+//! that what one trial alone decides is not certain (pseudo-BMA+; Yao, Vehtari, Simpson, Gelman, Bayesian Analysis 13, 2018).
+//! Rows that are correlated count for less (Bartlett, J. Roy. Stat. Soc. Suppl. 1946), and so does all that a law may be off by.
+//! Every number that was fitted is charged (Schwarz, Annals of Statistics 6, 1978). Before the trials, nothing, an unknown load,
+//! and one, two and three effects are equally probable, and so are all sets of a size and all forms of a law.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::fit::FORMULA;
+use super::judge::{Judge, Member};
+use super::lasting::memory_of;
+use super::verdict::Found;
+use wade_core::effects::Effect;
+use wade_learn::random::Random;
+
+/// Name of the explanation that the gap is noise and the model's stated error.
+pub const NOTHING: &str = "nothing";
+/// Name of the explanation that what is missing is in no library.
+pub const OUTSIDE_LIBRARY: &str = "outside_library";
+
+/// Probability below which an explanation is not worth a line.
+const LEAST: f64 = 0.001;
+/// Lines of a report.
+const MOST: usize = 10;
+
+/// One explanation of a gap.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Explanation {
+    /// Names of its effects; or `nothing`, or `outside_library`.
+    pub effects: Vec<&'static str>,
+    /// Probability among all explanations that were weighed.
+    pub probability: f64,
+}
+
+impl Explanation {
+    /// True for a set of effects of the library.
+    pub fn is_of_library(&self) -> bool {
+        self.effects != [NOTHING] && self.effects != [OUTSIDE_LIBRARY]
+    }
+
+    /// For people.
+    pub(super) fn in_words(&self) -> String {
+        match self.effects[..] {
+            [NOTHING] => "nothing missing".to_owned(),
+            [OUTSIDE_LIBRARY] => "a load outside the library".to_owned(),
+            _ => self.effects.join(" and ").replace('_', " "),
+        }
+    }
+}
+
+/// The effects that probably act though none is named: those of the most probable explanation, where it is more probable than all
+/// others together.
+pub(super) fn suspected(explanations: &[Explanation], is_named: bool) -> Vec<&'static str> {
+    let first = explanations.first().filter(|first| first.is_of_library() && first.probability > 0.5);
+    first.filter(|_| !is_named).map_or_else(Vec::new, |first| first.effects.clone())
+}
+
+/// An explanation with what its weight rests on.
+pub(super) struct Weighed {
+    pub explanation: Explanation,
+    /// Its effects as they were fitted.
+    pub set: Vec<Member>,
+    /// Sum of the squares of each trial's rows, by fits without their blocks.
+    losses: Vec<f64>,
+    log_prior: f64,
+    /// How many numbers were fitted.
+    numbers: usize,
+}
+
+/// Numbers that an unknown load has in each component: its size, and how it depends on the state.
+const NUMBERS_OUTSIDE: usize = 2;
+
+/// The explanations, the most probable first.
+pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Weighed> {
+    let design = judge.design;
+    let of = |name, losses, numbers| {
+        let explanation = Explanation { effects: vec![name], probability: 0.0 };
+        Weighed { explanation, set: Vec::new(), losses, log_prior: 0.0, numbers }
+    };
+    let rows = design.rows.of_trial.iter().map(|rows| &design.y.as_slice()[rows.clone()]);
+    let nothing: Vec<f64> = rows.map(|y| y.iter().map(|y| y * y).sum()).collect();
+    let trials = design.trials.iter().zip(&nothing);
+    let outside = trials.map(|(&trial, loss)| loss - found.of_gap.gains[trial]).collect();
+    let mut all =
+        vec![of(NOTHING, nothing, 0), of(OUTSIDE_LIBRARY, outside, NUMBERS_OUTSIDE * design.rows.width)];
+    let mut sets: BTreeMap<Vec<Effect>, Weighed> = BTreeMap::new();
+    for set in sets_to_weigh(judge, found, library) {
+        let Some(losses) = judge.losses(&set) else { continue };
+        let mut effects: Vec<Effect> = set.iter().map(|member| judge.effect(member)).collect();
+        effects.sort();
+        let whole = |losses: &[f64]| losses.iter().sum::<f64>();
+        if sets.get(&effects).is_some_and(|known| whole(&known.losses) <= whole(&losses)) {
+            continue;
+        }
+        let names = effects.iter().map(|effect| effect.name()).collect();
+        let weighed = Weighed {
+            explanation: Explanation { effects: names, probability: 0.0 },
+            log_prior: log_prior(judge, &effects, library),
+            numbers: judge.columns(&set).len(),
+            set,
+            losses,
+        };
+        sets.insert(effects, weighed);
+    }
+    all.extend(sets.into_values());
+    let probabilities = weights(&all, judge, found);
+    for (weighed, probability) in all.iter_mut().zip(probabilities) {
+        weighed.explanation.probability = probability;
+    }
+    all.sort_by(|a, b| {
+        let (a, b) = (&a.explanation, &b.explanation);
+        b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects))
+    });
+    all
+}
+
+/// Logarithm of the probability of a set before the trials, over that of nothing: all sets of a size are alike, and so are all
+/// forms of a law.
+fn log_prior(judge: &Judge, effects: &[Effect], library: &[Effect]) -> f64 {
+    let forms = |effect: &Effect| {
+        judge.design.candidates.iter().filter(|candidate| candidate.effect == *effect).count().max(1) as f64
+    };
+    let sets = (0..effects.len()).map(|i| library.len().saturating_sub(i).max(1) as f64 / (i + 1) as f64);
+    -sets.product::<f64>().ln() - effects.iter().map(forms).product::<f64>().ln()
+}
+
+/// Those that a report states: the first ones, nothing, and a load outside the library.
+pub(super) fn stated(weighed: &[Weighed]) -> Vec<Explanation> {
+    let is_stated = |(rank, e): (usize, &Explanation)| {
+        !e.is_of_library() || rank == 0 || rank < MOST && e.probability >= LEAST
+    };
+    let all = weighed.iter().map(|weighed| &weighed.explanation).enumerate();
+    all.filter(|entry| is_stated(*entry)).map(|(_, explanation)| explanation.clone()).collect()
+}
+
+/// The set that was found, those that explain as much, each effect alone, and each of the named set taken out, exchanged or joined
+/// by another.
+fn sets_to_weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Vec<Member>> {
+    let mut sets: Vec<Vec<Member>> = found.alternatives.clone();
+    let beside = |set: &[Member], effect: Effect| -> Option<Vec<Member>> {
+        if judge.taken(set, effect) {
+            return None;
+        }
+        let mut set = set.to_vec();
+        set.push(judge.judge(&set, effect)?.member);
+        Some(set)
+    };
+    sets.extend(library.iter().filter_map(|&effect| beside(&[], effect)));
+    if found.members.is_empty() {
+        return sets;
+    }
+    sets.push(found.members.clone());
+    sets.extend(library.iter().filter_map(|&effect| beside(&found.members, effect)));
+    for out in 0..found.members.len() {
+        let mut others = found.members.clone();
+        others.remove(out);
+        if !others.is_empty() {
+            sets.extend(library.iter().filter_map(|&effect| beside(&others, effect)));
+            sets.push(others);
+        }
+    }
+    sets
+}
+
+/// Weights of explanations over a Bayesian bootstrap of the trials (Rubin, Annals of Statistics 9, 1981).
+fn weights(all: &[Weighed], judge: &Judge, found: &Found) -> Vec<f64> {
+    let design = judge.design;
+    let rows = design.y.len().max(1) as f64;
+    let least = all.iter().map(|weighed| weighed.losses.iter().sum::<f64>()).fold(f64::INFINITY, f64::min);
+    // what the best explanation leaves is noise, and rows that are correlated say the same several times; what a law leaves
+    // open of all that is explained is one number more, since it is off in the same way everywhere
+    let memory = memory_of(design, &found.residual);
+    let variance = (least / rows).max(f64::MIN_POSITIVE) * memory;
+    let variance = variance + FORMULA.powi(2) * (design.empty_loss() - least).max(0.0);
+    // of a number, by Schwarz's criterion
+    let price = 0.5 * (rows / memory).max(1.0).ln();
+    let trials = design.trials.len();
+    let mut random = Random::new(judge.config.seed ^ 0xb0a7);
+    let mut sums = vec![0.0; all.len()];
+    for _ in 0..judge.config.bootstrap {
+        // a flat Dirichlet variable: exponential ones over their sum
+        let shares: Vec<f64> = (0..trials).map(|_| -(1.0 - random.unit()).ln()).collect();
+        let whole = shares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let log = |weighed: &Weighed| {
+            let loss: f64 = weighed.losses.iter().zip(&shares).map(|(loss, share)| loss * share).sum();
+            weighed.log_prior - 0.5 * loss * trials as f64 / whole / variance - price * weighed.numbers as f64
+        };
+        let logs: Vec<f64> = all.iter().map(log).collect();
+        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let likelihoods: Vec<f64> = logs.iter().map(|log| (log - most).exp()).collect();
+        let sum: f64 = likelihoods.iter().sum();
+        sums.iter_mut().zip(&likelihoods).for_each(|(total, likelihood)| *total += likelihood / sum);
+    }
+    sums.iter_mut().for_each(|sum| *sum /= judge.config.bootstrap as f64);
+    sums
+}
