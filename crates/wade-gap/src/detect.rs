@@ -7,12 +7,13 @@ use serde::Serialize;
 
 use super::candidates::{Column, Setting, columns, unavailable};
 use super::design::Design;
+use super::noise::{Floor, left_out};
 use super::rates::mean_square;
 use super::robust::errors;
 use super::series::Series;
 use super::smoothing::bins;
 use super::statistics::{median, quantile, white_variance};
-use super::{Config, Named, noise::Floor};
+use super::{Config, Named};
 use wade_core::effects::{Effect, Rate, Shape};
 use wade_learn::random::Random;
 use wade_learn::trials::{Manifest, WRENCH};
@@ -66,12 +67,9 @@ pub(super) fn sizes<'a>(
         let noise_floor = floors[component].with_model();
         // a computed wrench has no noise that had to be estimated
         let seen = if setting.computed { 1.0 } else { floors[component].source.least_seen() };
-        let size = GapSize {
-            rms: rms(&squares),
-            interval,
-            noise_floor,
-            above_floor: seen * interval[0] > noise_floor,
-        };
+        let noise = noise_floor.hypot(left_out(trials.clone(), floors[component].source, component));
+        let above_floor = seen * interval[0] > noise;
+        let size = GapSize { rms: rms(&squares), interval, noise_floor, above_floor };
         (WRENCH[component], size)
     };
     setting.components.iter().map(of).collect()

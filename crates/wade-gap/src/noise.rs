@@ -109,10 +109,31 @@ fn model_error(trials: &[&Series]) -> [f64; 6] {
 }
 
 fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {
+    pooled(all, |series| sample_noise(series, component))
+}
+
+/// Noise of a sample that a floor of its source leaves out [N or N m]: stated figures are those of the sensor, and a prediction
+/// for a noisy motion is noisy as well.
+pub(super) fn left_out<'a>(
+    all: impl Iterator<Item = &'a Series>,
+    source: FloorSource,
+    component: usize,
+) -> f64 {
+    match source {
+        FloorSource::Stated => pooled(all, |series| {
+            let values: Vec<f64> = series.predicted.iter().map(|wrench| wrench[component]).collect();
+            noise_variance(&values, scales(&series.t)).sqrt()
+        }),
+        FloorSource::Repeats | FloorSource::HighFrequency => 0.0,
+    }
+}
+
+/// Root mean square over the samples of some trials of a noise of each.
+fn pooled<'a>(all: impl Iterator<Item = &'a Series>, noise: impl Fn(&Series) -> f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for series in all {
         let samples = series.t.len() as f64;
-        sum += sample_noise(series, component).powi(2) * samples;
+        sum += noise(series).powi(2) * samples;
         count += samples;
     }
     (sum / f64::max(count, 1.0)).sqrt()
