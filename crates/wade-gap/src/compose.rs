@@ -155,7 +155,7 @@ pub(super) fn compose(
     report
 }
 
-/// Share of the squared gap that effects explain of the trials kept back, where it grows with them or leaves far more than noise and
+/// Share of the squared gap that effects explain of the held-out trials, where it grows with them or leaves far more than noise and
 /// the model's own error in a component that they act on.
 fn disproved(held_out: &BTreeMap<&'static str, Closure>, floors: &[Floor; 6]) -> Option<f64> {
     /// Floors that may be left: a law that is there leaves some per cent, and a floor may be a fifth too low.
