@@ -160,12 +160,15 @@ pub(super) fn compose(
 fn disproved(held_out: &BTreeMap<&'static str, Closure>, floors: &[Floor; 6]) -> Option<f64> {
     /// Floors that may be left: a law that is there leaves some per cent, and a floor may be a fifth too low.
     const LEFT: f64 = 2.0;
+    /// Share of the squared gap that a law may leave: formulas of one effect differ by as much.
+    const OFF: f64 = 0.2;
     let all = held_out.get("all")?;
     let share = all.explained();
     let leaves = |(name, floor): (&&str, &Floor)| {
         held_out.get(name).is_some_and(|of| {
             let floor = of.noise_floor.hypot(floor.model);
-            (of.before.powi(2) - of.after.powi(2)).abs() > floor.powi(2) && of.after > LEFT * floor
+            let [before, after] = [of.before, of.after].map(|size| size * size);
+            (before - after).abs() > floor.powi(2) && of.after > LEFT * floor && after > OFF * before
         })
     };
     let grows = all.closure.is_some_and(|closure| closure < 0.0);
