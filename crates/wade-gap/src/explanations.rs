@@ -5,7 +5,7 @@
 //! that what one trial alone decides is not certain (pseudo-BMA+; Yao, Vehtari, Simpson, Gelman, Bayesian Analysis 13, 2018).
 //! Rows that are correlated count for less (Bartlett, J. Roy. Stat. Soc. Suppl. 1946), and so does all that a law may be off by.
 //! Every number that was fitted is charged (Schwarz, Annals of Statistics 6, 1978). Before the trials, nothing, an unknown load,
-//! and one, two and three effects are equally probable, and so are all sets of a size and all forms of a law.
+//! and each number of effects are equally probable, and so are all sets of a size and all forms of a law.
 
 use std::collections::BTreeMap;
 

@@ -45,16 +45,7 @@ struct Products {
 
 /// What lasts of a target that has the rows of the design.
 pub(super) fn lasting(design: &Design, target: &DVector<f64>) -> Lasting {
-    let width = design.rows.width;
-    let trials: Vec<Vec<Products>> = design
-        .rows
-        .of_trial
-        .iter()
-        .map(|rows| {
-            let rows = &target.as_slice()[rows.clone()];
-            (0..width).map(|component| products(rows, component, width)).collect()
-        })
-        .collect();
+    let trials = products_of_trials(design, target);
     let memory = memory(&trials);
     let mut most = Size { deviate: 0.0, rms: 0.0 };
     let (mut together, mut energy) = (most, 0.0_f64);
@@ -123,12 +114,17 @@ fn products(rows: &[f64], component: usize, width: usize) -> Products {
 
 /// By how much rows count for less than independent ones: `sum rho` of a residual that has the rows of the design.
 pub(super) fn memory_of(design: &Design, residual: &DVector<f64>) -> f64 {
+    memory(&products_of_trials(design, residual))
+}
+
+/// Products of each component of each trial.
+fn products_of_trials(design: &Design, target: &DVector<f64>) -> Vec<Vec<Products>> {
     let width = design.rows.width;
-    let of = |rows: &std::ops::Range<usize>| -> Vec<Products> {
-        let rows = &residual.as_slice()[rows.clone()];
+    let of = |rows: &std::ops::Range<usize>| {
+        let rows = &target.as_slice()[rows.clone()];
         (0..width).map(|component| products(rows, component, width)).collect()
     };
-    memory(&design.rows.of_trial.iter().map(of).collect::<Vec<_>>())
+    design.rows.of_trial.iter().map(of).collect()
 }
 
 /// `sum rho` over the lags that noise may reach, of the middle one of all trials and components.

@@ -1,7 +1,7 @@
 //! Promise: means of fast samples say of an effect what the samples say, a short event keeps its bins, and a model is asked
 //! about the means alone.
 
-use crate::planted::{DRAFT, Noise, RHO, State, VOLUME, motions_at, planted as plant, rms, trials};
+use crate::planted::{DRAFT, Noise, RHO, State, VOLUME, motions_at, planted as plant, rms, run_with, trials};
 use wade_core::wrench::Wrench;
 use wade_gap::{Config, Parameter, Predicted, Report};
 use wade_learn::trials::{Trial, Trials};
@@ -18,8 +18,7 @@ fn damped(rate: f64, count: usize) -> (Trials, f64) {
 }
 
 fn run(trials: &Trials) -> Report {
-    let body = wade_gap::body_of(trials).expect("a body");
-    wade_gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).expect("runs")
+    run_with(trials, &Config::default())
 }
 
 /// Every so many samples of a trial, each as it was recorded.
