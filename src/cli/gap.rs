@@ -235,6 +235,7 @@ impl Source {
         let report = if has_bundle {
             let model = library.model(vehicle, Isa::available()[0])?;
             let body = Body::of_vehicle(model.vehicle());
+            let config = if is_anothers(&trials) { config } else { config.predicted_by(self.physics.into()) };
             wade_gap::run(&trials, &body, &mut predictor(&model, self.physics.into()), &config)
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));

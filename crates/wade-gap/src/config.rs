@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::GapError;
 use wade_core::condition::GroundContact;
 use wade_core::effects::Effect;
+use wade_core::physics::Physics;
 
 /// How to look, and what must hold before something is named.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,6 +15,8 @@ pub struct Config {
     pub ground_contact: GroundContact,
     /// Effects that are looked for, by name; the whole library unless said otherwise.
     pub library: Vec<Effect>,
+    /// Effects that the prediction is known to leave out, by name: before the trials they are as likely there as not.
+    pub absent: Vec<Effect>,
     /// Seed of everything random.
     pub seed: u64,
     /// Length of a bin, over which samples are averaged [s].
@@ -49,6 +52,7 @@ impl Default for Config {
         Self {
             ground_contact: GroundContact::Wetted,
             library: Effect::ALL.to_vec(),
+            absent: Vec::new(),
             seed: 1,
             bin_s: 0.1,
             block_s: 1.5,
@@ -68,6 +72,18 @@ impl Default for Config {
 }
 
 impl Config {
+    /// The same for a prediction with a part of the base alone, which leaves out what the rest of it holds.
+    pub fn predicted_by(mut self, physics: Physics) -> Self {
+        let moving = [Effect::AddedMass, Effect::WaveMemory];
+        let steady = [Effect::DragCoefficientError, Effect::LinearDamping];
+        match physics {
+            Physics::Full => {}
+            Physics::QuasiSteady => self.absent.extend(moving),
+            Physics::Hydrostatic => self.absent.extend(moving.into_iter().chain(steady)),
+        }
+        self
+    }
+
     /// Refuses numbers that make no sense, and counts that nobody could wait for.
     pub fn check(&self) -> Result<(), GapError> {
         let positive = [("bin_s", self.bin_s), ("block_s", self.block_s)];

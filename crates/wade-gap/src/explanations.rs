@@ -5,7 +5,8 @@
 //! that what one trial alone decides is not certain (pseudo-BMA+; Yao, Vehtari, Simpson, Gelman, Bayesian Analysis 13, 2018).
 //! Rows that are correlated count for less (Bartlett, J. Roy. Stat. Soc. Suppl. 1946), and so does all that a law may be off by.
 //! Every number that was fitted is charged (Schwarz, Annals of Statistics 6, 1978). Before the trials, nothing, an unknown load,
-//! and each number of effects are equally probable, and so are all sets of a size and all forms of a law.
+//! and each number of effects are equally probable, and so are all sets of a size and all forms of a law. An effect that the
+//! prediction is known to leave out is as likely there as not.
 
 use std::collections::BTreeMap;
 
@@ -119,13 +120,15 @@ pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Wei
     all
 }
 
-/// Logarithm of the probability of a set before the trials, over that of nothing: all sets of a size are alike, and so are all
-/// forms of a law.
+/// Logarithm of the probability of a set before the trials, over that of nothing: all sets of a size are alike, but for effects
+/// that the prediction is known to leave out, and so are all forms of a law.
 fn log_prior(judge: &Judge, effects: &[Effect], library: &[Effect]) -> f64 {
     let forms = |effect: &Effect| {
         judge.design.candidates.iter().filter(|candidate| candidate.effect == *effect).count().max(1) as f64
     };
-    let sets = (0..effects.len()).map(|i| library.len().saturating_sub(i).max(1) as f64 / (i + 1) as f64);
+    let unknown = |effects: &[Effect]| effects.iter().filter(|e| !judge.config.absent.contains(e)).count();
+    let (drawn, of) = (unknown(effects), unknown(library));
+    let sets = (0..drawn).map(|i| of.saturating_sub(i).max(1) as f64 / (i + 1) as f64);
     -sets.product::<f64>().ln() - effects.iter().map(forms).product::<f64>().ln()
 }
 
