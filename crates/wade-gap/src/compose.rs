@@ -43,6 +43,34 @@ fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
         .collect()
 }
 
+/// What a set of effects does for the trials that took no part in naming and fitting.
+struct HeldOut {
+    fitted: Option<Fit>,
+    named: Vec<Named>,
+    closures: BTreeMap<&'static str, Closure>,
+    /// Share of the squared gap that it explains, where that says that it is not what is missing.
+    disproof: Option<f64>,
+}
+
+impl HeldOut {
+    fn of(judge: &Judge, members: &[Member], held: &[usize]) -> Self {
+        let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
+        let fitted = if members.is_empty() { None } else { fit(design, members, all, setting, config) };
+        let named = fitted.as_ref().map_or_else(Vec::new, |fitted| named(design, members, fitted));
+        let floors = floors_of(all, held, judge.floors, &setting.components);
+        let closures = closures(&named, all, held, setting, &floors, config);
+        let seen = closures.get("all").map(|closure| as_naming_saw_it(*closure, &named, all, held, judge));
+        let small = seen.and_then(|closure| closure.disproof(config.coverage, judge.has_fault(members)));
+        let disproof = small.or_else(|| disproved(&closures, judge.floors));
+        Self { fitted, named, closures, disproof }
+    }
+}
+
+/// True for effects with which the gap of the held-out trials grows, or which leave too much of it.
+pub(super) fn is_disproved(judge: &Judge, members: &[Member], held: &[usize]) -> bool {
+    HeldOut::of(judge, members, held).disproof.is_some()
+}
+
 pub(super) fn compose(
     trials: &Trials,
     judge: &Judge,
@@ -58,15 +86,9 @@ pub(super) fn compose(
     }
     // nothing that does not fit is applied or shown as if it did
     let fits = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
-    let fitted = if fits { fit(design, &found.members, all, setting, config) } else { None };
-    let mut named = fitted.as_ref().map_or_else(Vec::new, |fitted| named(design, &found.members, fitted));
-    let held_floors = floors_of(all, &held, judge.floors, &setting.components);
-    let closures_of = |named: &[Named]| closures(named, all, &held, setting, &held_floors, config);
-    let mut held_out = closures_of(&named);
-    let is_fault = found.members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
-    let seen = held_out.get("all").map(|closure| as_naming_saw_it(*closure, &named, all, &held, judge));
-    let grows = disproved(&held_out, judge.floors);
-    let disproof = seen.and_then(|closure| closure.disproof(config.coverage, is_fault)).or(grows);
+    let members = if fits { found.members.as_slice() } else { &[] };
+    let HeldOut { fitted, mut named, closures: mut held_out, disproof } = HeldOut::of(judge, members, &held);
+    let is_fault = judge.has_fault(&found.members);
     // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows; a fault is
     // exact or is none
     let disproof =
@@ -74,8 +96,7 @@ pub(super) fn compose(
     if disproof.is_some() {
         found.verdict = Verdict::NoCandidateFits;
         found.left = found.of_gap.clone();
-        named.clear();
-        held_out = closures_of(&named);
+        HeldOut { named, closures: held_out, .. } = HeldOut::of(judge, &[], &held);
     }
     let holds = fits && disproof.is_none();
     let effects = match &fitted {

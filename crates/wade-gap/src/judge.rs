@@ -21,7 +21,7 @@ use super::series::Series;
 use super::shared::{exceeds_noise, outlasts_noise};
 use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
-use wade_core::effects::Effect;
+use wade_core::effects::{Effect, Kind};
 use wade_learn::random::Random;
 
 /// Least deviate of a column that stays in a group.
@@ -124,6 +124,11 @@ impl<'a> Judge<'a> {
 
     pub fn effect(&self, member: &Member) -> Effect {
         self.design.candidates[member.candidate].effect
+    }
+
+    /// True where a fault of a sensor is among them.
+    pub fn has_fault(&self, set: &[Member]) -> bool {
+        set.iter().any(|member| self.effect(member).kind() == Kind::Sensor)
     }
 
     /// The names of a set.

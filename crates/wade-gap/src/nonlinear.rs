@@ -120,19 +120,24 @@ pub(super) fn through_sensors(
                 coefficients: member.columns.iter().map(|&(column, k)| (k, value(column))).collect(),
             })
             .collect();
-        for (rank, series) in all.iter_mut().enumerate() {
-            let added = explained(&found, series, rank, setting);
-            let without = series.predicted.iter().zip(&series.known);
-            for ((seen, (predicted, known)), added) in series.seen.iter_mut().zip(without).zip(added) {
-                *seen = std::array::from_fn(|c| predicted[c] + known[c] + added[c]);
-            }
-        }
-        for candidate in 0..design.candidates.len() {
-            if maps_loads(design.candidates[candidate].effect) {
-                design.reshape(all, setting, candidate, design.candidates[candidate].shape);
-            }
-        }
+        see(design, all, setting, &found);
         refine(design, all, setting, members);
+    }
+}
+
+/// Lets the effects of sensors see the prediction with what named effects add to it.
+pub(super) fn see(design: &mut Design, all: &mut [Series], setting: &Setting, named: &[Named]) {
+    for (rank, series) in all.iter_mut().enumerate() {
+        let added = explained(named, series, rank, setting);
+        let without = series.predicted.iter().zip(&series.known);
+        for ((seen, (predicted, known)), added) in series.seen.iter_mut().zip(without).zip(added) {
+            *seen = std::array::from_fn(|c| predicted[c] + known[c] + added[c]);
+        }
+    }
+    for candidate in 0..design.candidates.len() {
+        if maps_loads(design.candidates[candidate].effect) {
+            design.reshape(all, setting, candidate, design.candidates[candidate].shape);
+        }
     }
 }
 

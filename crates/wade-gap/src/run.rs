@@ -3,16 +3,16 @@
 use super::base_drag::BaseDrag;
 use super::calibrate::calibrate;
 use super::candidates::{Setting, shapes, unavailable};
-use super::compose::compose;
+use super::compose::{compose, is_disproved};
 use super::design::{Design, Rows};
 use super::explanations::weigh;
 use super::general::General;
-use super::judge::Judge;
+use super::judge::{Judge, Member};
 use super::measurement::{is_computed, is_inferred};
 use super::noise::{floors, row_noise};
-use super::nonlinear::{refine, settle, through_sensors};
+use super::nonlinear::{refine, see, settle, through_sensors};
 use super::plausible;
-use super::report::Report;
+use super::report::{Report, Verdict};
 use super::series::{Series, one_clock, series};
 use super::smoothing::Smoothing;
 use super::split::hold_out;
@@ -90,15 +90,33 @@ pub fn run(
         let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
         judge.select(&library)
     };
-    refine(&mut design, &all, &setting, &members);
-    through_sensors(&mut design, &mut all, &setting, &members);
-    // what stood in for a shape that was not yet right has no place any more
-    let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
-    members = judge.confirmed(&members);
-    let mut found = Found::of(&judge, &members, &library, &general, &gap_structure);
-    let weighed = weigh(&judge, &found, &library);
-    found.heed(&weighed);
-    Ok(compose(trials, &judge, found, &weighed, held, &library))
+    // a set while a part of it is tried in its place, and the names of a part that did not hold
+    let (mut whole, mut refuted): (Option<Vec<Member>>, Vec<&str>) = (None, Vec::new());
+    loop {
+        let asked = members.clone();
+        refine(&mut design, &all, &setting, &members);
+        through_sensors(&mut design, &mut all, &setting, &members);
+        // what stood in for a shape that was not yet right has no place any more
+        let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
+        members = judge.confirmed(&members);
+        let mut found = Found::of(&judge, &members, &library, &general, &gap_structure);
+        let weighed = weigh(&judge, &found, &library);
+        let is_disproved = |set: &[Member]| is_disproved(&judge, set, &held);
+        let next = match whole.take() {
+            Some(whole) if found.verdict != Verdict::Named || is_disproved(&members) => {
+                refuted = judge.names(&asked);
+                Some(whole)
+            }
+            None if refuted.is_empty() => found.part_to_name(&weighed).inspect(|_| whole = Some(asked)),
+            _ => None,
+        };
+        let Some(next) = next else {
+            found.heed(&weighed, |set| judge.names(set) != refuted && !is_disproved(set));
+            return Ok(compose(trials, &judge, found, &weighed, held, &library));
+        };
+        members = next;
+        see(&mut design, &mut all, &setting, &[]);
+    }
 }
 
 /// Refuses trials kept back that repeat trials which are not.

@@ -12,7 +12,7 @@ use super::judge::{Judge, Member};
 use super::lasting::lasting;
 use super::nonlinear::is_too_short;
 use super::report::Verdict;
-use wade_core::effects::{Effect, Kind};
+use wade_core::effects::Effect;
 
 /// Deviates that structure without a name needs.
 pub(super) const STRUCTURE: f64 = 5.0;
@@ -40,6 +40,9 @@ const LIMITED: f64 = 0.1;
 
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
+
+/// Odds from which evidence is substantial (Jeffreys, Theory of Probability, appendix B).
+const SUBSTANTIAL: f64 = 3.162;
 
 /// What the search found.
 pub(super) struct Found {
@@ -87,8 +90,7 @@ impl Found {
             design.solve(&columns).unwrap_or_else(|| (DVector::zeros(columns.len()), design.empty_loss()));
         let residual = design.residual(&columns, &beta);
         let coverage = (design.empty_loss() - loss) / judge.missing();
-        let faults = members.iter().any(|member| judge.effect(member).kind() == Kind::Sensor);
-        let needed = if faults { config.coverage.max(EXACT) } else { config.coverage };
+        let needed = if judge.has_fault(members) { config.coverage.max(EXACT) } else { config.coverage };
         let unresolved = members.iter().any(|member| {
             let candidate = &design.candidates[member.candidate];
             is_too_short(&candidate.shape, judge.setting)
@@ -125,16 +127,32 @@ impl Found {
         Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, of_gap, loss, unfit }
     }
 
-    /// Names nothing against the weight of the evidence: explanations that are clearly more probable stand beside what was found, and
-    /// where one of them is none of the library, it is not named.
-    pub fn heed(&mut self, weighed: &[Weighed]) {
-        /// Odds from which evidence is substantial (Jeffreys, Theory of Probability, appendix B).
-        const SUBSTANTIAL: f64 = 3.162;
+    /// The part of what was found that is the most probable explanation, clearly more so than the whole.
+    pub fn part_to_name(&self, weighed: &[Weighed]) -> Option<Vec<Member>> {
+        let own = weighed.iter().find(|weighed| weighed.set == self.members)?;
+        let first = weighed.first()?;
+        let outweighs = first.explanation.probability > SUBSTANTIAL * own.explanation.probability;
+        let is_part = first.explanation.is_of_library()
+            && first.explanation.effects.len() < own.explanation.effects.len()
+            && first.explanation.effects.iter().all(|effect| own.explanation.effects.contains(effect));
+        (self.verdict == Verdict::Named && outweighs && is_part).then(|| first.set.clone())
+    }
+
+    /// Names nothing against the weight of the evidence: explanations that are clearly more probable and that hold on the trials
+    /// kept for that stand beside what was found, and where one of them is none of the library, it is not named.
+    pub fn heed(&mut self, weighed: &[Weighed], holds: impl Fn(&[Member]) -> bool) {
         let Some(own) = weighed.iter().find(|weighed| weighed.set == self.members) else { return };
         let least = SUBSTANTIAL * own.explanation.probability;
-        let before: Vec<&Weighed> =
-            weighed.iter().filter(|weighed| weighed.explanation.probability > least).collect();
-        if before.is_empty() || self.verdict != Verdict::Named {
+        if self.verdict != Verdict::Named {
+            return;
+        }
+        let before: Vec<&Weighed> = weighed
+            .iter()
+            .filter(|weighed| {
+                weighed.explanation.probability > least && (weighed.set.is_empty() || holds(&weighed.set))
+            })
+            .collect();
+        if before.is_empty() {
             return;
         }
         if let Some(first) = before.iter().find(|weighed| !weighed.explanation.is_of_library()) {
