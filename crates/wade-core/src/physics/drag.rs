@@ -10,12 +10,13 @@
 //! cylinder in open-channel flow (Qi, Eames, Johnson, JFM 2014). `C_f` is the ITTC 1957 line (UFC 4-159-03). `s` is the
 //! share that the shelter of the parts upstream leaves.
 //!
-//! Elements of a wheel whose speed `W` is stated have the velocity of its rim too, and besides `C_f` the coefficient
-//! [`TREAD`] `(W r)^2 / ((W r)^2 + |u|^2)` of its lugs: a wheel that stands still has the drag of one of which nothing is stated.
+//! Elements of a wheel whose speed `W` is stated have the velocity of its rim too. Along the rim it drags water with it and presses
+//! on none: in the first term `u_t` is that of the hull. Beside `C_f` stands the coefficient
+//! [`TREAD`] `(W r)^2 / ((W r)^2 + |u|^2) min(1, |W r - u_x| / |W r|)` of its lugs on the share `1 - n_y^2` that is tread: a wheel
+//! that stands still has the drag of one of which nothing is stated, and lugs push by their slip.
 //!
 //! Elements of a track whose speed `W` is stated, that of its drive sprocket of the radius `r`, have besides the velocity of the
-//! belt `W r (n_z, 0, -n_x)`, which runs round about the body's y, and the coefficient of its lugs on the share `1 - n_y^2` of
-//! them that the belt covers: the sides of a track stand still.
+//! belt `W r (n_z, 0, -n_x)`, which runs round about the body's y, and such lugs: the sides of a track stand still.
 //!
 //! Every term opposes the velocity of its own element and every factor is positive, so the sum over the elements takes
 //! power from the motion through the water in every state; wheels and tracks that turn put in their shaft power at most.
@@ -190,8 +191,10 @@ impl Drag {
             let mut sums = Sums::default();
             let skin = turning.map(|Turning { center, radius, is_track }| {
                 let axle = condition.velocity + condition.angular_velocity.cross(&center);
-                let (spin, past) = ((speed * radius).powi(2), axle.norm_squared());
-                let lugs = if spin > 0.0 { TREAD * spin / (spin + past) } else { 0.0 };
+                let rim = speed * radius;
+                let (spin, past) = (rim.powi(2), axle.norm_squared());
+                let slip = ((rim - axle.x) / rim).abs().min(1.0);
+                let lugs = if spin > 0.0 { TREAD * slip * spin / (spin + past) } else { 0.0 };
                 let speed = if is_track { speed * radius } else { speed };
                 Skin { speed, axle_x: center.x, axle_z: center.z, lugs }
             });
@@ -306,15 +309,20 @@ impl Block {
                 flow.velocity[1] + (wz * x - wx * z),
                 flow.velocity[2] + (wx * y - wy * x),
             ];
-            let (skin, tangential) = if IS_TRACK {
-                ([speed * nz, -speed * nx], flow.friction + lugs * (1.0 - ny * ny))
+            let skin = if IS_TRACK {
+                [speed * nz, -speed * nx]
             } else {
-                ([speed * (z - axle_z), -speed * (x - axle_x)], flow.friction + lugs)
+                [speed * (z - axle_z), -speed * (x - axle_x)]
             };
+            // on the tread, not on the sides
+            let tangential = flow.friction + lugs * (1.0 - ny * ny);
             let (vx, vy, vz) = (hull[0] + skin[0], hull[1], hull[2] + skin[1]);
             let across = vx * nx + vy * ny + vz * nz;
-            let squared = vx * vx + vy * vy + vz * vz;
-            let total = squared.sqrt();
+            // of the hull along the element and of both across it
+            let [hx, hy, hz] = hull;
+            let of_hull = hx * nx + hy * ny + hz * nz;
+            let squared = hx * hx + hy * hy + hz * hz + (across * across - of_hull * of_hull);
+            let total = squared.max(0.0).sqrt();
             let along = [vx - across * nx, vy - across * ny, vz - across * nz];
             let slip = (along[0] * along[0] + along[1] * along[1] + along[2] * along[2]).sqrt();
             let coefficient = if across > 0.0 { WINDWARD } else { LEEWARD };

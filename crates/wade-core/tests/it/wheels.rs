@@ -98,6 +98,48 @@ fn a_speed_turns_its_own_wheel_and_those_of_another_number_none() {
     assert_eq!(thrusts(Some([20.0; 4].into())), still);
 }
 
+/// Drag of the Warthog's base [N] at a speed and a depth, without wheel speeds and with wheels whose rims have this speed.
+fn drags(speed: f64, depth: f64, rim: f64) -> [f64; 2] {
+    /// Of the outermost elements of the wheels [m].
+    const RADIUS: f64 = 0.305;
+    let model = model("warthog");
+    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    [None, Some([rim / RADIUS; 4].into())].map(|speeds: Option<PerWheel<f64>>| {
+        let motion = Motion {
+            wheel_speeds: &model.wheel_speeds(speeds.as_ref()),
+            time_step: 0.0,
+            implicit_added_mass: false,
+            physics: Physics::QuasiSteady,
+        };
+        let state = Condition::level(Vec3::new(speed, 0.0, 0.0), depth);
+        model.evaluate_moving(&state, (&motion, None), &mut workspace, &mut forces);
+        -forces.wrench.force.x
+    })
+}
+
+#[test]
+fn rolling_wheels_change_the_drag_as_little_as_in_resolved_flow() {
+    // speed [m/s], depth [m], and what the drag loses [N] where bed and wheels move: set driving of campaigns/warthog, beside the
+    // same states with both at rest
+    for (speed, depth, loses) in [(3.0, 0.15, 6.9), (3.0, 0.20, 6.8), (4.0, 0.25, 62.9), (4.0, 0.40, 71.4)] {
+        let [still, rolling] = drags(speed, depth, speed);
+        let share = (still - rolling - loses).abs() / still;
+        assert!(share < 0.03, "{speed} m/s, {depth} m: {still} N, rolling {rolling} N");
+    }
+}
+
+#[test]
+fn lugs_push_by_their_slip() {
+    let push = |slip: f64| {
+        let [still, turning] = drags(2.0, 0.2, 2.0 * (1.0 + slip));
+        still - turning
+    };
+    let rolling = push(0.0);
+    let [small, twice, braking] = [0.02, 0.04, -0.02].map(|slip| push(slip) - rolling);
+    assert!(small > 0.0 && (1.8..2.3).contains(&(twice / small)), "{small} N, {twice} N");
+    assert!(braking < 0.3 * small, "{braking} N");
+}
+
 #[test]
 fn a_bundle_keeps_its_tracks_and_a_network_takes_them_for_wheels() {
     let folder = tempfile::TempDir::new().expect("a folder");
