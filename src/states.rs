@@ -160,6 +160,11 @@ impl Row {
         [Vec3::new(self.vx, self.vy, self.vz), angular.into()]
     }
 
+    /// Acceleration [m/s2]; 0 where none is stated.
+    pub fn acceleration(&self) -> Vec3 {
+        [self.ax, self.ay, self.az].map(|value| value.unwrap_or(0.0)).into()
+    }
+
     /// The state of the row.
     pub fn state(&self) -> State {
         let or_zero = |value: Option<f64>| value.unwrap_or(0.0) as f32;

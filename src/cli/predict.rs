@@ -11,7 +11,7 @@ use wade_core::frame::Vec3;
 use wade_core::model::Model;
 use wade_core::served::Session;
 use wade_learn::files::StagedFile;
-use wade_learn::trials::{acceleration, derivative};
+use wade_learn::trials::{Recorded, Remark, acceleration, are_rates, derivative, turning};
 use wade_wire::State;
 use wade_wire::{Evaluated, Evaluator};
 
@@ -135,7 +135,8 @@ fn number(value: &f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Accelerations of the rows of a run whose table has none: the derivatives of the velocities, as in `wade gap`.
+/// Accelerations of the rows of a run, as in `wade gap`: those of a table without them are the derivatives of the velocities, and
+/// those that are rates of the velocity's components get what turning adds.
 #[derive(Default)]
 struct Accelerations {
     linear: Option<Vec<Vec3>>,
@@ -150,18 +151,19 @@ impl Accelerations {
         let is_stated =
             |names: [&str; 3]| names.iter().any(|name| headers.iter().any(|header| header == *name));
         let stated = [["ax", "ay", "az"], ["alx", "aly", "alz"]].map(is_stated);
-        if stated == [true; 2] {
-            return Ok(Self::default());
-        }
         if !path.metadata().with_context(|| path.display().to_string())?.is_file() {
+            // what can be read once only is taken as it is
+            if stated == [true; 2] {
+                return Ok(Self::default());
+            }
             bail!("{} is no file, and is read twice: give it ax ay az and alx aly alz", path.display());
         }
-        let (mut times, mut velocity, mut angular, mut place) =
-            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut times, mut velocity, mut angular, mut recorded, mut place) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for record in csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path)?.records() {
-            let Some((t, [v, omega])) = record.ok().and_then(|record| {
+            let Some((t, [v, omega], a)) = record.ok().and_then(|record| {
                 let row = Row::read(&record, headers, wheels).ok()?;
-                Some((row.t?, row.motion()))
+                Some((row.t?, row.motion(), row.acceleration()))
             }) else {
                 return Ok(Self::default());
             };
@@ -173,15 +175,22 @@ impl Accelerations {
                 times.push(t);
                 velocity.push(v);
                 angular.push(omega);
+                recorded.push(a);
             }
             place.push(times.len() - 1);
         }
         let [has_linear, has_angular] = stated;
-        Ok(Self {
-            linear: (!has_linear).then(|| acceleration(&times, &velocity, &angular)),
-            angular: (!has_angular).then(|| derivative(&times, &angular)),
-            place,
-        })
+        let motion =
+            Recorded { t: &times, velocity: &velocity, angular_velocity: &angular, acceleration: &recorded };
+        let linear = if !has_linear {
+            Some(acceleration(&times, &velocity, &angular))
+        } else if are_rates(std::iter::once(motion)) {
+            eprintln!("{}: {}", path.display(), Remark::Rates);
+            Some(recorded.iter().zip(turning(&velocity, &angular)).map(|(rate, turn)| rate + turn).collect())
+        } else {
+            None
+        };
+        Ok(Self { linear, angular: (!has_angular).then(|| derivative(&times, &angular)), place })
     }
 
     fn of_row(&self, row: usize, state: State) -> State {

@@ -24,7 +24,7 @@ use super::verdict::Found;
 use super::{Named, measurement, plausible};
 use wade_core::condition::Condition;
 use wade_core::digest::hexadecimal;
-use wade_core::effects::{self, Effect, Kind};
+use wade_core::effects::{self, Effect};
 use wade_learn::trials::{SIMULATED, SimIs, Trials, WHEELS, WRENCH};
 
 fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {

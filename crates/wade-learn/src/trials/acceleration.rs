@@ -15,22 +15,41 @@ pub fn acceleration(times: &[f64], velocity: &[Vec3], angular_velocity: &[Vec3])
 }
 
 /// What turning adds to the rates of the components of a velocity: `omega x v` [m/s2].
-fn turning<'a>(velocity: &'a [Vec3], angular_velocity: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
+pub fn turning<'a>(velocity: &'a [Vec3], angular_velocity: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
     angular_velocity.iter().zip(velocity).map(|(omega, v)| omega.cross(v))
 }
 
-/// Adds `omega x v` to recorded accelerations that are the rates of the velocity's components, and true where that was so.
+/// A recorded motion, sample by sample in the axes of the body.
+pub struct Recorded<'a> {
+    /// Time [s].
+    pub t: &'a [f64],
+    /// Velocity [m/s].
+    pub velocity: &'a [Vec3],
+    /// Angular velocity [rad/s].
+    pub angular_velocity: &'a [Vec3],
+    /// Acceleration as it was recorded [m/s2].
+    pub acceleration: &'a [Vec3],
+}
+
+impl<'a> Recorded<'a> {
+    fn of(trial: &'a Trial) -> Self {
+        let Trial { t, velocity, angular_velocity, acceleration, .. } = trial;
+        Self { t, velocity, angular_velocity, acceleration }
+    }
+}
+
+/// True where recorded accelerations are the rates of the velocity's components, to which `omega x v` is to be added.
 /// Both conventions are in use, and a recording tells which is its own: `r = a - dv/dt` is 0 in one and
 /// `omega x v` in the other. What hardly turns tells neither, and stays as it is.
-pub(super) fn settle_convention(trials: &mut [Trial]) -> bool {
+pub fn are_rates<'a>(recordings: impl Iterator<Item = Recorded<'a>>) -> bool {
     /// How many times larger than what is left of `r` the turning must be, as the root of the sums of squares: noise that is
     /// correlated over some ten samples reaches 3.
     const CLEAR: f64 = 10.0;
     let (mut as_rates, mut as_inertial, mut turned, mut count) = (0.0, 0.0, 0.0, 0.0);
-    for trial in trials.iter().filter(|trial| trial.acceleration_is_measured) {
-        let rates = derivative(&trial.t, &trial.velocity);
-        let turns = turning(&trial.velocity, &trial.angular_velocity);
-        for ((recorded, rate), turn) in trial.acceleration.iter().zip(rates).zip(turns) {
+    for Recorded { t, velocity, angular_velocity, acceleration } in recordings {
+        let rates = derivative(t, velocity);
+        let turns = turning(velocity, angular_velocity);
+        for ((recorded, rate), turn) in acceleration.iter().zip(rates).zip(turns) {
             as_rates += (recorded - rate).norm_squared();
             as_inertial += (recorded - rate - turn).norm_squared();
             turned += turn.norm_squared();
@@ -38,7 +57,12 @@ pub(super) fn settle_convention(trials: &mut [Trial]) -> bool {
         }
     }
     let noise = f64::min(as_rates, as_inertial) / f64::max(3.0 * count, 1.0);
-    let are_rates = as_rates < as_inertial && turned > CLEAR * CLEAR * noise;
+    as_rates < as_inertial && turned > CLEAR * CLEAR * noise
+}
+
+/// Adds `omega x v` to recorded accelerations that are the rates of the velocity's components, and true where that was so.
+pub(super) fn settle_convention(trials: &mut [Trial]) -> bool {
+    let are_rates = are_rates(trials.iter().filter(|trial| trial.acceleration_is_measured).map(Recorded::of));
     for trial in trials.iter_mut().filter(|trial| are_rates && trial.acceleration_is_measured) {
         let turns = turning(&trial.velocity, &trial.angular_velocity);
         trial.acceleration.iter_mut().zip(turns).for_each(|(recorded, turn)| *recorded += turn);

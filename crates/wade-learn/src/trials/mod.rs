@@ -18,7 +18,7 @@ mod units;
 mod write;
 
 use acceleration::settle_convention;
-pub use acceleration::{acceleration, derivative};
+pub use acceleration::{Recorded, acceleration, are_rates, derivative, turning};
 pub use fault::Fault;
 use std::collections::BTreeSet;
 use std::fs;
