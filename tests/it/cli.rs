@@ -233,6 +233,18 @@ fn a_recording_without_accelerations_accelerates_as_its_velocity_says() {
         // some 40 kg of water accelerate along
         assert!(derived < &(single - 10.0), "{derived} {single}");
     }
+    // round a circle, where the components of the velocity stay
+    let circle = |t: f64| format!("{t},0.5,0.5,0,0.5,0.3");
+    let derived = fx("round", "t,vx,vy,vz,wz,depth", &circle);
+    let inertial = fx("inertial", "t,vx,vy,vz,wz,depth,ax,ay,az", &|t| format!("{},-0.25,0.25,0", circle(t)));
+    let rates = fx("rates", "t,vx,vy,vz,wz,depth,ax,ay,az", &|t| format!("{},0,0,0", circle(t)));
+    assert_eq!(rates, inertial);
+    for (derived, inertial) in derived.iter().zip(&inertial) {
+        assert!((derived - inertial).abs() < 1e-3, "{derived} {inertial}");
+    }
+    // an acceleration that is of neither kind counts as it is
+    let pushed = fx("pushed", "t,vx,vy,vz,wz,depth,ax,ay,az", &|t| format!("{},0.75,0.25,0", circle(t)));
+    assert!(pushed[30] < inertial[30] - 10.0, "{} {}", pushed[30], inertial[30]);
 }
 
 #[test]
