@@ -23,6 +23,7 @@ use super::{Vehicles, check_report_folder, emit, usage_error};
 
 /// The form of `--config`, with what holds without one; besides `library`, which names all effects.
 const SETTINGS: &str = "  # library = [\"added_mass\", \"current\"]   # default: all effects
+  absent = []                  # effects that the prediction leaves out
   ground_contact = \"wetted\"    # or \"dry\": water under the tires, or none
   seed = 1
   bin_s = 0.1                  # over which samples are averaged [s]

@@ -43,7 +43,7 @@ fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
         .collect()
 }
 
-/// What a set of effects does for the trials that took no part in naming and fitting.
+/// What a set of effects does for the held-out trials.
 struct HeldOut {
     fitted: Option<Fit>,
     named: Vec<Named>,

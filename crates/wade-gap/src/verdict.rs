@@ -138,8 +138,8 @@ impl Found {
         (self.verdict == Verdict::Named && outweighs && is_part).then(|| first.set.clone())
     }
 
-    /// Names nothing against the weight of the evidence: explanations that are clearly more probable and that hold on the trials
-    /// kept for that stand beside what was found, and where one of them is none of the library, it is not named.
+    /// Names nothing against the weight of the evidence: explanations that are clearly more probable and that the held-out
+    /// trials do not disprove stand beside what was found, and where one of them is none of the library, it is not named.
     pub fn heed(&mut self, weighed: &[Weighed], holds: impl Fn(&[Member]) -> bool) {
         let Some(own) = weighed.iter().find(|weighed| weighed.set == self.members) else { return };
         let least = SUBSTANTIAL * own.explanation.probability;
