@@ -12,7 +12,7 @@ use super::effects_file::remarks;
 use super::experiment::separating;
 use super::explanations::{Weighed, stated, suspected};
 use super::fit::{Fit, Parameter, fit};
-use super::holdout::{Closure, as_naming_saw_it, closures, explained, worse};
+use super::holdout::{Closure, closures, explained, explained_of_rows, worse};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
@@ -59,8 +59,10 @@ impl HeldOut {
         let named = fitted.as_ref().map_or_else(Vec::new, |fitted| named(design, members, fitted));
         let floors = floors_of(all, held, judge.floors, &setting.components);
         let closures = closures(&named, all, held, setting, &floors, config);
-        let seen = closures.get("all").map(|closure| as_naming_saw_it(*closure, &named, all, held, judge));
-        let small = seen.and_then(|closure| closure.disproof(config.coverage, judge.has_fault(members)));
+        let small = closures.get("all").and_then(|closure| {
+            let share = explained_of_rows(&named, all, held, judge).unwrap_or(closure.explained());
+            closure.disproof(share, config.coverage, judge.has_fault(members))
+        });
         let disproof = small.or_else(|| disproved(&closures, judge.floors));
         Self { fitted, named, closures, disproof }
     }
@@ -80,7 +82,7 @@ pub(super) fn compose(
     library: &[Effect],
 ) -> Report {
     let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
-    let size = detect::sizes(all.iter(), judge.floors, setting, config);
+    let size = detect::sizes(all.iter(), judge.floors, &design.error, setting, config);
     if found.verdict == Verdict::NothingMissing && size.values().any(|size| size.above_floor) {
         found.verdict = Verdict::NoCandidateFits;
     }

@@ -1,16 +1,16 @@
 //! The regression: rows are the compared components of every bin, columns the coefficients of the candidates.
 //!
-//! Rows are standardised by the noise of their component. The zero of a trial may differ from run to run, and where a model
-//! states how far it may be off, a trial may have a load of that size that stays, and one that goes with the square of the
-//! speed. Each trial's part along these is taken off in the share that such scatter has in it (the transform of the
-//! random-effects model; Baltagi, Econometric Analysis of Panel Data, section 2.3), so that the rows are about independent.
+//! Rows are standardised by the noise of their component. The zero of a trial may differ from run to run: each trial's mean is
+//! taken off in the share that such scatter has in it (the transform of the random-effects model; Baltagi, Econometric Analysis of
+//! Panel Data, section 2.3). So is what the model may be off by ([`super::model_error`]), and the rows are about independent.
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
+use nalgebra::{DMatrix, DVector};
 
 use super::Config;
 use super::candidates::{Column, Setting, columns};
+use super::model_error::ModelError;
 use super::series::Series;
 use super::smoothing::Smoothing;
 use super::split::folds;
@@ -32,10 +32,21 @@ pub(super) struct RowNoise {
     pub bin: [f64; 6],
     /// Standard deviation of the zero, by trial and component.
     pub offset: Vec<[f64; 6]>,
-    /// Standard deviation that the model states of itself, by trial and component; 0 where it states none.
-    pub model: Vec<[f64; 6]>,
+    /// True where the model states how far it may be off.
+    pub model: bool,
     /// Smoothing of the rows.
     pub smoothing: Smoothing,
+}
+
+impl RowNoise {
+    /// Takes off the mean of a trial's standardised values in the share that its zero has in it.
+    pub fn center(&self, values: &mut [f64], trial: usize, component: usize) {
+        let zero = self.offset[trial][component] / self.bin[component];
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let share = 1.0 - (1.0 + count * zero * zero).sqrt().recip();
+        values.iter_mut().for_each(|value| *value -= share * mean);
+    }
 }
 
 /// Where a row stands.
@@ -131,54 +142,18 @@ fn rows_of_trial(
     column: &Column,
     out: &mut Vec<f64>,
 ) {
-    let pace = noise.model[trial].iter().any(|std| *std > 0.0).then(|| pace(series));
     let by_component: Vec<Vec<f64>> = components
         .iter()
         .map(|&component| {
             let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
-            let bin = noise.bin[component];
-            let model = noise.model[trial][component] / bin;
-            let zero = (noise.offset[trial][component] / bin).hypot(model);
-            values.iter_mut().for_each(|value| *value /= bin);
-            match &pace {
-                Some(pace) => whiten(&mut values, pace, [zero, model]),
-                None => center(&mut values, zero),
-            }
+            values.iter_mut().for_each(|value| *value /= noise.bin[component]);
+            noise.center(&mut values, trial, component);
             values
         })
         .collect();
     for bin in 0..series.bins.len() {
         out.extend(by_component.iter().map(|values| values[bin]));
     }
-}
-
-/// Takes off the mean in the share that a zero of this deviation has in it, beside noise of 1 a value.
-fn center(values: &mut [f64], zero: f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let share = 1.0 - (1.0 + count * zero * zero).sqrt().recip();
-    values.iter_mut().for_each(|value| *value -= share * mean);
-}
-
-/// The same for a constant and a multiple of `pace`, of independent deviations: `(I + U U^T)^(-1/2)` of the values, `U` the
-/// two with their deviations.
-fn whiten(values: &mut [f64], pace: &[f64], [zero, paced]: [f64; 2]) {
-    let along = |value: f64| Vector2::new(zero, paced * value);
-    let gram = pace.iter().map(|&p| along(p) * along(p).transpose()).sum::<Matrix2<f64>>();
-    let projected = values.iter().zip(pace).map(|(value, &p)| along(p) * *value).sum::<Vector2<f64>>();
-    let SymmetricEigen { eigenvectors, eigenvalues } = gram.symmetric_eigen();
-    // (1 - 1 / sqrt(1 + l)) / l, which is 1/2 where l vanishes
-    let share = eigenvalues.map(|l| 1.0 / ((1.0 + l.max(0.0)).sqrt() * (1.0 + (1.0 + l.max(0.0)).sqrt())));
-    let off = eigenvectors * share.component_mul(&(eigenvectors.transpose() * projected));
-    values.iter_mut().zip(pace).for_each(|(value, &p)| *value -= along(p).dot(&off));
-}
-
-/// The square of the speed through the water of each bin, of mean square 1.
-fn pace(series: &Series) -> Vec<f64> {
-    let mut pace = series.binned(|i| series.conditions[i].velocity.norm_squared());
-    let size = (pace.iter().map(|p| p * p).sum::<f64>() / pace.len().max(1) as f64).sqrt();
-    pace.iter_mut().for_each(|p| *p /= size.max(f64::MIN_POSITIVE));
-    pace
 }
 
 /// Sums of products over the rows of one fold.
@@ -195,6 +170,8 @@ pub(super) struct Design {
     pub rows: Rows,
     pub trials: Vec<usize>,
     pub noise: RowNoise,
+    /// What the model may be off by.
+    pub error: ModelError,
     pub y: DVector<f64>,
     pub x: DMatrix<f64>,
     /// What a column was divided by, so that its mean square is 1.
@@ -234,13 +211,17 @@ impl Design {
         config: &Config,
     ) -> Self {
         let gap = |trial: usize| all[trial].gap.clone();
-        let y = DVector::from_vec(to_rows(all, &rows, &trials, &setting.components, &noise, gap));
+        let error = ModelError::new(all, &trials, &setting.components, &noise);
+        let mut y = to_rows(all, &rows, &trials, &setting.components, &noise, gap);
+        error.take_off(&mut y);
+        let y = DVector::from_vec(y);
         let block_fold = folds(all, &rows, config);
         let mut this = Self {
             x: DMatrix::zeros(rows.rows.len(), 0),
             reach: noise.smoothing.reach(config.bin_s),
             trials,
             noise,
+            error,
             y,
             scale: Vec::new(),
             candidates: Vec::new(),
@@ -289,6 +270,14 @@ impl Design {
                 rows_of_trial(&all[trial], trial, &setting.components, noise, column, rows);
             }
         }
+        rows.iter_mut().for_each(|rows| self.error.take_off(rows));
+        rows
+    }
+
+    /// A value a sample as rows.
+    pub fn to_rows(&self, all: &[Series], components: &[usize], of: impl Fn(usize) -> Column) -> Vec<f64> {
+        let mut rows = to_rows(all, &self.rows, &self.trials, components, &self.noise, of);
+        self.error.take_off(&mut rows);
         rows
     }
 
@@ -318,7 +307,9 @@ impl Design {
         of: &dyn Fn(usize) -> Column,
     ) -> DVector<f64> {
         let noise = self.unsmoothed_noise();
-        DVector::from_vec(to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of))
+        let mut rows = to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of);
+        self.error.take_off(&mut rows);
+        DVector::from_vec(rows)
     }
 
     fn unsmoothed_noise(&self) -> RowNoise {
@@ -574,27 +565,5 @@ mod tests {
             assert!(ridged(2, |_, _| size).cholesky().is_some());
             assert!(ridged(3, |i, j| size * (1.0 + i as f64) * (1.0 + j as f64)).cholesky().is_some());
         }
-    }
-
-    #[test]
-    fn whitens_by_the_inverse_root_of_the_covariance_and_alone_the_zero_is_the_mean() {
-        let pace: Vec<f64> = (0..12).map(|i| 0.3 + 0.1 * f64::from(i)).collect();
-        let values: Vec<f64> = (0..12).map(|i| f64::from(i * i % 7) - 2.0).collect();
-        let (zero, paced) = (1.7, 0.6);
-        let covariance = DMatrix::from_fn(12, 12, |i, j| {
-            zero * zero + paced * paced * pace[i] * pace[j] + f64::from(u8::from(i == j))
-        });
-        let eigen = covariance.symmetric_eigen();
-        let root = &eigen.eigenvectors
-            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| l.sqrt().recip()))
-            * eigen.eigenvectors.transpose();
-        let expected = root * DVector::from_vec(values.clone());
-        let mut found = values.clone();
-        whiten(&mut found, &pace, [zero, paced]);
-        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected}");
-        let (mut centered, mut found) = (values.clone(), values);
-        center(&mut centered, zero);
-        whiten(&mut found, &pace, [zero, 0.0]);
-        assert!(found.iter().zip(&centered).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 }

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::candidates::{Column, Setting, columns, unavailable};
 use super::design::Design;
+use super::model_error::ModelError;
 use super::noise::{Floor, left_out};
 use super::rates::mean_square;
 use super::robust::errors;
@@ -44,10 +45,11 @@ pub struct GapSize {
 pub(super) fn sizes<'a>(
     trials: impl Iterator<Item = &'a Series> + Clone,
     floors: &[Floor; 6],
+    error: &ModelError,
     setting: &Setting,
     config: &Config,
 ) -> BTreeMap<&'static str, GapSize> {
-    let of = |&component: &usize| {
+    let of = |(place, &component): (usize, &usize)| {
         let squares: Vec<(f64, f64)> = trials
             .clone()
             .map(|s| (s.gap.iter().map(|gap| gap[component].powi(2)).sum(), s.gap.len() as f64))
@@ -67,12 +69,14 @@ pub(super) fn sizes<'a>(
         let noise_floor = floors[component].with_model();
         // a computed wrench has no noise that had to be estimated
         let seen = if setting.computed { 1.0 } else { floors[component].source.least_seen() };
-        let noise = noise_floor.hypot(left_out(trials.clone(), floors[component].source, component));
+        let left_out = left_out(trials.clone(), floors[component].source, component);
+        let model = floors[component].model * error.at_most(place);
+        let noise = floors[component].total().hypot(model).hypot(left_out);
         let above_floor = seen * interval[0] > noise;
         let size = GapSize { rms: rms(&squares), interval, noise_floor, above_floor };
         (WRENCH[component], size)
     };
-    setting.components.iter().map(of).collect()
+    setting.components.iter().enumerate().map(of).collect()
 }
 
 /// What the trials say about one effect of the library, whether it is there or not.

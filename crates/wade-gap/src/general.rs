@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::candidates::Column;
-use super::design::{Design, to_rows};
+use super::design::Design;
 use super::features::time_in_water;
 use super::series::Series;
 use super::statistics::quantile;
@@ -13,14 +13,6 @@ use super::statistics::quantile;
 #[derive(Debug, Clone)]
 pub(super) struct General {
     columns: Vec<Smooth>,
-    /// The functions of what a model is told, factored, for each component in the order of a bin's rows.
-    told: Vec<Option<Told>>,
-}
-
-#[derive(Debug, Clone)]
-struct Told {
-    x: DMatrix<f64>,
-    factor: Cholesky<f64, Dyn>,
 }
 
 /// One of the functions over all rows.
@@ -28,8 +20,6 @@ struct Told {
 struct Smooth {
     name: String,
     values: Vec<f64>,
-    /// True for a function of what a model is told: velocity, depth, attitude.
-    told: bool,
 }
 
 /// What the general model finds in the rows.
@@ -51,22 +41,20 @@ pub(super) struct Structure {
 impl General {
     pub fn new(all: &[Series], design: &Design, components: &[usize]) -> Self {
         let mut columns = Vec::new();
-        let mut add = |name: String, told: bool, function: &dyn Fn(&Series, usize, f64) -> f64| {
+        let mut add = |name: String, function: &dyn Fn(&Series, usize, f64) -> f64| {
             let of = |trial: usize| -> Column {
                 let series = &all[trial];
                 let time = time_in_water(series);
                 (0..series.t.len()).map(|i| [function(series, i, time[i]); 6]).collect()
             };
-            let values = to_rows(all, &design.rows, &design.trials, components, &design.noise, of);
+            let values = design.to_rows(all, components, of);
             if values.iter().any(|v| v.abs() > 1e-12) {
-                columns.push(Smooth { name, values, told });
+                columns.push(Smooth { name, values });
             }
         };
-        for (told, functions) in [(true, of_the_state()), (false, of_the_motion())] {
-            functions.into_iter().for_each(|(name, function)| add(name.to_owned(), told, &function));
-        }
+        functions().into_iter().for_each(|(name, function)| add(name.to_owned(), &function));
         // hats over the range of a quantity follow any shape that a polynomial does not
-        for (name, told, quantity) in quantities() {
+        for (name, quantity) in quantities() {
             let mut values: Vec<f64> =
                 all.iter().flat_map(|s| (0..s.t.len()).step_by(7).map(|i| quantity(s, i))).collect();
             let (low, high) = (quantile(&mut values.clone(), 0.005), quantile(&mut values, 0.995));
@@ -74,19 +62,10 @@ impl General {
             for hat in (0..=HATS).filter(|_| width > 1e-6) {
                 let middle = low + hat as f64 * width;
                 let height = move |value: f64| (1.0 - ((value - middle) / width).abs()).max(0.0);
-                add(format!("{name} near {middle:.2}"), told, &|s, i, _| height(quantity(s, i)));
+                add(format!("{name} near {middle:.2}"), &|s, i, _| height(quantity(s, i)));
             }
         }
-        let width = design.rows.width;
-        let functions: Vec<&Smooth> = columns.iter().filter(|column| column.told).collect();
-        let of = |place: usize| {
-            let rows: Vec<usize> = (place..design.y.len()).step_by(width).collect();
-            let x = scaled(&functions, &rows);
-            let factor = ridged(x.tr_mul(&x), rows.len())?;
-            Some(Told { x, factor })
-        };
-        let told = (0..width).map(of).collect();
-        Self { columns, told }
+        Self { columns }
     }
 
     /// Fits each component of `target`, which has the rows of the design.
@@ -117,19 +96,6 @@ impl General {
         }
     }
 
-    /// What smooth functions of what a model is told leave of a target that has the rows of the design.
-    pub fn untold(&self, target: &DVector<f64>) -> DVector<f64> {
-        let mut left = target.clone();
-        let width = self.told.len();
-        for (place, told) in self.told.iter().enumerate() {
-            let Some(Told { x, factor }) = told else { continue };
-            let y = DVector::from_fn(x.nrows(), |i, _| target[place + i * width]);
-            let rest = &y - x * factor.solve(&x.tr_mul(&y));
-            rest.iter().enumerate().for_each(|(i, value)| left[place + i * width] = *value);
-        }
-        left
-    }
-
     /// The rows of one component.
     fn part(&self, design: &Design, target: &DVector<f64>, rows: &[usize]) -> Part {
         let trials = design.rows.past_last_trial();
@@ -138,11 +104,10 @@ impl General {
         let fold_of_trial: Vec<usize> =
             (0..trials).map(|trial| design.place(trial) % folds.min(design.trials.len())).collect();
         let fold_of = |row: usize| fold_of_trial[design.rows.rows[row].trial];
-        let columns: Vec<&Smooth> = self.columns.iter().collect();
-        let x = scaled(&columns, rows);
+        let x = scaled(&self.columns, rows);
         let y = DVector::from_fn(rows.len(), |i, _| target[rows[i]]);
         let (xx, xy) = (x.tr_mul(&x), x.tr_mul(&y));
-        let count = columns.len();
+        let count = self.columns.len();
         let left = ridged(xx.clone(), rows.len())
             .map_or(y.norm_squared(), |factor| (&y - &x * factor.solve(&xy)).norm_squared());
         let shares = (0..count).map(|j| xy[j].powi(2) / xx[(j, j)].max(1e-12));
@@ -183,7 +148,7 @@ impl Part {
 }
 
 /// The functions over some rows, each in units of its root mean square.
-fn scaled(columns: &[&Smooth], rows: &[usize]) -> DMatrix<f64> {
+fn scaled(columns: &[Smooth], rows: &[usize]) -> DMatrix<f64> {
     let mut x = DMatrix::from_fn(rows.len(), columns.len(), |i, j| columns[j].values[rows[i]]);
     let root = (rows.len().max(1) as f64).sqrt();
     x.column_iter_mut().for_each(|mut column| column /= (column.norm() / root).max(1e-12));
@@ -204,19 +169,18 @@ const HATS: usize = 12;
 
 type Quantity = fn(&Series, usize) -> f64;
 
-/// Each with whether a model is told of it.
-fn quantities() -> [(&'static str, bool, Quantity); 3] {
+fn quantities() -> [(&'static str, Quantity); 3] {
     [
-        ("forward velocity", true, |s, i| s.conditions[i].velocity.x),
-        ("depth", true, |s, i| s.conditions[i].depth),
-        ("yaw rate", false, |s, i| s.conditions[i].angular_velocity.z),
+        ("forward velocity", |s, i| s.conditions[i].velocity.x),
+        ("depth", |s, i| s.conditions[i].depth),
+        ("yaw rate", |s, i| s.conditions[i].angular_velocity.z),
     ]
 }
 
 type Function = fn(&Series, usize, f64) -> f64;
 
-/// Functions of what a model is told.
-fn of_the_state() -> Vec<(&'static str, Function)> {
+/// Functions of the state, of how the vehicle moves and moved, and of where it heads.
+fn functions() -> Vec<(&'static str, Function)> {
     vec![
         ("a constant", |_, _, _| 1.0),
         ("forward velocity", |s, i, _| s.conditions[i].velocity.x),
@@ -244,12 +208,6 @@ fn of_the_state() -> Vec<(&'static str, Function)> {
         ("depth times forward velocity", |s, i, _| s.conditions[i].depth * s.conditions[i].velocity.x),
         ("pitch", |s, i, _| s.roll_pitch[i][1]),
         ("roll", |s, i, _| s.roll_pitch[i][0]),
-    ]
-}
-
-/// Functions of how the vehicle moves and moved, and of where it heads.
-fn of_the_motion() -> Vec<(&'static str, Function)> {
-    vec![
         ("forward acceleration", |s, i, _| s.conditions[i].acceleration.x),
         ("lateral acceleration", |s, i, _| s.conditions[i].acceleration.y),
         ("vertical acceleration", |s, i, _| s.conditions[i].acceleration.z),

@@ -9,6 +9,7 @@ use super::design::{Rows, to_rows};
 use super::features::{Features, of_bins};
 use super::judge::Judge;
 use super::locate::{Limits, OPEN, Region, inside};
+use super::model_error::ModelError;
 use super::noise::Floor;
 use super::rates::mean_square;
 use super::series::Series;
@@ -46,19 +47,17 @@ pub struct Closure {
 impl Closure {
     /// Share of the squared gap above noise and the model's own error that is explained; of all components together, in floors.
     pub(super) fn explained(&self) -> f64 {
-        let [before, after] = [self.before, self.after].map(|size| size * size);
-        (before - after) / (before - 1.0).max(f64::MIN_POSITIVE)
+        above_noise(self.before.powi(2), self.after.powi(2))
     }
 
-    /// Share of the squared gap above noise and the model's own error that is explained of all components, where what was named
-    /// does not hold on trials that nobody looked at: less than `least` is explained and what is left is loud; or it names a
-    /// fault of a sensor, which is exact, and closes too little even at the upper end of the interval.
-    pub(super) fn disproof(&self, least: f64, is_fault: bool) -> Option<f64> {
+    /// The share that is explained where what was named does not hold on trials that nobody looked at: less than `least` is explained
+    /// and what is left of all components is loud; or it names a fault of a sensor, which is exact, and closes too little even at the
+    /// upper end of the interval.
+    pub(super) fn disproof(&self, share: f64, least: f64, is_fault: bool) -> Option<f64> {
         /// In noise and the model's own error, as all components together are.
         const LOUD: f64 = 2.0;
         /// Closure that a fault must reach.
         const EXACT: f64 = 0.7;
-        let share = self.explained();
         let inexact = is_fault && self.interval.is_some_and(|[_, high]| high < EXACT);
         (inexact || self.after > LOUD && share < least).then_some(share)
     }
@@ -161,31 +160,37 @@ pub(super) fn closures(
     closures
 }
 
-/// A closure with the sizes of the gap as naming saw it, where the model states how far it may be off: without the share that its
-/// own error, a load that stays and one that goes with the square of the speed, has in each trial. What was named is held to
-/// nothing that its naming did not look at. Sizes in noises of a row, which hold the model's error.
-pub(super) fn as_naming_saw_it(
-    closure: Closure,
+/// Share of the squared gap that is explained as naming saw it, where the model states how far it may be off: in rows without the
+/// share that its error has in them. What was named is held to nothing that its naming did not look at.
+pub(super) fn explained_of_rows(
     named: &[Named],
     all: &[Series],
     held: &[usize],
     judge: &Judge,
-) -> Closure {
+) -> Option<f64> {
     let (noise, setting) = (&judge.design.noise, judge.setting);
-    if !held.iter().any(|&trial| noise.model[trial].iter().any(|std| *std > 0.0)) {
-        return closure;
+    if !noise.model {
+        return None;
     }
     let components = &setting.components;
     let rows = Rows::new(all, held, components, judge.config.block_s);
+    let error = ModelError::new(all, held, components, noise);
     let of = |value: &dyn Fn(usize) -> Column| {
-        mean_square(&to_rows(all, &rows, held, components, noise, value)).sqrt()
+        let mut rows = to_rows(all, &rows, held, components, noise, value);
+        error.take_off(&mut rows);
+        mean_square(&rows)
     };
     let after = |trial: usize| {
         let added = explained(named, &all[trial], trial, setting);
         let less = |(gap, added): (&[f64; 6], &[f64; 6])| std::array::from_fn(|c| gap[c] - added[c]);
         all[trial].gap.iter().zip(&added).map(less).collect()
     };
-    Closure { before: of(&|trial| all[trial].gap.clone()), after: of(&after), ..closure }
+    Some(above_noise(of(&|trial| all[trial].gap.clone()), of(&after)))
+}
+
+/// Share that is explained of what stands above the noise, of mean squares in units of it.
+fn above_noise(before: f64, after: f64) -> f64 {
+    (before - after) / (before - 1.0).max(f64::MIN_POSITIVE)
 }
 
 impl std::fmt::Display for Worse {
@@ -287,7 +292,8 @@ mod tests {
     #[test]
     fn a_name_is_disproved_where_little_is_explained_and_what_is_left_is_loud() {
         let of = |before: f64, after: f64| {
-            Closure { before, after, noise_floor: 1.0, closure: None, interval: None }.disproof(0.6, false)
+            let closure = Closure { before, after, noise_floor: 1.0, closure: None, interval: None };
+            closure.disproof(closure.explained(), 0.6, false)
         };
         // (85^2 - 57^2) / (85^2 - 1)
         assert!(of(85.0, 57.0).is_some_and(|share| (share - 0.5504).abs() < 1e-4));
@@ -296,7 +302,7 @@ mod tests {
         let fault = |high: f64| {
             let interval = Some([0.4, high]);
             Closure { before: 1.2, after: 1.1, noise_floor: 1.0, closure: Some(0.5), interval }
-                .disproof(0.6, true)
+                .disproof(0.5, 0.6, true)
         };
         assert!(fault(0.64).is_some() && fault(0.82).is_none(), "a zero that is off explains all of it");
     }

@@ -4,7 +4,7 @@
 //! Biometrika 1994) and Schwarz's price of a number (Annals of Statistics 1978). Each effect of a set must pass every gate given the others:
 //! significant by cluster-robust errors, inside its physical bounds, of one sign in every fold, better in most folds and in
 //! most of the blocks that excite it, a stated share of the remaining gap above the floor, larger than its phase-shifted
-//! placebos, and large enough to matter beside the noise of a sample and the model's own uncertainty.
+//! placebos, and large enough to matter beside the noise of a sample.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -13,10 +13,9 @@ use std::ops::Range;
 use nalgebra::DVector;
 
 use super::design::{Design, Fitted};
-use super::general::General;
 use super::noise::Floor;
 use super::rates::mean_square;
-use super::robust::{Error, contribution, errors, group, of_column, shadow, total};
+use super::robust::{Error, contribution, errors, group, shadow, total};
 use super::series::Series;
 use super::shared::{exceeds_noise, outlasts_noise};
 use super::statistics::deviate_of;
@@ -67,7 +66,7 @@ pub enum Refusal {
     NotSignificant,
     /// Coefficients beyond what is physically possible.
     OutOfBounds,
-    /// Too small beside the noise or the model's uncertainty.
+    /// Too small beside the noise.
     Irrelevant,
     /// Explains too little of the remaining gap.
     SmallShare,
@@ -93,7 +92,6 @@ pub(super) struct Judge<'a> {
     pub setting: &'a Setting<'a>,
     pub config: &'a Config,
     pub floors: &'a [Floor; 6],
-    pub general: &'a General,
     /// Loss that nothing explains.
     pub floor_loss: f64,
     passed: RefCell<Verdicts>,
@@ -106,10 +104,9 @@ impl<'a> Judge<'a> {
         setting: &'a Setting<'a>,
         config: &'a Config,
         floors: &'a [Floor; 6],
-        general: &'a General,
         floor_loss: f64,
     ) -> Self {
-        Self { design, all, setting, config, floors, general, floor_loss, passed: RefCell::default() }
+        Self { design, all, setting, config, floors, floor_loss, passed: RefCell::default() }
     }
 
     /// Loss above the floor, which there is to explain.
@@ -298,7 +295,8 @@ impl<'a> Judge<'a> {
         (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
     }
 
-    /// Size of what a member adds, against the noise of a sample and the model's uncertainty, in any component.
+    /// Size of what a member adds, against the noise of a sample, in any component. What of it the model's own error could be was
+    /// taken off the rows.
     fn relevant(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
         let (design, first) = (self.design, base.len());
         let mut squares = [0.0; 6];
@@ -312,32 +310,8 @@ impl<'a> Judge<'a> {
             count[place.component] += 1.0;
         }
         let size = |c: usize| (squares[c] / f64::max(count[c], 1.0)).sqrt();
-        let components = &self.setting.components;
-        let audible = |&&c: &&usize| size(c) > self.config.relevance * self.floors[c].sample;
-        components.iter().filter(audible).any(|&c| size(c) > self.floors[c].model)
-            || components.iter().any(|c| audible(&c)) && self.is_beyond_model(member, base, fitted)
-    }
-
-    /// True where no error of the model can stand for a member. That error is a function of what the model is told, velocity,
-    /// depth and attitude, the same in every trial: what goes with the same must be larger than it. What is left of a member
-    /// beyond all smooth functions of those is judged by the trials alone, whatever its size.
-    fn is_beyond_model(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {
-        /// Share of the member that must be left, and of its coefficient.
-        const MOST: f64 = 0.5;
-        let design = self.design;
-        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
-        let Some(sum) = contribution(design, base, &own, &fitted.beta.as_slice()[base.len()..]) else {
-            return false;
-        };
-        let left = self.general.untold(&sum);
-        if left.norm_squared() < MOST * sum.norm_squared() {
-            return false;
-        }
-        let columns: Vec<usize> = base.iter().chain(&own).copied().collect();
-        let residual = design.residual(&columns, &fitted.beta);
-        let kept = left.dot(&(&residual + &sum)) / left.norm_squared();
-        let error = of_column(design, &left, &residual);
-        kept > MOST && error.probability(kept) <= self.config.significance
+        let is_audible = |&c: &usize| size(c) > self.config.relevance * self.floors[c].sample;
+        self.setting.components.iter().any(is_audible)
     }
 
     fn stable(&self, member: &Member, base: &[usize], fitted: &Fitted) -> bool {

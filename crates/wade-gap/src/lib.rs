@@ -36,6 +36,7 @@ mod judge;
 mod lasting;
 mod locate;
 mod measurement;
+mod model_error;
 mod noise;
 mod nonlinear;
 mod page;

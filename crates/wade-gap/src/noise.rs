@@ -4,6 +4,7 @@
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
 use super::design::RowNoise;
+use super::model_error::ROUGH;
 use super::rates::mean_step;
 use super::series::Series;
 use super::smoothing::Smoothing;
@@ -207,7 +208,8 @@ fn half_difference(a: &Series, b: &Series, component: usize) -> Option<f64> {
     (!differences.is_empty()).then_some(0.5 * variance)
 }
 
-/// Noise of the rows, for weights: of bins by their own high-frequency part, of trials by what the manifest states.
+/// Noise of the rows, for weights: of bins by their own high-frequency part and what of the model's error is no smooth function of
+/// the state, of trials by what the manifest states.
 pub(super) fn row_noise(
     all: &[Series],
     trials: &[usize],
@@ -215,7 +217,7 @@ pub(super) fn row_noise(
     (floors, manifest): (&[Floor; 6], &Manifest),
     smoothing: Smoothing,
 ) -> RowNoise {
-    let model = all.iter().map(|series| model_error(std::slice::from_ref(&series))).collect();
+    let model = components.iter().any(|&c| floors[c].model > 0.0);
     let mut noise = RowNoise { bin: [1.0; 6], offset: vec![[0.0; 6]; all.len()], model, smoothing };
     for &component in components {
         let mut variances = Vec::new();
@@ -232,9 +234,7 @@ pub(super) fn row_noise(
         // a component without any noise at all weighs as if its gap were noise of a thousandth
         let size = rms(all, trials, component);
         let bin = bin.max(1e-3 * size).max(1e-12);
-        // what the model does not know of itself goes with the state, and stays; a component of which it knows little
-        // says little beside the others
-        noise.bin[component] = bin.hypot(floors[component].model);
+        noise.bin[component] = bin.hypot(ROUGH.sqrt() * floors[component].model);
         for (offset, series) in noise.offset.iter_mut().zip(all) {
             offset[component] = manifest.trial_offset_of(&series.name, WRENCH[component]);
         }

@@ -360,7 +360,7 @@ pub(super) fn refusal(why: Refusal) -> &'static str {
     match why {
         Refusal::NotSignificant => "not significant in addition to the named effects",
         Refusal::OutOfBounds => "physically impossible value",
-        Refusal::Irrelevant => "smaller than the noise of a sample or the model's own error",
+        Refusal::Irrelevant => "smaller than the noise of a sample",
         Refusal::SmallShare => "explains too little of the remaining gap",
         Refusal::Unstable => "absent in most folds, or its sign changes",
         Refusal::NotNew => "collinear with the named effects",

@@ -74,7 +74,7 @@ pub(super) fn group(
 }
 
 /// The error of the coefficient of a single column that is no part of the design.
-pub(super) fn of_column(design: &Design, column: &DVector<f64>, residual: &DVector<f64>) -> Error {
+fn of_column(design: &Design, column: &DVector<f64>, residual: &DVector<f64>) -> Error {
     let weights = column / column.norm_squared().max(f64::MIN_POSITIVE);
     Noise::of(residual).error(design, &weights, column.as_slice())
 }
@@ -157,12 +157,15 @@ impl<'a> Noise<'a> {
             of_block[place.block] += column[row] * column[row];
         }
         let (trials, blocks) = (effective(&energy), effective(&of_block));
+        // never less than that of rows in which the model is as wrong as it says
+        let least = if design.noise.model { weights.norm_squared() } else { 0.0 };
         if trials >= ENOUGH_TRIALS {
             let by_trial: Vec<f64> = rows.of_trial.iter().map(|r| r.clone().map(part).sum()).collect();
-            return Error { std: sandwich(&by_trial).sqrt(), freedom: trials - 1.0, trials, blocks };
+            let variance = sandwich(&by_trial).max(least);
+            return Error { std: variance.sqrt(), freedom: trials - 1.0, trials, blocks };
         }
         // where nothing is there the noise is that of all blocks together, which the scatter of a few can only exceed
-        let variance = self.pooled(design, weights).max(sandwich(&by_block));
+        let variance = self.pooled(design, weights).max(sandwich(&by_block)).max(least);
         Error { std: variance.sqrt(), freedom: rows.blocks as f64 - 1.0, trials, blocks }
     }
 

@@ -87,27 +87,27 @@ pub fn run(
     let gap_structure = general.structure(&design, &setting.components, &design.y);
     let floor_loss = floor_loss(&design, &gap_structure);
     let mut members = {
-        let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
+        let judge = Judge::new(&design, &all, &setting, config, &floors, floor_loss);
         judge.select(&library)
     };
-    // a set while a part of it is tried in its place, and the names of a part that did not hold
-    let (mut whole, mut refuted): (Option<Vec<Member>>, Vec<&str>) = (None, Vec::new());
+    // the set of the search while a more probable one is tried in its place, and the names of one that did not hold
+    let (mut searched, mut refuted): (Option<Vec<Member>>, Vec<&str>) = (None, Vec::new());
     loop {
         let asked = members.clone();
         refine(&mut design, &all, &setting, &members);
         through_sensors(&mut design, &mut all, &setting, &members);
         // what stood in for a shape that was not yet right has no place any more
-        let judge = Judge::new(&design, &all, &setting, config, &floors, &general, floor_loss);
+        let judge = Judge::new(&design, &all, &setting, config, &floors, floor_loss);
         members = judge.confirmed(&members);
         let mut found = Found::of(&judge, &members, &library, &general, &gap_structure);
         let weighed = weigh(&judge, &found, &library);
         let is_disproved = |set: &[Member]| is_disproved(&judge, set, &held);
-        let next = match whole.take() {
-            Some(whole) if found.verdict != Verdict::Named || is_disproved(&members) => {
+        let next = match searched.take() {
+            Some(searched) if found.verdict != Verdict::Named || is_disproved(&members) => {
                 refuted = judge.names(&asked);
-                Some(whole)
+                Some(searched)
             }
-            None if refuted.is_empty() => found.part_to_name(&weighed).inspect(|_| whole = Some(asked)),
+            None if refuted.is_empty() => found.set_to_name(&weighed).inspect(|_| searched = Some(asked)),
             _ => None,
         };
         let Some(next) = next else {

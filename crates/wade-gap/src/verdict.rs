@@ -10,6 +10,7 @@ use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
 use super::judge::{Judge, Member};
 use super::lasting::lasting;
+use super::model_error::ROUGH;
 use super::nonlinear::is_too_short;
 use super::report::Verdict;
 use wade_core::effects::Effect;
@@ -91,6 +92,8 @@ impl Found {
         let residual = design.residual(&columns, &beta);
         let coverage = (design.empty_loss() - loss) / judge.missing();
         let needed = if judge.has_fault(members) { config.coverage.max(EXACT) } else { config.coverage };
+        // rows in which the model is as wrong as it says have a square of 1 each
+        let stated = if design.noise.model { design.y.len() as f64 } else { 0.0 };
         let unresolved = members.iter().any(|member| {
             let candidate = &design.candidates[member.candidate];
             is_too_short(&candidate.shape, judge.setting)
@@ -106,7 +109,7 @@ impl Found {
         });
         let unfit = match members.is_empty() {
             true => None,
-            _ if coverage < needed => Some(Unfit::Explains(coverage, needed)),
+            _ if coverage < needed && loss > stated => Some(Unfit::Explains(coverage, needed)),
             _ if unresolved => Some(Unfit::Unresolved),
             _ if imitated => Some(Unfit::Imitates),
             _ => leaves_much(design, &residual).then_some(Unfit::Leaves),
@@ -127,15 +130,13 @@ impl Found {
         Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, of_gap, loss, unfit }
     }
 
-    /// The part of what was found that is the most probable explanation, clearly more so than the whole.
-    pub fn part_to_name(&self, weighed: &[Weighed]) -> Option<Vec<Member>> {
+    /// The most probable explanation, where it is a set of effects that is clearly more so than what was found: a search that adds one
+    /// effect after the other can end in a set too many or too few.
+    pub fn set_to_name(&self, weighed: &[Weighed]) -> Option<Vec<Member>> {
         let own = weighed.iter().find(|weighed| weighed.set == self.members)?;
-        let first = weighed.first()?;
+        let first = weighed.first().filter(|first| first.explanation.is_of_library())?;
         let outweighs = first.explanation.probability > SUBSTANTIAL * own.explanation.probability;
-        let is_part = first.explanation.is_of_library()
-            && first.explanation.effects.len() < own.explanation.effects.len()
-            && first.explanation.effects.iter().all(|effect| own.explanation.effects.contains(effect));
-        (self.verdict == Verdict::Named && outweighs && is_part).then(|| first.set.clone())
+        (self.verdict == Verdict::Named && outweighs).then(|| first.set.clone())
     }
 
     /// Names nothing against the weight of the evidence: explanations that are clearly more probable and that the held-out
@@ -189,10 +190,12 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     let relative = setting
         .components
         .iter()
-        .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].model) / design.noise.bin[c])
+        .map(|&c| judge.floors[c].sample.hypot(ROUGH.sqrt() * judge.floors[c].model) / design.noise.bin[c])
         .fold(f64::INFINITY, f64::min);
     let least = config.relevance * relative;
-    let size = (structure.gain / rows).sqrt();
+    let size = ((structure.gain - design.error.most_left()).max(0.0) / rows).sqrt();
+    // what lasts and is no larger than the rough part of what the model says is none
+    let lasts = if design.noise.model { least.max(1.0) } else { least };
     // a force that comes and goes with no phase of its own shows in its energy alone
     let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
     let (deviate, energy) = energy(all, design, &unsmoothed);
@@ -201,12 +204,14 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     let moving = lasting(design, &without_zeros(design, &design.y));
     // a load that was computed has no noise that hangs together and could pass for a gap
     let naming = design.trials.iter().map(|&trial| &all[trial]);
-    let above = || sizes(naming.clone(), judge.floors, setting, config).values().any(|s| s.above_floor);
+    let above = || {
+        sizes(naming.clone(), judge.floors, &design.error, setting, config).values().any(|s| s.above_floor)
+    };
     setting.computed && above()
         || structure.deviate > STRUCTURE && size > least
-        || deviate > bar && energy > 2.0 * least.max(0.5)
-        || kept.most.deviate > LASTS && kept.most.rms > least
-        || moving.most.deviate > LOUD[0] && moving.most.rms > LOUD[1].max(least)
+        || deviate > bar && energy > 2.0 * lasts.max(0.5)
+        || kept.most.deviate > LASTS && kept.most.rms > lasts
+        || moving.most.deviate > LOUD[0] && moving.most.rms > LOUD[1].max(lasts)
         || moving.together.deviate > LOUD[0] && moving.together.rms > HUGE.max(least)
 }
 

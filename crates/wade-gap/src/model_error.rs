@@ -1,0 +1,236 @@
+//! What the model may be off by: one smooth function of the state, the same in every trial.
+//!
+//! A model that states a standard deviation says how far its answer for a state may be off; the error is the same whenever the
+//! state is the same, and alike where states are alike. So it is a Gaussian process over the state (Kennedy, O'Hagan, J. Roy. Stat.
+//! Soc. B 63, 2001) with the stated deviation `d`: `cov(e(s), e(s')) = (1 - r) d(s) d(s') exp(-|s - s'|^2 / 2)`, each number of a
+//! state measured in lengths, and a part `r` of the variance is rough. The smooth part's share in the rows is taken off in the share that it has in them, by a few states that stand for all
+//! (Nystrom's method; Rasmussen, Williams, Gaussian Processes for Machine Learning, 2006, section 8.1).
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::design::RowNoise;
+use super::series::Series;
+use super::statistics::quantile;
+
+/// Numbers of a state: velocity, depth, roll and pitch, angular velocity.
+const NUMBERS: usize = 9;
+/// A state in lengths.
+type State = [f64; NUMBERS];
+
+/// A length over the range that the trials cover: errors at the two ends of it are nearly independent, of a correlation of `e^-2`.
+/// Fitted to how the base misses our CFD, lengths are 0.05 to 0.3 of the range of a velocity, and 0.6 to 1.1 of the depth.
+const OF_RANGE: f64 = 0.5;
+/// Share of the squared error that is no smooth function of the state and counts as noise of a bin: of how the base misses our CFD
+/// along x a third in the mean of both vehicles.
+pub(super) const ROUGH: f64 = 1.0 / 3.0;
+/// Least lengths [m/s, m, rad, rad/s]: what varies by less is noise of the motion.
+const LEAST: State = [0.15, 0.15, 0.15, 0.025, 0.05, 0.05, 0.15, 0.15, 0.15];
+/// What 19 of 20 normal deviates are below.
+const DEVIATE: f64 = 1.645;
+/// States that stand for all.
+const MOST_STATES: usize = 48;
+/// Squared distance of two states that say the same.
+const SAME: f64 = 1e-4;
+
+/// The error of a model in the rows of some trials.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ModelError {
+    /// Of each component in the order of a bin's rows; nothing where the model states none.
+    parts: Vec<Part>,
+}
+
+/// The covariance of the rows of a component is `I + Z Z^T`, and its inverse root is `I - Z share Z^T`.
+#[derive(Debug, Clone)]
+struct Part {
+    z: DMatrix<f64>,
+    share: DMatrix<f64>,
+    /// Degrees of freedom of the smooth function that the rows tell of.
+    freedom: f64,
+}
+
+impl ModelError {
+    /// Of the rows of some trials.
+    pub fn new(all: &[Series], trials: &[usize], components: &[usize], noise: &RowNoise) -> Self {
+        if !noise.model {
+            return Self::default();
+        }
+        let states: Vec<Vec<State>> = trials.iter().map(|&trial| states(&all[trial])).collect();
+        let lengths = lengths(states.concat());
+        let in_lengths = |state: State| std::array::from_fn(|i| state[i] / lengths[i]);
+        let states: Vec<Vec<State>> =
+            states.into_iter().map(|of| of.into_iter().map(in_lengths).collect()).collect();
+        let process = Process::new(&states.concat());
+        let weights: Vec<DMatrix<f64>> = states.iter().map(|states| process.weights(states)).collect();
+        let rows = states.iter().map(Vec::len).sum();
+        let part = |&component: &usize| {
+            let mut z = DMatrix::zeros(rows, process.states.len());
+            let mut first = 0;
+            for (&trial, weights) in trials.iter().zip(&weights) {
+                let series = &all[trial];
+                let smooth = (1.0 - ROUGH).sqrt() / noise.bin[component];
+                let size = series.binned(|i| smooth * series.uncertainty[i][component]);
+                let mut of_trial = DMatrix::from_diagonal(&DVector::from_vec(size)) * weights;
+                for mut column in of_trial.column_iter_mut() {
+                    noise.center(column.as_mut_slice(), trial, component);
+                }
+                z.rows_mut(first, weights.nrows()).copy_from(&of_trial);
+                first += weights.nrows();
+            }
+            Part::new(z)
+        };
+        Self { parts: components.iter().map(part).collect() }
+    }
+
+    /// Takes the error's share off rows, which are those of all the trials.
+    pub fn take_off(&self, rows: &mut [f64]) {
+        let width = self.parts.len();
+        for (place, Part { z, share, .. }) in self.parts.iter().enumerate() {
+            let own = DVector::from_iterator(z.nrows(), rows.iter().skip(place).step_by(width).copied());
+            let off = z * (share * z.tr_mul(&own));
+            rows.iter_mut().skip(place).step_by(width).zip(&off).for_each(|(row, off)| *row -= off);
+        }
+    }
+
+    /// Sum of squares that a smooth error of the stated size leaves in the rows in 19 of 20 draws at most: a chi-square of its degrees
+    /// of freedom.
+    pub fn most_left(&self) -> f64 {
+        let freedom: f64 = self.parts.iter().map(|part| part.freedom).sum();
+        freedom + DEVIATE * (2.0 * freedom).sqrt()
+    }
+
+    /// How many times what is stated the error of a component is in 19 of 20 draws at most, root mean square over all rows: a smooth
+    /// function has few degrees of freedom (Satterthwaite, Biometrics Bulletin 2, 1946), which it has a chi-square of (Wilson,
+    /// Hilferty, PNAS 17, 1931).
+    pub fn at_most(&self, place: usize) -> f64 {
+        let Some(Part { z, .. }) = self.parts.get(place) else { return 1.0 };
+        let squares = z.tr_mul(z);
+        let spread = 2.0 / 9.0 * squares.norm_squared() / squares.trace().powi(2).max(f64::MIN_POSITIVE);
+        (1.0 - spread + DEVIATE * spread.sqrt()).powf(1.5)
+    }
+}
+
+impl Part {
+    fn new(z: DMatrix<f64>) -> Self {
+        let SymmetricEigen { eigenvectors, eigenvalues } = z.tr_mul(&z).symmetric_eigen();
+        // (1 - 1 / sqrt(1 + l)) / l, which is 1/2 where l vanishes
+        let shares = eigenvalues.map(|l| {
+            let root = (1.0 + l.max(0.0)).sqrt();
+            1.0 / (root * (1.0 + root))
+        });
+        let share = &eigenvectors * DMatrix::from_diagonal(&shares) * eigenvectors.transpose();
+        let freedom = eigenvalues.iter().map(|l| l.max(0.0) / (1.0 + l.max(0.0))).sum();
+        Self { z, share, freedom }
+    }
+}
+
+/// The state of each bin, in SI units.
+fn states(series: &Series) -> Vec<State> {
+    let number = |number: usize| {
+        series.binned(|i| {
+            let condition = &series.conditions[i];
+            match number {
+                0..3 => condition.velocity[number],
+                3 => condition.depth,
+                4 | 5 => series.roll_pitch[i][number - 4],
+                _ => condition.angular_velocity[number - 6],
+            }
+        })
+    };
+    let numbers: [Vec<f64>; NUMBERS] = std::array::from_fn(number);
+    (0..series.bins.len()).map(|bin| std::array::from_fn(|i| numbers[i][bin])).collect()
+}
+
+fn lengths(states: Vec<State>) -> State {
+    std::array::from_fn(|number| {
+        // single samples of noise do not widen what was covered
+        let mut values: Vec<f64> = states.iter().map(|state| state[number]).collect();
+        let [low, high] = [0.01, 0.99].map(|share| quantile(&mut values, share));
+        (OF_RANGE * (high - low)).max(LEAST[number])
+    })
+}
+
+/// A Gaussian process of unit variance as a sum over independent unit Gaussian weights.
+struct Process {
+    states: Vec<State>,
+    /// Inverse root of the covariance of the states.
+    root: DMatrix<f64>,
+}
+
+impl Process {
+    /// By some of the states, each as far from those before it as can be.
+    fn new(all: &[State]) -> Self {
+        let mut states: Vec<State> = Vec::new();
+        let mut distances = vec![f64::INFINITY; all.len()];
+        let mut next = 0;
+        while states.len() < MOST_STATES && distances.get(next).is_some_and(|distance| *distance > SAME) {
+            let state = all[next];
+            states.push(state);
+            for (distance, other) in distances.iter_mut().zip(all) {
+                *distance = distance.min(squared_distance(&state, other));
+            }
+            next = (0..all.len()).max_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
+        }
+        let of = |i: usize, j: usize| covariance(&states[i], &states[j]);
+        let SymmetricEigen { eigenvectors, eigenvalues } =
+            DMatrix::from_fn(states.len(), states.len(), of).symmetric_eigen();
+        let roots = eigenvalues.map(|l| if l > 1e-9 { l.sqrt().recip() } else { 0.0 });
+        let root = &eigenvectors * DMatrix::from_diagonal(&roots) * eigenvectors.transpose();
+        Self { states, root }
+    }
+
+    /// What each weight adds at each state.
+    fn weights(&self, at: &[State]) -> DMatrix<f64> {
+        let near = |i: usize, j: usize| covariance(&at[i], &self.states[j]);
+        DMatrix::from_fn(at.len(), self.states.len(), near) * &self.root
+    }
+}
+
+fn covariance(a: &State, b: &State) -> f64 {
+    (-0.5 * squared_distance(a, b)).exp()
+}
+
+fn squared_distance(a: &State, b: &State) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// States along a line, a tenth of a length apart.
+    fn line(count: usize) -> Vec<State> {
+        (0..count).map(|i| std::array::from_fn(|n| if n == 0 { 0.1 * i as f64 } else { 0.0 })).collect()
+    }
+
+    #[test]
+    fn a_few_states_stand_for_all_and_rows_lose_the_inverse_root_of_the_covariance() {
+        let states = line(60);
+        let z = Process::new(&states).weights(&states) * 1.7;
+        let covariance = DMatrix::from_fn(60, 60, |i, j| 1.7 * 1.7 * covariance(&states[i], &states[j]));
+        assert!((&z * z.transpose() - &covariance).amax() < 1e-6);
+        let SymmetricEigen { eigenvectors, eigenvalues } =
+            (covariance + DMatrix::identity(60, 60)).symmetric_eigen();
+        let root = &eigenvectors
+            * DMatrix::from_diagonal(&eigenvalues.map(|l| l.sqrt().recip()))
+            * eigenvectors.transpose();
+        // of two components in turn, each has its own rows
+        let values: Vec<f64> = (0..120).map(|i| f64::from(i * i % 7) - 2.0).collect();
+        let mut rows = values.clone();
+        ModelError { parts: vec![Part::new(z.clone()), Part::new(z)] }.take_off(&mut rows);
+        for place in 0..2 {
+            let of = |rows: &[f64]| DVector::from_fn(60, |i, _| rows[2 * i + place]);
+            assert!((&root * of(&values) - of(&rows)).amax() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn an_error_that_is_alike_everywhere_may_be_far_larger_than_stated() {
+        // |N(0, 1)| is below 1.96 in 19 of 20 draws
+        let alike = ModelError { parts: vec![Part::new(DMatrix::from_element(50, 1, 0.3))] };
+        assert!((alike.at_most(0) - 1.96).abs() < 0.03, "{}", alike.at_most(0));
+        // root of the chi-square of 50 degrees at 0.95, over 50
+        let independent = ModelError { parts: vec![Part::new(DMatrix::identity(50, 50))] };
+        assert!((independent.at_most(0) - (67.505_f64 / 50.0).sqrt()).abs() < 0.002);
+        assert_eq!(ModelError::default().at_most(0), 1.0);
+    }
+}
