@@ -110,7 +110,6 @@ pub fn ramps() -> String {
         "before_y_n",
         "after_y_n",
         "explained_percent",
-        "applied",
     ];
     let rows = rows.iter().map(|row| columns.map(|column| row[column].clone()).to_vec());
     let header = [
@@ -123,7 +122,6 @@ pub fn ramps() -> String {
         "y before [N]",
         "y after [N]",
         "explained [%]",
-        "`--apply`",
     ];
     let condition = comments.replace("# ", "").replace('\n', ".\n");
     format!("```text\n{condition}\n```\n\n{}", markdown(&header, rows.collect()))

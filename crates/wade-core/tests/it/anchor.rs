@@ -106,10 +106,12 @@ fn at_rest_the_surfaces_feel_archimedes_and_nothing_else() {
 fn a_dry_surface_has_nothing_and_gets_wet_without_a_jump() {
     for name in crate::common::VEHICLES {
         let vehicle = vehicle(name);
+        let anchor = Anchor::new(&vehicle);
+        let mut reading = Reading::default();
         let mut before: Option<Vec<f64>> = None;
         for step in 0..4000 {
             let depth = 1e-4 * f64::from(step);
-            let reading = read(&vehicle, &Condition::level(Vec3::new(0.9, 0.3, 0.0), depth));
+            anchor.read(&vehicle, &Condition::level(Vec3::new(0.9, 0.3, 0.0), depth), &mut reading);
             for surface in reading.surfaces.iter().filter(|s| s.wet_fraction == 0.0) {
                 assert_eq!((surface.unit, surface.drag, surface.hydrostatic.force), Default::default());
             }
