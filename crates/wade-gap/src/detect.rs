@@ -37,7 +37,8 @@ pub struct GapSize {
     pub interval: [f64; 2],
     /// What noise alone would show.
     pub noise_floor: f64,
-    /// True where the interval lies above the floor, and above all noise that a floor of its source may have missed.
+    /// True where the interval lies above the floor, above all noise that a floor of its source may have missed, and above what a
+    /// smooth error of the stated size can be.
     pub above_floor: bool,
 }
 
