@@ -19,7 +19,7 @@ use super::noise::{Floor, floors_of};
 use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
 use super::sentences::{summary, unexplained};
 use super::series::Series;
-use super::statistics::quantile;
+use super::statistics::{Z90, quantile};
 use super::verdict::Found;
 use super::{Named, measurement, plausible};
 use wade_core::condition::Condition;
@@ -286,7 +286,7 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             nonlinear.filter(|(axis, _)| one.shape.parameter(*axis) != 0.0)
         {
             let (value, std) = (one.shape.parameter(axis), fitted.shape_std[index][axis]);
-            let interval = [value - 1.645 * std, value + 1.645 * std];
+            let interval = [value - Z90 * std, value + Z90 * std];
             parameters.insert(name, Parameter { value, std, unit, interval, literature: None });
         }
         effects.push(NamedEffect {

@@ -39,6 +39,11 @@ pub(super) struct RowNoise {
 }
 
 impl RowNoise {
+    /// Least mean square that is expected of rows: 1 where the model may be as wrong as it says, else 0, since noise is estimated.
+    pub fn stated(&self) -> f64 {
+        f64::from(u8::from(self.model))
+    }
+
     /// Takes off the mean of a trial's standardised values in the share that its zero has in it.
     pub fn center(&self, values: &mut [f64], trial: usize, component: usize) {
         let zero = self.offset[trial][component] / self.bin[component];
@@ -117,19 +122,21 @@ impl Rows {
     }
 }
 
-/// A value a sample to the rows: bin means, smoothed, standardised, partly centered trial by trial.
+/// A value a sample to the rows: bin means, smoothed, standardised, partly centered trial by trial, less the share that the model's
+/// error has in them.
 pub(super) fn to_rows(
     all: &[Series],
     rows: &Rows,
     trials: &[usize],
     components: &[usize],
-    noise: &RowNoise,
+    (noise, error): (&RowNoise, &ModelError),
     of: impl Fn(usize) -> Column,
 ) -> Vec<f64> {
     let mut out = Vec::with_capacity(rows.rows.len());
     for &trial in trials {
         rows_of_trial(&all[trial], trial, components, noise, &of(trial), &mut out);
     }
+    error.take_off(&mut out);
     out
 }
 
@@ -212,8 +219,7 @@ impl Design {
     ) -> Self {
         let gap = |trial: usize| all[trial].gap.clone();
         let error = ModelError::new(all, &trials, &setting.components, &noise);
-        let mut y = to_rows(all, &rows, &trials, &setting.components, &noise, gap);
-        error.take_off(&mut y);
+        let y = to_rows(all, &rows, &trials, &setting.components, (&noise, &error), gap);
         let y = DVector::from_vec(y);
         let block_fold = folds(all, &rows, config);
         let mut this = Self {
@@ -276,9 +282,7 @@ impl Design {
 
     /// A value a sample as rows.
     pub fn to_rows(&self, all: &[Series], components: &[usize], of: impl Fn(usize) -> Column) -> Vec<f64> {
-        let mut rows = to_rows(all, &self.rows, &self.trials, components, &self.noise, of);
-        self.error.take_off(&mut rows);
-        rows
+        to_rows(all, &self.rows, &self.trials, components, (&self.noise, &self.error), of)
     }
 
     fn candidate_columns(
@@ -307,9 +311,8 @@ impl Design {
         of: &dyn Fn(usize) -> Column,
     ) -> DVector<f64> {
         let noise = self.unsmoothed_noise();
-        let mut rows = to_rows(all, &self.rows, &self.trials, &setting.components, &noise, of);
-        self.error.take_off(&mut rows);
-        DVector::from_vec(rows)
+        let noise = (&noise, &self.error);
+        DVector::from_vec(to_rows(all, &self.rows, &self.trials, &setting.components, noise, of))
     }
 
     fn unsmoothed_noise(&self) -> RowNoise {

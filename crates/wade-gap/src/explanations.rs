@@ -175,11 +175,11 @@ fn weights(all: &[Weighed], judge: &Judge, found: &Found) -> Vec<f64> {
     let design = judge.design;
     let rows = design.y.len().max(1) as f64;
     let least = all.iter().map(|weighed| weighed.losses.iter().sum::<f64>()).fold(f64::INFINITY, f64::min);
-    // what the best explanation leaves is noise, never less than that of rows in which the model is as wrong as it says, and rows that are correlated say the same several times; what a law leaves
-    // open of all that is explained is one number more, since it is off in the same way everywhere
+    // what the best explanation leaves is noise, never less than where the model is as wrong as it says, and rows that are
+    // correlated say the same several times; what a law leaves open of all that is explained is one number more, since it is off in
+    // the same way everywhere
     let memory = memory_of(design, &found.residual);
-    let stated = if design.noise.model { 1.0 } else { f64::MIN_POSITIVE };
-    let variance = (least / rows).max(stated) * memory;
+    let variance = (least / rows).max(design.noise.stated()).max(f64::MIN_POSITIVE) * memory;
     let variance = variance + FORMULA.powi(2) * (design.empty_loss() - least).max(0.0);
     // of a number, by Schwarz's criterion
     let price = 0.5 * (rows / memory).max(1.0).ln();

@@ -14,12 +14,10 @@ use super::features::{DEPTH, Features, SPEED, of_bins};
 use super::judge::Member;
 use super::robust::errors;
 use super::series::Series;
-use super::statistics::{quantile, student_from_normal};
+use super::statistics::{Z90, quantile, student_from_normal};
 use wade_core::effects::{Effect, Kind, Numbers};
 use wade_learn::random::Random;
 
-/// Two-sided 90 % of a normal distribution.
-const Z90: f64 = 1.645;
 /// Fewest trials, in effect, that let an interval rest on the scatter between trials.
 const ENOUGH_TRIALS: f64 = 8.0;
 /// Share of a load of the water that its formula leaves open, one standard deviation: no law of the library holds to

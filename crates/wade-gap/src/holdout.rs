@@ -176,9 +176,7 @@ pub(super) fn explained_of_rows(
     let rows = Rows::new(all, held, components, judge.config.block_s);
     let error = ModelError::new(all, held, components, noise);
     let of = |value: &dyn Fn(usize) -> Column| {
-        let mut rows = to_rows(all, &rows, held, components, noise, value);
-        error.take_off(&mut rows);
-        mean_square(&rows)
+        mean_square(&to_rows(all, &rows, held, components, (noise, &error), value))
     };
     let after = |trial: usize| {
         let added = explained(named, &all[trial], trial, setting);

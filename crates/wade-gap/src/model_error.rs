@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::design::RowNoise;
 use super::series::Series;
-use super::statistics::quantile;
+use super::statistics::{Z90, quantile};
 
 /// Numbers of a state: velocity, depth, roll and pitch, angular velocity.
 const NUMBERS: usize = 9;
@@ -25,8 +25,6 @@ const OF_RANGE: f64 = 0.5;
 pub(super) const ROUGH: f64 = 1.0 / 3.0;
 /// Least lengths [m/s, m, rad, rad/s]: what varies by less is noise of the motion.
 const LEAST: State = [0.15, 0.15, 0.15, 0.025, 0.05, 0.05, 0.15, 0.15, 0.15];
-/// What 19 of 20 normal deviates are below.
-const DEVIATE: f64 = 1.645;
 /// States that stand for all.
 const MOST_STATES: usize = 48;
 /// Squared distance of two states that say the same.
@@ -44,8 +42,8 @@ pub(super) struct ModelError {
 struct Part {
     z: DMatrix<f64>,
     share: DMatrix<f64>,
-    /// Degrees of freedom of the smooth function that the rows tell of.
-    freedom: f64,
+    /// Eigenvalues of `Z^T Z`, none below 0.
+    squares: DVector<f64>,
 }
 
 impl ModelError {
@@ -94,18 +92,17 @@ impl ModelError {
     /// Sum of squares that a smooth error of the stated size leaves in the rows in 19 of 20 draws at most: a chi-square of its degrees
     /// of freedom.
     pub fn most_left(&self) -> f64 {
-        let freedom: f64 = self.parts.iter().map(|part| part.freedom).sum();
-        freedom + DEVIATE * (2.0 * freedom).sqrt()
+        let freedom: f64 = self.parts.iter().flat_map(|part| &part.squares).map(|l| l / (1.0 + l)).sum();
+        freedom + Z90 * (2.0 * freedom).sqrt()
     }
 
     /// How many times what is stated the error of a component is in 19 of 20 draws at most, root mean square over all rows: a smooth
     /// function has few degrees of freedom (Satterthwaite, Biometrics Bulletin 2, 1946), which it has a chi-square of (Wilson,
     /// Hilferty, PNAS 17, 1931).
     pub fn at_most(&self, place: usize) -> f64 {
-        let Some(Part { z, .. }) = self.parts.get(place) else { return 1.0 };
-        let squares = z.tr_mul(z);
-        let spread = 2.0 / 9.0 * squares.norm_squared() / squares.trace().powi(2).max(f64::MIN_POSITIVE);
-        (1.0 - spread + DEVIATE * spread.sqrt()).powf(1.5)
+        let Some(Part { squares, .. }) = self.parts.get(place) else { return 1.0 };
+        let spread = 2.0 / 9.0 * squares.norm_squared() / squares.sum().powi(2).max(f64::MIN_POSITIVE);
+        (1.0 - spread + Z90 * spread.sqrt()).powf(1.5)
     }
 }
 
@@ -113,13 +110,13 @@ impl Part {
     fn new(z: DMatrix<f64>) -> Self {
         let SymmetricEigen { eigenvectors, eigenvalues } = z.tr_mul(&z).symmetric_eigen();
         // (1 - 1 / sqrt(1 + l)) / l, which is 1/2 where l vanishes
-        let shares = eigenvalues.map(|l| {
-            let root = (1.0 + l.max(0.0)).sqrt();
+        let squares = eigenvalues.map(|l| l.max(0.0));
+        let shares = squares.map(|l| {
+            let root = (1.0 + l).sqrt();
             1.0 / (root * (1.0 + root))
         });
         let share = &eigenvectors * DMatrix::from_diagonal(&shares) * eigenvectors.transpose();
-        let freedom = eigenvalues.iter().map(|l| l.max(0.0) / (1.0 + l.max(0.0))).sum();
-        Self { z, share, freedom }
+        Self { z, share, squares }
     }
 }
 

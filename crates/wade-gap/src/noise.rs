@@ -59,6 +59,11 @@ impl Floor {
     pub fn with_model(&self) -> f64 {
         self.total().hypot(self.model)
     }
+
+    /// What of the model's error is no smooth function of the state [N or N m].
+    pub(super) fn rough(&self) -> f64 {
+        ROUGH.sqrt() * self.model
+    }
 }
 
 /// The floor of each compared component from the trials `naming`; the others are 0. Repeats may be of any trials: what
@@ -234,7 +239,7 @@ pub(super) fn row_noise(
         // a component without any noise at all weighs as if its gap were noise of a thousandth
         let size = rms(all, trials, component);
         let bin = bin.max(1e-3 * size).max(1e-12);
-        noise.bin[component] = bin.hypot(ROUGH.sqrt() * floors[component].model);
+        noise.bin[component] = bin.hypot(floors[component].rough());
         for (offset, series) in noise.offset.iter_mut().zip(all) {
             offset[component] = manifest.trial_offset_of(&series.name, WRENCH[component]);
         }

@@ -158,7 +158,7 @@ impl<'a> Noise<'a> {
         }
         let (trials, blocks) = (effective(&energy), effective(&of_block));
         // never less than that of rows in which the model is as wrong as it says
-        let least = if design.noise.model { weights.norm_squared() } else { 0.0 };
+        let least = design.noise.stated() * weights.norm_squared();
         if trials >= ENOUGH_TRIALS {
             let by_trial: Vec<f64> = rows.of_trial.iter().map(|r| r.clone().map(part).sum()).collect();
             let variance = sandwich(&by_trial).max(least);

@@ -37,6 +37,9 @@ pub(super) fn quiet_white_variance(values: &[f64]) -> f64 {
     median(&mut squares.collect::<Vec<_>>()) / (20.0 * MEDIAN)
 }
 
+/// Normal deviate that 19 of 20 are below, and that 90 % lie within on both sides.
+pub(super) const Z90: f64 = 1.645;
+
 /// Least share of the standard deviation of colored noise that [`noise_variance`] sees: that of a mean of five samples, whose
 /// spectrum is steep, in the limit of many samples.
 pub(super) const SEEN_OF_COLORED_NOISE: f64 = 0.82;

@@ -10,7 +10,6 @@ use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
 use super::judge::{Judge, Member};
 use super::lasting::lasting;
-use super::model_error::ROUGH;
 use super::nonlinear::is_too_short;
 use super::report::Verdict;
 use wade_core::effects::Effect;
@@ -93,7 +92,7 @@ impl Found {
         let coverage = (design.empty_loss() - loss) / judge.missing();
         let needed = if judge.has_fault(members) { config.coverage.max(EXACT) } else { config.coverage };
         // rows in which the model is as wrong as it says have a square of 1 each
-        let stated = if design.noise.model { design.y.len() as f64 } else { 0.0 };
+        let stated = design.noise.stated() * design.y.len() as f64;
         let unresolved = members.iter().any(|member| {
             let candidate = &design.candidates[member.candidate];
             is_too_short(&candidate.shape, judge.setting)
@@ -190,12 +189,12 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     let relative = setting
         .components
         .iter()
-        .map(|&c| judge.floors[c].sample.hypot(ROUGH.sqrt() * judge.floors[c].model) / design.noise.bin[c])
+        .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].rough()) / design.noise.bin[c])
         .fold(f64::INFINITY, f64::min);
     let least = config.relevance * relative;
     let size = ((structure.gain - design.error.most_left()).max(0.0) / rows).sqrt();
     // what lasts and is no larger than the rough part of what the model says is none
-    let lasts = if design.noise.model { least.max(1.0) } else { least };
+    let lasts = least.max(design.noise.stated());
     // a force that comes and goes with no phase of its own shows in its energy alone
     let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
     let (deviate, energy) = energy(all, design, &unsmoothed);
