@@ -87,6 +87,7 @@ Keys of trials.toml; only the vehicle is needed:
   vehicle = \"warthog\"
   fluid_density = 1000.0
   mass = 280.0             # where the wrench is inferred
+  inertia = [[20, 0, 0], [0, 40, 0], [0, 0, 50]]   # where moments are, kg m2
   channel_width = 6.0
   [channel_widths]         # by trial
   run07 = inf              # open water

@@ -1,7 +1,9 @@
 //! Every effect of the library as columns: the wrench of each coefficient at 1, sample by sample.
 
+use nalgebra::Matrix3;
+
 use super::base_drag::BaseDrag;
-use super::measurement::rolling_direction;
+use super::measurement::{of_each_axis, rolling_direction};
 use super::series::Series;
 use wade_core::effects::added_mass::{AddedMass, HeaveMass};
 use wade_core::effects::bed_motion::{BedArea, BedMotion};
@@ -39,6 +41,8 @@ pub(super) struct Setting<'a> {
     /// True where the width of some trial's channel is stated.
     pub in_channel: bool,
     pub mass: f64,
+    /// Stated inertia about the center of mass [kg m2].
+    pub inertia: Option<Matrix3<f64>>,
     /// Compared components.
     pub components: Vec<usize>,
     /// The wrench comes from inertia, drive and weight.
@@ -48,6 +52,12 @@ pub(super) struct Setting<'a> {
     /// True where each stamp of the folder is of one clock.
     pub one_clock: bool,
     pub first_stamp: f64,
+}
+
+impl Setting<'_> {
+    fn infers_moments(&self) -> bool {
+        self.inferred && self.inertia.is_some() && self.components.iter().any(|&component| component >= 3)
+    }
 }
 
 /// One coefficient's wrench, a value a sample [per unit of the coefficient].
@@ -72,6 +82,9 @@ pub(super) fn unavailable(
         Quantity::InferredWrench if !setting.inferred => {
             Some("the wrench was measured, not inferred from mass and drive")
         }
+        Quantity::InferredMoment if !setting.infers_moments() => Some(
+            "no moment was inferred: trials.toml states no inertia, or no column of a moment in measured.other_forces",
+        ),
         Quantity::DriveForce if !setting.inferred && manifest.measured.other_forces.is_empty() => {
             Some("no drive force stands among the columns")
         }
@@ -258,6 +271,19 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
                     None => series.calibrated[sample].acceleration + up * GRAVITY,
                 };
                 (0..3).for_each(|axis| columns[0][sample][axis] = -setting.mass * inertia[axis]);
+            }
+            Shape::InertiaError(_) => {
+                let calibrated = &series.calibrated[sample];
+                let (rate, change) = (&calibrated.angular_velocity, &calibrated.angular_acceleration);
+                let moments = match &series.turning {
+                    Some(turning) => turning[sample],
+                    None => {
+                        setting.inertia.map_or_else(Default::default, |of| of_each_axis(of, rate, change))
+                    }
+                };
+                for (column, moment) in columns.iter_mut().zip(moments) {
+                    (0..3).for_each(|axis| column[sample][axis + 3] = -moment[axis]);
+                }
             }
             _ => {}
         }

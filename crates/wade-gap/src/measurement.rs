@@ -1,12 +1,15 @@
 //! The measured wrench of a trial: as its columns say, or inferred from the motion.
 //!
-//! Inverse dynamics (`method = "inverse_dynamics"`): `F = m (a + g up) - sum of other forces`. A column of a known other
-//! force is named after the component it acts on (`drive_fx`). Components without such a column are not inferred, since
+//! Inverse dynamics (`method = "inverse_dynamics"`): `F = m (a + g up) - sum of other forces`, and with a stated inertia
+//! `M = I alpha + omega x I omega - sum of other moments` about the center of mass. A column of a known other force is named
+//! after the component it acts on (`drive_fx`, `drive_mz`). Components without such a column are not inferred, since
 //! what the ground carries is unknown there. A dry twin, the same command without water, is taken off at the same time
 //! since the start, and so is its part in all that the wrench was inferred from: an error of the mass or of the drive
 //! stands in both.
 
 use std::collections::BTreeMap;
+
+use nalgebra::Matrix3;
 
 use super::GapError;
 use super::rates::mean_step;
@@ -27,11 +30,15 @@ pub(super) struct Measurement {
     pub other: Vec<[f64; 6]>,
 }
 
-/// What times the mass is force.
+/// What times the mass is force, and what the inertia makes of the turning.
 pub(super) struct Motion {
     /// [m/s2]
     pub acceleration: Vec<Vec3>,
     pub up: Vec<Vec3>,
+    /// `I alpha + omega x I omega` [N m]; 0 where no inertia is stated.
+    pub moment: Vec<Vec3>,
+    /// The same of each moment of inertia alone, about x, y and z [N m].
+    pub moments: Vec<[Vec3; 3]>,
     /// The dry twin's weight times the direction in which it rolls, over its mass; 0 without one [m/s2].
     pub dry_rolling: Vec<f64>,
 }
@@ -61,10 +68,12 @@ pub(super) fn measurement(
     let mut motion = Motion {
         acceleration: trial.acceleration.clone(),
         up: (0..trial.len()).map(|sample| trial.up(sample).into_inner()).collect(),
+        moment: turning(manifest, trial, |inertia, rate, change| moment(&inertia, rate, change)),
+        moments: turning(manifest, trial, of_each_axis),
         dry_rolling: vec![0.0; trial.len()],
     };
     if let Some(twin) = twin {
-        take_off(&mut motion, &mut other, trial, twin)?;
+        take_off(&mut motion, &mut other, manifest, trial, twin)?;
     }
     let mass = manifest.mass.unwrap_or(mass);
     let force = |axis: usize| {
@@ -72,7 +81,12 @@ pub(super) fn measurement(
         let inertia = motion.acceleration.iter().zip(&motion.up).map(|(a, up)| a[axis] + GRAVITY * up[axis]);
         Some(inertia.zip(&other).map(|(inertia, other)| mass * inertia - other[axis]).collect())
     };
-    let wrench = [force(0), force(1), force(2), None, None, None];
+    let about = |axis: usize| {
+        manifest.inertia?;
+        sum_on(axis + 3, &trial.other_forces)?;
+        Some(motion.moment.iter().zip(&other).map(|(moment, other)| moment[axis] - other[axis + 3]).collect())
+    };
+    let wrench = [force(0), force(1), force(2), about(0), about(1), about(2)];
     Ok(Measurement { wrench, motion: Some(motion), other })
 }
 
@@ -89,13 +103,41 @@ pub(super) fn remarks(trials: &Trials, mass: f64) -> Vec<String> {
     }
     for name in &trials.manifest.measured.other_forces {
         let mut rows = trials.trials.iter().filter_map(|trial| trial.other_forces.get(name)).flatten();
-        if component_of(name).is_some_and(|component| component >= 3) {
-            said.push(format!("column {name} is not used: moments are not inferred from the motion"));
+        let is_moment = component_of(name).is_some_and(|component| component >= 3);
+        if is_moment && trials.manifest.inertia.is_none() {
+            said.push(format!(
+                "column {name} is not used: a moment is inferred from the motion where trials.toml states the inertia (inertia = [[Ixx, Ixy, Ixz], ...], kg m2)"
+            ));
         } else if rows.all(|force| *force == 0.0) {
             said.push(format!("column {name} is 0 in every row: no such force acts on the vehicle"));
         }
     }
     said
+}
+
+/// What the stated inertia makes of a trial's turning, a value a sample; 0 where none is stated.
+fn turning<T: Default + Clone>(
+    manifest: &Manifest,
+    trial: &Trial,
+    of: impl Fn(Matrix3<f64>, &Vec3, &Vec3) -> T,
+) -> Vec<T> {
+    let Some(inertia) = manifest.inertia_matrix() else { return vec![T::default(); trial.len()] };
+    let rates = trial.angular_velocity.iter().zip(&trial.angular_acceleration);
+    rates.map(|(rate, change)| of(inertia, rate, change)).collect()
+}
+
+/// `I alpha + omega x I omega`, Euler's equation of a body about its center of mass [N m].
+pub(super) fn moment(inertia: &Matrix3<f64>, rate: &Vec3, change: &Vec3) -> Vec3 {
+    inertia * change + rate.cross(&(inertia * rate))
+}
+
+/// The same of each moment of inertia alone.
+pub(super) fn of_each_axis(inertia: Matrix3<f64>, rate: &Vec3, change: &Vec3) -> [Vec3; 3] {
+    std::array::from_fn(|axis| {
+        let mut alone = Matrix3::zeros();
+        alone[(axis, axis)] = inertia[(axis, axis)];
+        moment(&alone, rate, change)
+    })
 }
 
 /// Which way wheels roll: the sign of the speed ahead [m/s], 0 at rest.
@@ -137,6 +179,7 @@ fn sum_on(component: usize, columns: &BTreeMap<String, Vec<f64>>) -> Option<Vec<
 fn take_off(
     motion: &mut Motion,
     other: &mut [[f64; 6]],
+    manifest: &Manifest,
     trial: &Trial,
     twin: &Trial,
 ) -> Result<(), GapError> {
@@ -154,11 +197,19 @@ fn take_off(
         let values: Vec<f64> = (0..twin.len()).map(value).collect();
         interpolate(&twin.t, &values, &since_start)
     };
+    let dry_moment = turning(manifest, twin, |inertia, rate, change| moment(&inertia, rate, change));
+    let dry_moments = turning(manifest, twin, of_each_axis);
     for axis in 0..3 {
         let acceleration = at(&|i| twin.acceleration[i][axis]);
         motion.acceleration.iter_mut().zip(acceleration).for_each(|(wet, dry)| wet[axis] -= dry);
         let up = at(&|i| twin.up(i)[axis]);
         motion.up.iter_mut().zip(up).for_each(|(wet, dry)| wet[axis] -= dry);
+        let whole = at(&|i| dry_moment[i][axis]);
+        motion.moment.iter_mut().zip(whole).for_each(|(wet, dry)| wet[axis] -= dry);
+        for alone in 0..3 {
+            let one = at(&|i| dry_moments[i][alone][axis]);
+            motion.moments.iter_mut().zip(one).for_each(|(wet, dry)| wet[alone][axis] -= dry);
+        }
     }
     motion.dry_rolling = at(&|i| GRAVITY * twin.up(i).z * rolling_direction(twin.velocity[i].x));
     let dry = of_columns(&twin.other_forces, twin.len());
@@ -167,4 +218,25 @@ fn take_off(
         other.iter_mut().zip(dry).for_each(|(wet, dry)| wet[component] -= dry);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_top_without_a_moment_turns_by_eulers_equation() {
+        // a symmetric top: its rate goes round the axis of symmetry at (C - A) / A times the spin about that
+        let (a, c, spin, cone) = (2.0, 3.0, 4.0, 0.7);
+        let inertia = Matrix3::from_diagonal(&Vec3::new(a, a, c));
+        let pace: f64 = (c - a) / a * spin;
+        for t in [0.0, 0.3, 1.1] {
+            let (sin, cos) = (pace * t).sin_cos();
+            let rate = Vec3::new(cone * cos, cone * sin, spin);
+            let change = Vec3::new(-cone * pace * sin, cone * pace * cos, 0.0);
+            assert!(moment(&inertia, &rate, &change).norm() < 1e-12);
+            let alone = of_each_axis(inertia, &rate, &change);
+            assert!(alone.iter().sum::<Vec3>().norm() < 1e-12 && alone[2].norm() > 1.0, "{alone:?}");
+        }
+    }
 }

@@ -65,6 +65,7 @@ pub fn run(
         base_drag: BaseDrag::new(&all, body),
         in_channel: all.iter().any(|series| series.channel_width.is_some()),
         mass: trials.manifest.mass.unwrap_or(body.mass),
+        inertia: trials.manifest.inertia_matrix(),
         components,
         inferred: is_inferred(&trials.manifest),
         computed: is_computed(&trials.manifest),

@@ -47,6 +47,8 @@ pub(super) struct Series {
     pub recorded_rates: Vec<[f64; 6]>,
     /// `a + g up` before any smoothing [m/s2], where the wrench was inferred with it.
     pub inertia: Option<Vec<Vec3>>,
+    /// What each stated moment of inertia makes of the turning before any smoothing [N m], where moments were inferred with it.
+    pub turning: Option<Vec<[Vec3; 3]>>,
     /// What the dry twin's rolling resistance takes off, over its mass and the coefficient [m/s2]; 0 without a twin.
     pub dry_rolling: Vec<f64>,
     /// Rates of velocity and angular velocity, wetting rate and angular velocities: how far each hangs together.
@@ -261,6 +263,7 @@ fn of_trial(
         channel_width: trials.manifest.channel_width_of(&trial.name).filter(|width| width.is_finite()),
         wetting_rate,
         inertia: motion.as_ref().map(|motion| inertia(&trial.t, &pieces, motion)),
+        turning: motion.as_ref().map(|motion| turning(&trial.t, &pieces, motion)),
         dry_rolling: motion.map_or_else(|| vec![0.0; count], |motion| motion.dry_rolling),
         coherence,
         wheels,
@@ -290,6 +293,14 @@ fn inertia(t: &[f64], pieces: &[Range<usize>], motion: &Motion) -> Vec<Vec3> {
     let accelerated = Vec3::from_fn(|axis, _| f64::from(u8::from(moves(axis))));
     let of = |(acceleration, up): (&Vec3, &Vec3)| acceleration.component_mul(&accelerated) + up * GRAVITY;
     motion.acceleration.iter().zip(&motion.up).map(of).collect()
+}
+
+/// What each moment of inertia makes of the turning, of those about which the body turns.
+fn turning(t: &[f64], pieces: &[Range<usize>], motion: &Motion) -> Vec<[Vec3; 3]> {
+    let turns =
+        [0, 1, 2].map(|axis| Coherence::of(t, pieces, |i| motion.moments[i][axis][axis]).is_a_motion());
+    let of = |alone: &[Vec3; 3]| std::array::from_fn(|axis| alone[axis] * f64::from(u8::from(turns[axis])));
+    motion.moments.iter().map(of).collect()
 }
 
 #[cfg(test)]

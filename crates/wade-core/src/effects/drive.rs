@@ -53,3 +53,23 @@ impl Law for MassError {
         ..DRIVE
     };
 }
+
+/// A wrong inertia.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct InertiaError;
+
+impl Law for InertiaError {
+    const SPEC: EffectSpec = EffectSpec {
+        name: "inertia_error",
+        summary: "a wrong inertia in an inferred moment",
+        coefficients: &[
+            Coefficient::new("roll", "1", -0.5, 1.0),
+            Coefficient::new("pitch", "1", -0.5, 1.0),
+            Coefficient::new("yaw", "1", -0.5, 1.0),
+        ],
+        inputs: &[Quantity::InferredMoment, Quantity::AngularVelocity, Quantity::AngularAcceleration],
+        rates: &[Rate::AngularAcceleration],
+        experiment: "swing the vehicle as it was tested from a cable, or turn it on dry ground",
+        ..DRIVE
+    };
+}

@@ -110,6 +110,7 @@ effects! {
     drive::RollingResistance,
     drive::DriveGain,
     drive::MassError,
+    drive::InertiaError,
 }
 
 /// Most coefficients of one effect.

@@ -157,6 +157,8 @@ pub enum Quantity {
     MeasuredWrench,
     /// A wrench that was inferred from mass, drive and weight.
     InferredWrench,
+    /// A moment that was inferred from inertia and drive.
+    InferredMoment,
     /// A drive force, known by itself or in an inferred wrench.
     DriveForce,
 }
@@ -179,6 +181,7 @@ impl Quantity {
             Self::NoStatedCurrent => "no current that the caller states",
             Self::MeasuredWrench => "a measured wrench",
             Self::InferredWrench => "a wrench inferred from mass and drive",
+            Self::InferredMoment => "a moment inferred from inertia and drive",
             Self::DriveForce => "the drive force",
         }
     }

@@ -298,7 +298,7 @@ fn a_report_says_what_an_inferred_wrench_rests_on_where_the_trials_leave_it_open
     for said in [
         "trials.toml states no mass: the wrench is inferred with the vehicle's, 280 kg",
         "column brake_fx is 0 in every row: no such force acts on the vehicle",
-        "column drive_mz is not used: moments are not inferred from the motion",
+        "column drive_mz is not used: a moment is inferred from the motion where trials.toml states the inertia",
     ] {
         assert!(open.contains(said), "{open}");
     }

@@ -6,4 +6,5 @@ mod planted;
 
 mod explanations;
 mod gap_recovery;
+mod moments;
 mod sampling;

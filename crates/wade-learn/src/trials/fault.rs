@@ -288,6 +288,14 @@ pub enum Fault {
         /// The name.
         name: String,
     },
+    /// An inertia that no body has.
+    #[error(
+        "inertia {why}: state it by rows, [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]] in kg m2 about the center of mass, products as they stand in the matrix"
+    )]
+    Inertia {
+        /// What is wrong.
+        why: &'static str,
+    },
     /// A number in the manifest that makes no sense.
     #[error("{key} = {value} must be {expected}")]
     Number {

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use super::trial::WRENCH;
@@ -20,6 +21,7 @@ const LENGTH: Bounds = (1e-3, 1e3, "between 0.001 and 1000 m");
 const DEPTH: Bounds = (1e-4, 20.0, "between 0.0001 and 20 m");
 const WIDTH: Bounds = (1e-2, 1e6, "between 0.01 and 1000000 m");
 const MASS: Bounds = (1e-6, 1e8, "between 1e-6 and 1e8 kg");
+const INERTIA: Bounds = (-1e10, 1e10, "between -1e10 and 1e10 kg m2");
 const VOLUME: Bounds = (1e-9, 1e8, "between 1e-9 and 1e8 m3");
 /// Of the center of mass, from the middle of the body.
 const PLACE: Bounds = (-1e3, 1e3, "within 1000 m");
@@ -43,6 +45,9 @@ pub struct Manifest {
     /// Mass of the vehicle as it was tested [kg].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
+    /// Inertia of the vehicle as it was tested, by rows, about the center of mass, body axes [kg m2].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<[[f64; 3]; 3]>,
     /// Water depth over the flat ground, by trial, as it was measured at rest [m].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub nominal_depth: BTreeMap<String, f64>,
@@ -153,6 +158,11 @@ pub fn component_of(column: &str) -> Option<usize> {
 }
 
 impl Manifest {
+    /// Stated inertia about the center of mass, body axes [kg m2].
+    pub fn inertia_matrix(&self) -> Option<Matrix3<f64>> {
+        self.inertia.map(|rows| Matrix3::from_fn(|i, j| rows[i][j]))
+    }
+
     /// The text of the file.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("plain numbers, strings and tables are always TOML")
@@ -239,6 +249,30 @@ impl Manifest {
         own.or(self.trial_offset.get(component)).copied().unwrap_or(0.0)
     }
 
+    /// Symmetric, and of masses: no principal moment of inertia is negative or larger than the other two together.
+    fn check_inertia(&self) -> Result<(), Fault> {
+        let Some(matrix) = self.inertia_matrix() else { return Ok(()) };
+        for &value in &matrix {
+            within("inertia".to_owned(), value, INERTIA)?;
+        }
+        // as far as a file of six digits states them
+        let rounding = 1e-5 * matrix.norm();
+        let skew = matrix - matrix.transpose();
+        if skew.amax() > rounding {
+            return Err(Fault::Inertia { why: "is not symmetric" });
+        }
+        let moments = matrix.symmetric_eigenvalues();
+        if moments.min() <= 0.0 {
+            return Err(Fault::Inertia { why: "has a principal moment of inertia that is not positive" });
+        }
+        if 2.0 * moments.max() > moments.sum() + rounding {
+            return Err(Fault::Inertia {
+                why: "has a principal moment of inertia larger than the other two together, which no body has",
+            });
+        }
+        Ok(())
+    }
+
     fn check_numbers(&self) -> Result<(), Fault> {
         let stated = |key: &str, value: Option<f64>, bounds: Bounds| {
             value.map(|value| (key.to_owned(), value, bounds))
@@ -267,6 +301,7 @@ impl Manifest {
             }
             within(key, value, bounds)?;
         }
+        self.check_inertia()?;
         let widths =
             self.channel_widths.iter().map(|(name, &value)| (format!("channel_widths.{name}"), value));
         for (key, value) in widths.chain(self.channel_width.map(|value| ("channel_width".to_owned(), value)))

@@ -341,6 +341,19 @@ fn a_manifest_with_unknown_names_or_numbers_is_refused() {
     for (manifest, expected) in [
         ("vehicel = \"warthog\"", "vehicel"),
         ("vehicle = \"w\"\nmass = -1.0", "mass = -1 must be positive"),
+        (
+            "vehicle = \"w\"\ninertia = [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
+            "inertia is not symmetric: state it by rows",
+        ),
+        (
+            "vehicle = \"w\"\ninertia = [[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
+            "inertia has a principal moment of inertia that is not positive",
+        ),
+        (
+            "vehicle = \"w\"\ninertia = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]",
+            "larger than the other two together",
+        ),
+        ("vehicle = \"w\"\ninertia = [1.0, 1.0, 1.0]", "inertia"),
         ("vehicle = \"w\"\n[nominal_depth]\nrun2 = 0.1", "nominal_depth names \"run2\""),
         ("vehicle = \"w\"\n[measured]\nrepeats = [[\"run\", \"again\"]]", "measured.repeats names \"again\""),
         ("vehicle = \"w\"\n[channel_widths]\nrun2 = 3.0", "channel_widths names \"run2\""),
