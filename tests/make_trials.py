@@ -73,13 +73,13 @@ def predicted(wade, motion, times):
 
 
 def figure(wade):
-    """The first trace of the page: a trial that took no part, before and after."""
+    """The gap of the first trial of the page: one that took no part, before and after."""
     with tempfile.TemporaryDirectory() as folder:
         command = [wade, "gap", "--vehicle", "husky", "--vehicles", BUNDLE.parent, "--trials", FOLDER, "--out", folder]
         subprocess.run(command, check=True)
         page = (Path(folder) / "index.html").read_text()
-    traces = page[page.index("The trials with the largest gap") :]
-    return re.search(r"<svg.*?</svg>", traces, re.DOTALL).group()
+    traces = page[page.index("Trials over time") :]
+    return re.findall(r"<svg.*?</svg>", traces, re.DOTALL)[1]
 
 
 def main():

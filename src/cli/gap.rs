@@ -282,6 +282,7 @@ impl Source {
                 "effects": names,
                 "alternatives": report.alternatives,
                 "separating_experiment": report.separating_experiment,
+                "next_step": report.next_step,
                 "not_testable": report.not_testable,
                 "rejected": report.rejected,
             }))?,
@@ -441,6 +442,9 @@ fn verdict(report: &Report) -> String {
     let mut text = format!("{}\n", report.summary);
     if let Some(experiment) = &report.separating_experiment {
         text += &format!("To separate them: {experiment}.\n");
+    }
+    if let Some(step) = &report.next_step {
+        text += &format!("Next: {step}.\n");
     }
     if let Some(left) = &report.gap.unexplained {
         text += &format!("Left without a name: {left}.\n");

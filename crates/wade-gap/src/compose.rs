@@ -9,17 +9,18 @@ use super::carriers::{carriers, of_region};
 use super::design::Design;
 use super::detect::{self, Excitation};
 use super::effects_file::remarks;
-use super::experiment::separating;
+use super::experiment::{next_step, separating};
 use super::explanations::{Weighed, stated, suspected};
 use super::fit::{Fit, Parameter, fit};
-use super::holdout::{Closure, closures, explained, explained_of_rows, worse};
+use super::holdout::{Closure, closures, explained_of_rows, worse};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
-use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Trace, Verdict};
+use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources, Verdict};
 use super::sentences::{summary, unexplained};
 use super::series::Series;
 use super::statistics::{Z90, quantile};
+use super::traces::{traces, trends};
 use super::verdict::Found;
 use super::{Named, measurement, plausible};
 use wade_core::condition::Condition;
@@ -159,6 +160,7 @@ pub(super) fn compose(
         effects,
         alternatives,
         suspected: suspected(&explanations, holds),
+        next_step: next_step(found.verdict, &explanations, &regions),
         explanations,
         separating_experiment,
         not_testable,
@@ -173,6 +175,7 @@ pub(super) fn compose(
         remarks: said,
         sources: Sources { trials: hash(trials), ..Sources::default() },
         traces: traces(&named, all, &held, setting, judge.floors),
+        trends: trends(&named, all, setting, judge.floors),
     };
     report.summary = summary(&report, found.gated);
     report
@@ -430,47 +433,4 @@ fn hash(trials: &Trials) -> String {
         }
     }
     hexadecimal(&digest.finalize())
-}
-
-/// Bins of the trials with the largest gap in their worst component: of those that took no part, then of the others.
-fn traces(
-    named: &[Named],
-    all: &[Series],
-    held: &[usize],
-    setting: &Setting,
-    floors: &[Floor; 6],
-) -> Vec<Trace> {
-    const MOST: usize = 2;
-    let mut worst: Vec<(f64, usize, usize)> = Vec::new();
-    for (trial, series) in all.iter().enumerate() {
-        let size = |&c: &usize| {
-            let squares = series.gap.iter().map(|gap| gap[c].powi(2)).sum::<f64>();
-            ((squares / series.gap.len() as f64).sqrt() / floors[c].with_model().max(1e-12), trial, c)
-        };
-        worst.extend(setting.components.iter().map(size).max_by(|a, b| a.0.total_cmp(&b.0)));
-    }
-    worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let (kept, others): (Vec<_>, Vec<_>) = worst.into_iter().partition(|(_, trial, _)| held.contains(trial));
-    let chosen = kept.into_iter().take(MOST).chain(others.into_iter().take(MOST));
-    chosen.map(|(_, trial, component)| trace(named, &all[trial], trial, component, setting, floors)).collect()
-}
-
-fn trace(
-    named: &[Named],
-    series: &Series,
-    trial: usize,
-    component: usize,
-    setting: &Setting,
-    floors: &[Floor; 6],
-) -> Trace {
-    let added = explained(named, series, trial, setting);
-    let samples = series.bins.iter().map(|bin| bin.len()).max().unwrap_or(1) as f64;
-    Trace {
-        trial: series.name.clone(),
-        component: WRENCH[component],
-        t: series.binned(|i| series.t[i] - series.t[0]),
-        before: series.binned(|i| series.gap[i][component]),
-        after: series.binned(|i| series.gap[i][component] - added[i][component]),
-        noise: floors[component].sample / samples.sqrt(),
-    }
 }

@@ -54,6 +54,7 @@ mod shared;
 mod smoothing;
 mod split;
 mod statistics;
+mod traces;
 mod verdict;
 
 pub use carriers::in_shares;

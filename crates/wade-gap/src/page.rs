@@ -8,7 +8,7 @@ use super::judge::Refusal;
 use super::noise::FloorSource;
 use super::report::{NamedEffect, Report, Trace, Verdict};
 use wade_core::effects::Kind;
-use wade_learn::page::plot::{BLUE, GRAY, RED, Series, traces};
+use wade_learn::page::plot::{BLUE, GRAY, RED, Series, scatter, traces};
 use wade_learn::page::{PlotError, document, escape, table};
 
 /// No column is the source paper's.
@@ -28,6 +28,9 @@ impl Report {
         if let Some(experiment) = &self.separating_experiment {
             body += &verdict("notice", &format!("<b>To separate them:</b> {}.", escape(&plain(experiment))));
         }
+        if let Some(step) = &self.next_step {
+            body += &verdict("notice", &format!("<b>Next:</b> {}.", escape(&plain(step))));
+        }
         let _ = writeln!(
             body,
             "<p class=\"small\">{} trials, {} samples; {} trials are held out from naming and fitting.</p>",
@@ -45,7 +48,8 @@ impl Report {
         body += &explanations(self);
         body += &effects(self);
         body += &held_out(self);
-        body += &worst(self)?;
+        body += &drawn(self)?;
+        body += &trends(self)?;
         body += &sizes(self);
         body += &regions(self);
         body += &rivals(self);
@@ -250,33 +254,60 @@ fn held_out(report: &Report) -> String {
     text
 }
 
-fn worst(report: &Report) -> Result<String, PlotError> {
+fn drawn(report: &Report) -> Result<String, PlotError> {
     let mut text = format!(
-        "<h2>The trials with the largest gap</h2><p class=\"small\">Measured minus predicted, in averages over {} s; gray: two \
-         standard deviations of the noise of a point.</p>\n",
+        "<h2>Trials over time</h2><p class=\"small\">The trials with the largest gap, and the one whose gap is the median: what was \
+         measured and predicted, and the difference, in averages over {} s. Gray: two standard deviations of the noise of a \
+         point.</p>\n",
         number(report.bin_s)
     );
     for trace in &report.traces {
-        let held = report.gap.held_out_trials.contains(&trace.trial);
-        let part = if held { "held out" } else { "used for naming" };
-        let figure = figure(trace, !report.effects.is_empty())?;
-        let _ = writeln!(text, "<h3>{} ({part})</h3>{figure}", escape(&trace.trial));
+        let part = if trace.is_held { "held out" } else { "used for naming" };
+        let kind = if trace.is_typical { "typical" } else { "among the largest gaps" };
+        let figures = figures(trace, !report.effects.is_empty())?;
+        let _ = writeln!(text, "<h3>{} ({part}, {kind})</h3>{figures}", escape(&trace.trial));
     }
     Ok(text)
 }
 
-/// The gap of a trial before and after.
-fn figure(trace: &Trace, changed: bool) -> Result<String, PlotError> {
-    let line = |name: &str, values: &[f64]| Series {
+/// A trial as it was measured and predicted, and its gap before and after.
+fn figures(trace: &Trace, changed: bool) -> Result<String, PlotError> {
+    let line = |name: &str, values: Vec<f64>| Series {
         name: name.to_owned(),
-        points: trace.t.iter().copied().zip(values.iter().copied()).collect(),
+        points: trace.t.iter().copied().zip(values).collect(),
     };
-    let mut series = vec![line("gap of the model", &trace.before)];
+    let less = |gap: &[f64]| trace.measured.iter().zip(gap).map(|(measured, gap)| measured - gap).collect();
+    let mut overlaid = vec![line("measured", trace.measured.clone()), line("model", less(&trace.before))];
+    let mut gaps = vec![line("gap of the model", trace.before.clone())];
     if changed {
-        series.push(line("with the named effects", &trace.after));
+        overlaid.push(line("with the named effects", less(&trace.after)));
+        gaps.push(line("gap with the named effects", trace.after.clone()));
     }
-    let y_title = format!("gap of {}", component(trace.component));
-    traces("time [s]", &y_title, 2.0 * trace.noise, &series)
+    let of = component(trace.component);
+    let overlaid = traces("time [s]", &of, 0.0, &overlaid)?;
+    Ok(overlaid + &traces("time [s]", &format!("gap of {of}"), 2.0 * trace.noise, &gaps)?)
+}
+
+fn trends(report: &Report) -> Result<String, PlotError> {
+    let Some(first) = report.trends.first() else { return Ok(String::new()) };
+    let mut text = format!(
+        "<h2>How the gap goes with the state</h2><p class=\"small\">Mean gap of {}, where it is largest beside noise, of all \
+         trials.</p>\n<div class=\"row\">",
+        escape(&component(first.component))
+    );
+    for trend in &report.trends {
+        let line = |name: &str, values: &[f64]| Series {
+            name: name.to_owned(),
+            points: trend.at.iter().copied().zip(values.iter().copied()).collect(),
+        };
+        let mut series = vec![line("gap of the model", &trend.before)];
+        if !report.effects.is_empty() {
+            series.push(line("with the named effects", &trend.after));
+        }
+        let x_title = format!("{} [{}]", trend.quantity, trend.unit);
+        text += &scatter(&x_title, &format!("gap of {}", component(trend.component)), &series)?;
+    }
+    Ok(text + "</div>\n")
 }
 
 fn sizes(report: &Report) -> String {

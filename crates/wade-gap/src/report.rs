@@ -120,14 +120,37 @@ pub struct Trace {
     pub trial: String,
     /// Component.
     pub component: &'static str,
+    /// Took no part in naming and fitting.
+    pub is_held: bool,
+    /// The trial whose gap is the median, not one of the largest.
+    pub is_typical: bool,
     /// Time [s].
     pub t: Vec<f64>,
+    /// What was measured or inferred [N, N m]; less `before` it is the prediction, less `after` that with the named effects.
+    pub measured: Vec<f64>,
     /// Gap without the named effects.
     pub before: Vec<f64>,
     /// Gap with them.
     pub after: Vec<f64>,
     /// One standard deviation of the noise of a point.
     pub noise: f64,
+}
+
+/// How the gap goes with a quantity of the state: means over equal numbers of bins of all trials.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trend {
+    /// Component of the gap.
+    pub component: &'static str,
+    /// The quantity in words.
+    pub quantity: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its value.
+    pub at: Vec<f64>,
+    /// Gap without the named effects [N, N m].
+    pub before: Vec<f64>,
+    /// Gap with them [N, N m].
+    pub after: Vec<f64>,
 }
 
 /// What the workflow found; serializes to `report.json`.
@@ -151,6 +174,8 @@ pub struct Report {
     pub suspected: Vec<&'static str>,
     /// Trial that tells the alternatives apart.
     pub separating_experiment: Option<String>,
+    /// What to do where nothing is named.
+    pub next_step: Option<String>,
     /// Effects that these trials could not have shown.
     pub not_testable: Vec<NotTestable>,
     /// Effects that were looked for and not named.
@@ -175,6 +200,8 @@ pub struct Report {
     pub remarks: Vec<String>,
     /// Hashes.
     pub sources: Sources,
-    /// Traces of the worst trials.
+    /// The trials with the largest gap, and typical ones.
     pub traces: Vec<Trace>,
+    /// How the gap goes with the state.
+    pub trends: Vec<Trend>,
 }
