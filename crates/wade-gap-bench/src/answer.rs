@@ -73,12 +73,38 @@ pub struct FoundRegion {
 pub struct HeldOut {
     /// Share of the gap above the floor that is closed; absent where there is none.
     pub closure: Option<f64>,
+    /// Root mean square without the named effects [N, N m]; absent where the tool states none, as the others are.
+    before: Option<f64>,
+    /// With them.
+    after: Option<f64>,
+    /// Of noise alone.
+    noise_floor: Option<f64>,
+}
+
+/// Size of the gap of a component over all trials.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+struct Size {
+    /// True where its interval lies above what noise and the model's own error can be.
+    #[serde(default)]
+    above_floor: bool,
+}
+
+/// What is expected of a component without anything missing.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+struct Floor {
+    /// Deviation that the model states of itself [N, N m].
+    #[serde(default)]
+    model: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 struct GapReport {
     #[serde(default)]
     held_out: BTreeMap<String, HeldOut>,
+    #[serde(default)]
+    size: BTreeMap<String, Size>,
+    #[serde(default)]
+    floors: BTreeMap<String, Floor>,
 }
 
 /// An answer; what is not scored is not kept.
@@ -101,9 +127,42 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Reads a report.
+    /// Reads a report; one whose verdict its own numbers contradict is none.
     pub fn from_report(report: &Value) -> Result<Self, serde_json::Error> {
-        Self::deserialize(report)
+        let answer = Self::deserialize(report)?;
+        match answer.contradiction() {
+            Some(why) => Err(serde::de::Error::custom(why)),
+            None => Ok(answer),
+        }
+    }
+
+    /// What the numbers of the report say against its verdict.
+    fn contradiction(&self) -> Option<String> {
+        /// Floors that a law may leave, and share of the squared gap: formulas of one effect differ by as much.
+        const LEFT: [f64; 2] = [2.0, 0.2];
+        let GapReport { held_out, size, floors } = &self.gap;
+        match self.verdict {
+            Verdict::NothingMissing => {
+                let above = size.iter().find(|(_, size)| size.above_floor);
+                above.map(|(name, _)| {
+                    format!("nothing is missing, and the gap of {name} lies above its floor")
+                })
+            }
+            Verdict::Named => {
+                let leaves = |(name, held): (&String, &HeldOut)| -> Option<bool> {
+                    let model = floors.get(name)?.model;
+                    let (before, after) = (held.before?.powi(2), held.after?.powi(2));
+                    let floor = held.noise_floor?.powi(2) + model * model;
+                    let acts = (before - after).abs() > floor;
+                    Some(acts && after > LEFT[0].powi(2) * floor && after > LEFT[1] * before)
+                };
+                let grows = self.closure().is_some_and(|closure| closure < 0.0);
+                let left = held_out.iter().find(|entry| leaves(*entry).unwrap_or(false));
+                let left = left.map(|(name, _)| format!("what is named leaves most of the gap of {name}"));
+                left.or_else(|| grows.then(|| "the held-out gap grows with what is named".to_owned()))
+            }
+            Verdict::Ambiguous | Verdict::NoCandidateFits => None,
+        }
     }
 
     /// Names of the effects.
@@ -160,5 +219,29 @@ mod tests {
         let surge = &answer.effects[0].parameters["surge"];
         assert_eq!((surge.std, surge.interval), (Some(2.0), Some([27.5, 34.0])));
         assert!(Answer::from_report(&serde_json::json!({"verdict": "perhaps"})).is_err());
+    }
+
+    #[test]
+    fn a_verdict_that_its_own_numbers_contradict_is_refused() {
+        let held = |after: f64, closure: f64| {
+            serde_json::json!({
+                "verdict": "named",
+                "gap": {
+                    "held_out": {
+                        "fx": {"before": 90.0, "after": after, "noise_floor": 3.0, "closure": closure},
+                        "all": {"before": 9.0, "after": 4.0, "noise_floor": 1.0, "closure": closure}
+                    },
+                    "floors": {"fx": {"model": 4.0}}
+                }
+            })
+        };
+        let why = |report: &Value| Answer::from_report(report).err().map(|error| error.to_string());
+        assert_eq!(why(&held(9.0, 0.9)), None);
+        assert_eq!(why(&held(39.0, 0.6)), None, "a fifth of the squared gap");
+        assert!(why(&held(45.0, 0.5)).unwrap().contains("most of the gap of fx"));
+        assert!(why(&held(9.0, -0.1)).unwrap().contains("grows"));
+        let size = |above: bool| serde_json::json!({"verdict": "nothing_missing", "gap": {"size": {"fz": {"above_floor": above}}}});
+        assert_eq!(why(&size(false)), None);
+        assert!(why(&size(true)).unwrap().contains("gap of fz lies above its floor"));
     }
 }
