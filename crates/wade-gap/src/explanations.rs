@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::fit::FORMULA;
-use super::judge::{Judge, Member};
+use super::judge::{Judge, Member, Refusal};
 use super::lasting::memory_of;
 use super::verdict::Found;
 use wade_core::effects::Effect;
@@ -89,35 +89,52 @@ pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Wei
     let outside = trials.map(|(&trial, loss)| loss - found.of_gap.gains[trial]).collect();
     let mut all =
         vec![of(NOTHING, nothing, 0), of(OUTSIDE_LIBRARY, outside, NUMBERS_OUTSIDE * design.rows.width)];
-    let mut sets: BTreeMap<Vec<Effect>, Weighed> = BTreeMap::new();
-    for set in sets_to_weigh(judge, found, library) {
+    // the best of each set of effects; the impossible ones come last
+    let mut sets: BTreeMap<(bool, Vec<Effect>), Weighed> = BTreeMap::new();
+    for Set { members: set, is_possible } in sets_to_weigh(judge, found, library) {
         let Some(losses) = judge.losses(&set) else { continue };
         let mut effects: Vec<Effect> = set.iter().map(|member| judge.effect(member)).collect();
         effects.sort();
         let whole = |losses: &[f64]| losses.iter().sum::<f64>();
-        if sets.get(&effects).is_some_and(|known| whole(&known.losses) <= whole(&losses)) {
+        let place = (!is_possible, effects);
+        if sets.get(&place).is_some_and(|known| whole(&known.losses) <= whole(&losses)) {
             continue;
         }
-        let names = effects.iter().map(|effect| effect.name()).collect();
+        let names = place.1.iter().map(|effect| effect.name()).collect();
         let weighed = Weighed {
             explanation: Explanation { effects: names, probability: 0.0 },
-            log_prior: log_prior(judge, &effects, library),
+            log_prior: log_prior(judge, &place.1, library),
             numbers: judge.columns(&set).len(),
             set,
             losses,
         };
-        sets.insert(effects, weighed);
+        sets.insert(place, weighed);
     }
+    let possible = all.len() + sets.keys().filter(|(is_impossible, _)| !is_impossible).count();
     all.extend(sets.into_values());
     let probabilities = weights(&all, judge, found);
     for (weighed, probability) in all.iter_mut().zip(probabilities) {
         weighed.explanation.probability = probability;
     }
+    // what looks like an effect with an impossible value is another load
+    let impossible = all.split_off(possible);
+    let beyond: f64 = impossible.iter().map(|weighed| weighed.explanation.probability).sum();
+    all[1].explanation.probability += beyond;
     all.sort_by(|a, b| {
         let (a, b) = (&a.explanation, &b.explanation);
         b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects))
     });
     all
+}
+
+/// The effects that are more probable than not, in the order of the library: of all sets that with the best prediction (median
+/// probability model; Barbieri and Berger, Annals of Statistics 32, 2004).
+pub(super) fn more_probable_than_not(weighed: &[Weighed]) -> Vec<&'static str> {
+    let explanations = || weighed.iter().map(|weighed| &weighed.explanation);
+    let probability = |name: &str| -> f64 {
+        explanations().filter(|e| e.effects.contains(&name)).map(|e| e.probability).sum()
+    };
+    Effect::ALL.into_iter().map(Effect::name).filter(|name| probability(name) > 0.5).collect()
 }
 
 /// Logarithm of the probability of a set before the trials, over that of nothing: all sets of a size are alike, but for effects
@@ -141,33 +158,83 @@ pub(super) fn stated(weighed: &[Weighed]) -> Vec<Explanation> {
     all.filter(|entry| is_stated(*entry)).map(|(_, explanation)| explanation.clone()).collect()
 }
 
-/// The set that was found, those that explain as much, each effect alone, and each of the named set taken out, exchanged or joined
-/// by another.
-fn sets_to_weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Vec<Member>> {
-    let mut sets: Vec<Vec<Member>> = found.alternatives.clone();
-    let beside = |set: &[Member], effect: Effect| -> Option<Vec<Member>> {
-        if judge.taken(set, effect) {
+/// Effects to weigh, and whether each can be there as it was fitted.
+#[derive(Clone)]
+struct Set {
+    members: Vec<Member>,
+    is_possible: bool,
+}
+
+impl Set {
+    /// An effect beside a set with the columns that hold; none without a part of its law, or where the set says the same.
+    fn with(&self, judge: &Judge, effect: Effect) -> Option<Self> {
+        let judged = judge.judge(&self.members, effect)?;
+        if judged.refused == Some(Refusal::NotNew) || !judge.is_a_law(&judged.member) {
             return None;
         }
-        let mut set = set.to_vec();
-        set.push(judge.judge(&set, effect)?.member);
-        Some(set)
+        let is_possible = self.is_possible && judged.refused != Some(Refusal::OutOfBounds);
+        let mut members = self.members.clone();
+        members.push(judged.member);
+        Some(Self { members, is_possible })
+    }
+}
+
+impl From<Vec<Member>> for Set {
+    fn from(members: Vec<Member>) -> Self {
+        Self { members, is_possible: true }
+    }
+}
+
+/// The set that was found, those that explain as much, each effect alone, the pairs that explain most, and each of the named set taken
+/// out, exchanged or joined by another.
+fn sets_to_weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Set> {
+    let mut sets: Vec<Set> = found.alternatives.iter().cloned().map(Set::from).collect();
+    let beside = |set: &Set, effect: Effect| {
+        (!judge.taken(&set.members, effect)).then(|| set.with(judge, effect)).flatten()
     };
-    sets.extend(library.iter().filter_map(|&effect| beside(&[], effect)));
+    let nothing = Set::from(Vec::new());
+    sets.extend(library.iter().filter_map(|&effect| beside(&nothing, effect)));
+    sets.extend(pairs(judge, library));
     if found.members.is_empty() {
         return sets;
     }
-    sets.push(found.members.clone());
-    sets.extend(library.iter().filter_map(|&effect| beside(&found.members, effect)));
+    let own = Set::from(found.members.clone());
+    sets.extend(library.iter().filter_map(|&effect| beside(&own, effect)));
     for out in 0..found.members.len() {
-        let mut others = found.members.clone();
-        others.remove(out);
-        if !others.is_empty() {
+        let mut others = own.clone();
+        others.members.remove(out);
+        if !others.members.is_empty() {
             sets.extend(library.iter().filter_map(|&effect| beside(&others, effect)));
             sets.push(others);
         }
     }
+    sets.push(own);
     sets
+}
+
+/// The pairs of effects that explain most, each effect with the columns that hold beside the other: a search that adds one effect
+/// after the other finds none of which either explains little alone.
+fn pairs(judge: &Judge, library: &[Effect]) -> Vec<Set> {
+    const LOOKED_AT: usize = 24;
+    let mut looked_at: Vec<[Effect; 2]> = Vec::new();
+    let of = |first: Effect, second: Effect| {
+        let alone = Set::from(vec![judge.judge_quick(&[], first)?]);
+        let second = Set::from(vec![alone.with(judge, second)?.members.pop()?]);
+        let pair = second.with(judge, first)?;
+        // both beside each other, and neither alone
+        let [second, first] = &pair.members[..] else { return None };
+        let again = Set::from(vec![first.clone()]).with(judge, judge.effect(second))?;
+        Some(Set { is_possible: pair.is_possible && again.is_possible, ..pair })
+    };
+    let mut pairs = Vec::new();
+    for (first, second) in judge.pairs(&[], library) {
+        let pair = [first.min(second), first.max(second)];
+        if looked_at.len() < LOOKED_AT && !looked_at.contains(&pair) {
+            looked_at.push(pair);
+            pairs.extend(of(first, second));
+        }
+    }
+    pairs
 }
 
 /// Weights of explanations over a Bayesian bootstrap of the trials (Rubin, Annals of Statistics 9, 1981).

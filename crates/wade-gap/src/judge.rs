@@ -272,19 +272,8 @@ impl<'a> Judge<'a> {
         before: f64,
         fitted: &Fitted,
     ) -> Option<Refusal> {
-        let effect = self.effect(member);
-        // what comes with an effect does not come without it
-        if effect.spec().needs_its_first && member.columns.iter().all(|(_, coefficient)| *coefficient > 0) {
+        if !self.is_a_law(member) {
             return Some(Refusal::NotSignificant);
-        }
-        // a moving bed changes the lift, and the drag along or across: either alone is another effect's
-        if effect == Effect::BedMotion {
-            const LIFT: usize = 1;
-            let lifts = |&(_, coefficient): &(usize, usize)| coefficient == LIFT;
-            let both = |columns: &[(usize, usize)]| columns.iter().any(lifts) && !columns.iter().all(lifts);
-            if both(&self.design.candidates[member.candidate].columns) && !both(&member.columns) {
-                return Some(Refusal::NotSignificant);
-            }
         }
         if !self.relevant(member, base, fitted) {
             return Some(Refusal::Irrelevant);
@@ -293,6 +282,21 @@ impl<'a> Judge<'a> {
             return Some(Refusal::SmallShare);
         }
         (!self.stable(member, base, fitted)).then_some(Refusal::Unstable)
+    }
+
+    /// False for columns of an effect that are not its law by themselves: what comes with an effect does not come without it. A moving
+    /// bed changes the lift, and the drag along or across: either alone is another effect's.
+    pub fn is_a_law(&self, member: &Member) -> bool {
+        const LIFT: usize = 1;
+        let effect = self.effect(member);
+        let of_bed = |columns: &[(usize, usize)]| {
+            let lifts = |&(_, coefficient): &(usize, usize)| coefficient == LIFT;
+            columns.iter().any(lifts) && !columns.iter().all(lifts)
+        };
+        let has_first = member.columns.iter().any(|(_, coefficient)| *coefficient == 0);
+        let candidate = &self.design.candidates[member.candidate];
+        (has_first || !effect.spec().needs_its_first)
+            && (effect != Effect::BedMotion || of_bed(&member.columns) || !of_bed(&candidate.columns))
     }
 
     /// Size of what a member adds, against the noise of a sample, in any component. What of it the model's own error could be was

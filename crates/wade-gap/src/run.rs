@@ -91,8 +91,9 @@ pub fn run(
         let judge = Judge::new(&design, &all, &setting, config, &floors, floor_loss);
         judge.select(&library)
     };
-    // the set of the search while a more probable one is tried in its place, and the names of one that did not hold
+    // the set of the search while a more probable one is tried in its place, and the names of one that the held-out trials disproved
     let (mut searched, mut refuted): (Option<Vec<Member>>, Vec<&str>) = (None, Vec::new());
+    let mut is_tried = false;
     loop {
         let asked = members.clone();
         refine(&mut design, &all, &setting, &members);
@@ -104,17 +105,22 @@ pub fn run(
         let weighed = weigh(&judge, &found, &library);
         let is_disproved = |set: &[Member]| is_disproved(&judge, set, &held);
         let next = match searched.take() {
-            Some(searched) if found.verdict != Verdict::Named || is_disproved(&members) => {
-                refuted = judge.names(&asked);
-                Some(searched)
+            Some(searched) => {
+                let is_whole =
+                    found.verdict == Verdict::Named && judge.names(&members) == judge.names(&asked);
+                if is_disproved(&members) {
+                    refuted = judge.names(&asked);
+                }
+                (!is_whole || !refuted.is_empty()).then_some(searched)
             }
-            None if refuted.is_empty() => found.set_to_name(&weighed).inspect(|_| searched = Some(asked)),
-            _ => None,
+            None if is_tried => None,
+            None => found.set_to_name(&weighed).inspect(|_| searched = Some(asked)),
         };
         let Some(next) = next else {
             found.heed(&weighed, |set| judge.names(set) != refuted && !is_disproved(set));
             return Ok(compose(trials, &judge, found, &weighed, held, &library));
         };
+        is_tried = true;
         members = next;
         see(&mut design, &mut all, &setting, &[]);
     }

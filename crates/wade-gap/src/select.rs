@@ -155,6 +155,22 @@ impl Judge<'_> {
         if set.len() + 2 > self.config.most_effects {
             return Vec::new();
         }
+        for (first, second) in self.pairs(set, library).into_iter().take(2 * LOOKED_AT) {
+            let Some(a) = self.judge_quick(set, first) else { continue };
+            let mut beside = set.to_vec();
+            beside.push(a);
+            let Some(b) = self.passes(&beside, second) else { continue };
+            let mut beside = set.to_vec();
+            beside.push(b.member.clone());
+            let Some(a) = self.passes(&beside, first) else { continue };
+            return vec![a.member, b.member];
+        }
+        Vec::new()
+    }
+
+    /// Every two effects beside a set by least squares alone, in both orders: the second in the form that suits the first. The best
+    /// come first.
+    pub fn pairs(&self, set: &[Member], library: &[Effect]) -> Vec<(Effect, Effect)> {
         let free: Vec<Effect> = library.iter().filter(|effect| !self.taken(set, **effect)).copied().collect();
         let mut pairs: Vec<(f64, Effect, Effect)> = Vec::new();
         for &first in &free {
@@ -169,21 +185,11 @@ impl Judge<'_> {
             }
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        for (_, first, second) in pairs.into_iter().take(2 * LOOKED_AT) {
-            let Some(a) = self.judge_quick(set, first) else { continue };
-            let mut beside = set.to_vec();
-            beside.push(a);
-            let Some(b) = self.passes(&beside, second) else { continue };
-            let mut beside = set.to_vec();
-            beside.push(b.member.clone());
-            let Some(a) = self.passes(&beside, first) else { continue };
-            return vec![a.member, b.member];
-        }
-        Vec::new()
+        pairs.into_iter().map(|(_, first, second)| (first, second)).collect()
     }
 
     /// The best form of an effect beside a set by least squares alone.
-    fn judge_quick(&self, set: &[Member], effect: Effect) -> Option<Member> {
+    pub fn judge_quick(&self, set: &[Member], effect: Effect) -> Option<Member> {
         Some(self.whole(self.ranked(set, effect)?.first()?.1))
     }
 }

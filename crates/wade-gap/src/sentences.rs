@@ -53,6 +53,10 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
                 "; the closest candidate is {names}, but that none of the library explains the gap is more probable ({})",
                 probability(p)
             ),
+            Unfit::Outweighed(p) => format!(
+                "; the closest candidate is {names}, but effects that the held-out trials disprove are more probable ({})",
+                probability(p)
+            ),
             Unfit::Leaves => format!("; the closest candidate is {names}, but serial correlation remains"),
         };
     }

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::design::Design;
 use super::detect::sizes;
-use super::explanations::Weighed;
+use super::explanations::{Weighed, more_probable_than_not};
 use super::features::{energy, without_zeros};
 use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
@@ -41,13 +41,12 @@ const LIMITED: f64 = 0.1;
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
 
-/// Odds from which evidence is substantial (Jeffreys, Theory of Probability, appendix B).
-const SUBSTANTIAL: f64 = 3.162;
-
 /// What the search found.
 pub(super) struct Found {
     pub verdict: Verdict,
     pub members: Vec<Member>,
+    /// Their names, in the order of the library.
+    names: Vec<&'static str>,
     pub alternatives: Vec<Vec<Member>>,
     pub residual: DVector<f64>,
     /// One effect that explains more within a region than the members do everywhere.
@@ -74,6 +73,8 @@ pub(super) enum Unfit {
     Leaves,
     /// That nothing of the library explains the gap is more probable, with this probability.
     Unlikely(f64),
+    /// Other effects are more probable, with this probability, and the held-out trials disprove them.
+    Outweighed(f64),
 }
 
 impl Found {
@@ -126,42 +127,63 @@ impl Found {
             _ => Verdict::Ambiguous,
         };
         let of_gap = gap_structure.clone();
-        Self { verdict, members: members.to_vec(), alternatives, residual, gated, left, of_gap, loss, unfit }
+        let mut effects: Vec<Effect> = members.iter().map(|member| judge.effect(member)).collect();
+        effects.sort();
+        let names = effects.into_iter().map(Effect::name).collect();
+        Self {
+            verdict,
+            members: members.to_vec(),
+            names,
+            alternatives,
+            residual,
+            gated,
+            left,
+            of_gap,
+            loss,
+            unfit,
+        }
     }
 
-    /// The most probable explanation, where it is a set of effects that is clearly more so than what was found: a search that adds one
-    /// effect after the other can end in a set too many or too few.
+    /// The explanation that the members are, in whatever forms and columns of their laws.
+    fn own<'a>(&self, weighed: &'a [Weighed]) -> Option<&'a Weighed> {
+        weighed.iter().find(|weighed| weighed.explanation.effects == self.names)
+    }
+
+    /// The set of the effects that are more probable than not, where it is another than what was found: a search that adds one effect
+    /// after the other can end in a set too many or too few.
     pub fn set_to_name(&self, weighed: &[Weighed]) -> Option<Vec<Member>> {
-        let own = weighed.iter().find(|weighed| weighed.set == self.members)?;
-        let first = weighed.first().filter(|first| first.explanation.is_of_library())?;
-        let outweighs = first.explanation.probability > SUBSTANTIAL * own.explanation.probability;
-        (self.verdict == Verdict::Named && outweighs).then(|| first.set.clone())
+        let likely = more_probable_than_not(weighed);
+        let is_another = self.verdict == Verdict::Named && !likely.is_empty() && likely != self.names;
+        let set = weighed.iter().find(|weighed| is_another && weighed.explanation.effects == likely)?;
+        Some(set.set.clone())
     }
 
-    /// Names nothing against the weight of the evidence: explanations that are clearly more probable and that the held-out
-    /// trials do not disprove stand beside what was found, and where one of them is none of the library, it is not named.
+    /// Names nothing against the weight of the evidence: where other effects than the members are more probable than not, the
+    /// explanations that are more probable than the members stand beside them. Where the first of these is none of the library, or where
+    /// the held-out trials disprove all of them, nothing is named: then neither the members nor they are what is missing.
     pub fn heed(&mut self, weighed: &[Weighed], holds: impl Fn(&[Member]) -> bool) {
-        let Some(own) = weighed.iter().find(|weighed| weighed.set == self.members) else { return };
-        let least = SUBSTANTIAL * own.explanation.probability;
-        if self.verdict != Verdict::Named {
+        let Some(own) = self.own(weighed) else { return };
+        if self.verdict != Verdict::Named || more_probable_than_not(weighed) == self.names {
             return;
         }
-        let before: Vec<&Weighed> = weighed
-            .iter()
-            .filter(|weighed| {
-                weighed.explanation.probability > least && (weighed.set.is_empty() || holds(&weighed.set))
-            })
-            .collect();
-        if before.is_empty() {
-            return;
-        }
-        if let Some(first) = before.iter().find(|weighed| !weighed.explanation.is_of_library()) {
+        let least = own.explanation.probability;
+        let before: Vec<&Weighed> =
+            weighed.iter().filter(|weighed| weighed.explanation.probability > least).collect();
+        let Some(first) = before.first().map(|first| &first.explanation) else { return };
+        let of_library = before.iter().filter(|weighed| weighed.explanation.is_of_library());
+        let alternatives: Vec<Vec<Member>> =
+            of_library.map(|weighed| &weighed.set).filter(|set| holds(set)).cloned().collect();
+        let unfit = match first.is_of_library() {
+            false => Some(Unfit::Unlikely(first.probability)),
+            true => alternatives.is_empty().then_some(Unfit::Outweighed(first.probability)),
+        };
+        if unfit.is_some() {
             self.verdict = Verdict::NoCandidateFits;
-            self.unfit = Some(Unfit::Unlikely(first.explanation.probability));
+            self.unfit = unfit;
             self.left = self.of_gap.clone();
         } else {
             self.verdict = Verdict::Ambiguous;
-            self.alternatives = before.iter().map(|weighed| weighed.set.clone()).collect();
+            self.alternatives = alternatives;
         }
     }
 }
