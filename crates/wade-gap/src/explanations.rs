@@ -119,7 +119,8 @@ pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Wei
     // what looks like an effect with an impossible value is another load
     let impossible = all.split_off(possible);
     let beyond: f64 = impossible.iter().map(|weighed| weighed.explanation.probability).sum();
-    all[1].explanation.probability += beyond;
+    let outside = all.iter_mut().map(|weighed| &mut weighed.explanation);
+    outside.filter(|e| e.effects == [OUTSIDE_LIBRARY]).for_each(|e| e.probability += beyond);
     all.sort_by(|a, b| {
         let (a, b) = (&a.explanation, &b.explanation);
         b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects))
@@ -269,4 +270,30 @@ fn weights(all: &[Weighed], judge: &Judge, found: &Found) -> Vec<f64> {
     }
     sums.iter_mut().for_each(|sum| *sum /= judge.config.bootstrap as f64);
     sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effects_are_likely_over_all_explanations_together() {
+        let of = |(effects, probability): (&[&'static str], f64)| Weighed {
+            explanation: Explanation { effects: effects.to_vec(), probability },
+            set: Vec::new(),
+            losses: Vec::new(),
+            log_prior: 0.0,
+            numbers: 0,
+        };
+        // the first alone is the less probable half of what holds it
+        let explanations: [(&[&str], f64); 4] = [
+            (&["added_mass", "squat"], 0.35),
+            (&["added_mass"], 0.25),
+            (&["current"], 0.2),
+            (&[OUTSIDE_LIBRARY], 0.2),
+        ];
+        let weighed: Vec<Weighed> = explanations.into_iter().map(of).collect();
+        assert_eq!(more_probable_than_not(&weighed), ["added_mass"]);
+        assert_eq!(more_probable_than_not(&weighed[1..]), [""; 0]);
+    }
 }

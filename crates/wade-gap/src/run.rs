@@ -104,12 +104,16 @@ pub fn run(
         let mut found = Found::of(&judge, &members, &library, &general, &gap_structure);
         let weighed = weigh(&judge, &found, &library);
         let is_disproved = |set: &[Member]| is_disproved(&judge, set, &held);
+        let names = |set: &[Member]| {
+            let mut names = judge.names(set);
+            names.sort_unstable();
+            names
+        };
         let next = match searched.take() {
             Some(searched) => {
-                let is_whole =
-                    found.verdict == Verdict::Named && judge.names(&members) == judge.names(&asked);
+                let is_whole = found.verdict == Verdict::Named && names(&members) == names(&asked);
                 if is_disproved(&members) {
-                    refuted = judge.names(&asked);
+                    refuted = names(&asked);
                 }
                 (!is_whole || !refuted.is_empty()).then_some(searched)
             }
@@ -117,7 +121,7 @@ pub fn run(
             None => found.set_to_name(&weighed).inspect(|_| searched = Some(asked)),
         };
         let Some(next) = next else {
-            found.heed(&weighed, |set| judge.names(set) != refuted && !is_disproved(set));
+            found.heed(&weighed, |set| names(set) != refuted && !is_disproved(set));
             return Ok(compose(trials, &judge, found, &weighed, held, &library));
         };
         is_tried = true;
