@@ -321,7 +321,12 @@ fn workflow(trials: &Trials) -> Result<Answer, ToolError> {
     let body = wade_gap::body_of(trials).map_err(refused)?;
     let report =
         wade_gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).map_err(refused)?;
-    Ok(Answer::from_report(&serde_json::to_value(report)?)?)
+    let answer = Answer::from_report(&serde_json::to_value(report)?)?;
+    // a verdict that its own numbers contradict is no answer
+    match answer.contradiction() {
+        Some(why) => Err(ToolError::Refused(why.into())),
+        None => Ok(answer),
+    }
 }
 
 fn text(outcomes: &BTreeMap<String, Outcome>) -> String {
