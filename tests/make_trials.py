@@ -73,7 +73,7 @@ def predicted(wade, motion, times):
 
 
 def figure(wade):
-    """The gap of the first trial of the page: one that took no part, before and after."""
+    """The gap of the first trial of the page: one that is held out, before and after."""
     with tempfile.TemporaryDirectory() as folder:
         command = [wade, "gap", "--vehicle", "husky", "--vehicles", BUNDLE.parent, "--trials", FOLDER, "--out", folder]
         subprocess.run(command, check=True)

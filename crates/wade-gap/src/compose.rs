@@ -20,7 +20,7 @@ use super::report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sourc
 use super::sentences::{summary, unexplained};
 use super::series::Series;
 use super::statistics::{Z90, quantile};
-use super::traces::{traces, trends};
+use super::traces::drawn;
 use super::verdict::Found;
 use super::{Named, measurement, plausible};
 use wade_core::condition::Condition;
@@ -151,6 +151,7 @@ pub(super) fn compose(
         held_out_trials: held.iter().map(|&trial| all[trial].name.clone()).collect(),
         unexplained,
     };
+    let (traces, trends) = drawn(&named, all, &held, setting, judge.floors);
     let mut report = Report {
         verdict: found.verdict,
         summary: String::new(),
@@ -174,8 +175,8 @@ pub(super) fn compose(
         bin_s: config.bin_s,
         remarks: said,
         sources: Sources { trials: hash(trials), ..Sources::default() },
-        traces: traces(&named, all, &held, setting, judge.floors),
-        trends: trends(&named, all, setting, judge.floors),
+        traces,
+        trends,
     };
     report.summary = summary(&report, found.gated);
     report

@@ -1,5 +1,5 @@
-//! Promise: with a stated inertia moments are inferred from the motion as forces are, and a wrong inertia is told from what the
-//! water does.
+//! Promise: with a stated inertia moments are inferred from the motion as forces are, and a wrong inertia is distinguished
+//! from what the water does.
 
 use crate::planted::{self, Noise, State, motions, planted as plant, run_with, trials};
 use wade_gap::{Config, Report};
