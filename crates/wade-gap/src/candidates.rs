@@ -4,12 +4,14 @@ use nalgebra::Matrix3;
 
 use super::base_drag::BaseDrag;
 use super::measurement::{of_each_axis, rolling_direction};
+use super::rates::mean_step;
 use super::series::Series;
 use wade_core::effects::added_mass::{AddedMass, HeaveMass};
 use wade_core::effects::bed_motion::{BedArea, BedMotion};
 use wade_core::effects::channel_blockage::ChannelBlockage;
 use wade_core::effects::current::Current;
 use wade_core::effects::drag_coefficient_error::{DragCoefficientError, DragLaw};
+use wade_core::effects::drive::{DriveDelay, Response};
 use wade_core::effects::hull_flooding::HullFlooding;
 use wade_core::effects::rotation::{Extent, Rotation};
 use wade_core::effects::sensor::{SensorBiasStep, SensorDelay, SensorDrift, SensorGain};
@@ -24,6 +26,9 @@ use wade_learn::trials::Manifest;
 /// Half the distance over which the prediction is differentiated for a delay [s]: further than noise that stands in both
 /// the gap and the prediction reaches, which would pass for a delay.
 const DELAY_ARM: f64 = 0.15;
+
+/// Delays about which one is first looked for [s].
+const DELAYS: [f64; 4] = [0.0, 0.1, 0.25, 0.5];
 
 /// Froude numbers at which one-dimensional flow in a channel ends.
 const FADED_AT: [f64; 2] = [0.7, 1.0];
@@ -147,8 +152,11 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
                 .map(Shape::WaterEntrySlamming)
                 .collect()
         }
-        Effect::SensorDelay => {
-            [0.0, 0.1, 0.25, 0.5].map(|delay_s| Shape::SensorDelay(SensorDelay { delay_s })).into()
+        Effect::SensorDelay => DELAYS.map(|delay_s| Shape::SensorDelay(SensorDelay { delay_s })).into(),
+        Effect::DriveDelay => {
+            let of = |response, delay_s| Shape::DriveDelay(DriveDelay { delay_s, response });
+            let delays = [-0.25, -0.1].into_iter().chain(DELAYS).map(|delay| of(Response::Delay, delay));
+            delays.chain(DELAYS.map(|lag| of(Response::Lag, lag))).collect()
         }
         Effect::SensorDrift if setting.one_clock => {
             [SensorDrift::OfTrial, SensorDrift::OfSession].map(Shape::SensorDrift).into()
@@ -272,6 +280,14 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
                 };
                 (0..3).for_each(|axis| columns[0][sample][axis] = -setting.mass * inertia[axis]);
             }
+            Shape::RotatingInertia(_) => {
+                let surge = match &series.inertia {
+                    Some(inertia) if series.dry_acceleration.is_some() => inertia[sample].x,
+                    Some(inertia) => inertia[sample].x - GRAVITY * up.x,
+                    None => series.calibrated[sample].acceleration.x,
+                };
+                columns[0][sample][0] = -setting.mass * surge;
+            }
             Shape::InertiaError(_) => {
                 let calibrated = &series.calibrated[sample];
                 let (rate, change) = (&calibrated.angular_velocity, &calibrated.angular_acceleration);
@@ -288,9 +304,46 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
             _ => {}
         }
     }
-    if let Shape::SensorDelay(SensorDelay { delay_s }) = *shape {
-        delayed(series, delay_s, &mut columns[0]);
+    match *shape {
+        Shape::SensorDelay(SensorDelay { delay_s }) => delayed(series, delay_s, &mut columns[0]),
+        Shape::DriveDelay(law) => late(series, law, &mut columns[0]),
+        _ => {}
     }
+}
+
+/// Change of the known force `D` per second of delay or time constant `tau`: `(D(t - tau) - D(t)) / tau`, or what a lag of first
+/// order leaves in the place of the former. Recorded forces have no noise of the motion in them.
+fn late(series: &Series, law: DriveDelay, column: &mut Column) {
+    let shortest = mean_step(&series.t);
+    let tau = match law.response {
+        Response::Delay => shortest.max(law.delay_s.abs()).copysign(law.delay_s),
+        Response::Lag => shortest.max(law.delay_s),
+    };
+    let times: Vec<f64> = series.t.iter().map(|t| t - tau).collect();
+    for component in 0..6 {
+        let values: Vec<f64> = series.other.iter().map(|other| other[component]).collect();
+        let late = match law.response {
+            Response::Delay => wade_learn::signal::interpolate(&series.t, &values, &times),
+            Response::Lag => lagged(&series.t, &values, tau),
+        };
+        for ((change, late), now) in column.iter_mut().zip(late).zip(&values) {
+            change[component] = (late - now) / tau;
+        }
+    }
+}
+
+/// Lag of first order, from the value of the first sample on, of values that change linearly from sample to sample.
+fn lagged(t: &[f64], values: &[f64], tau: f64) -> Vec<f64> {
+    let mut state = values[0];
+    let mut out = vec![state];
+    for (t, v) in t.windows(2).zip(values.windows(2)) {
+        let step = t[1] - t[0];
+        let slope = (v[1] - v[0]) / step.max(f64::MIN_POSITIVE);
+        let steady = |value: f64| value - slope * tau;
+        state = steady(v[1]) + (state - steady(v[0])) * (-step / tau).exp();
+        out.push(state);
+    }
+    out
 }
 
 /// Change per second of delay, `-dp/dt` at `t - tau/2`: `-(15 D_h - 6 D_2h + D_3h) / 10` with the central

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Config;
 use super::candidates::{Column, Setting, columns};
+use super::color::Color;
 use super::model_error::ModelError;
 use super::series::Series;
 use super::smoothing::Smoothing;
@@ -36,12 +37,25 @@ pub(super) struct RowNoise {
     pub model: bool,
     /// Smoothing of the rows.
     pub smoothing: Smoothing,
+    /// Color of the noise, by component; none of one whose bins are independent.
+    pub color: [Option<Color>; 6],
 }
 
 impl RowNoise {
     /// Least mean square that is expected of rows: 1 where the model may be as wrong as it says, else 0, since noise is estimated.
     pub fn stated(&self) -> f64 {
         f64::from(u8::from(self.model))
+    }
+
+    /// True where the noise is that of a motion, which is louder in a maneuver.
+    pub fn is_colored(&self) -> bool {
+        self.color.iter().any(Option::is_some)
+    }
+
+    /// Makes the standardised values of a trial's bins independent.
+    pub fn whiten(&self, values: &mut [f64], series: &Series, component: usize) {
+        let Some(color) = &self.color[component] else { return };
+        series.runs.iter().for_each(|run| color.whiten(&mut values[run.clone()], self.bin[component]));
     }
 
     /// Takes off the mean of a trial's standardised values in the share that its zero has in it.
@@ -154,6 +168,7 @@ fn rows_of_trial(
         .map(|&component| {
             let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
             values.iter_mut().for_each(|value| *value /= noise.bin[component]);
+            noise.whiten(&mut values, series, component);
             noise.center(&mut values, trial, component);
             values
         })

@@ -73,6 +73,9 @@ pub(super) struct Weighed {
     numbers: usize,
 }
 
+/// Share of a loss by which two sets that say the same can differ.
+const SAME: f64 = 1e-6;
+
 /// Numbers that an unknown load has in each component: its size, and how it depends on the state.
 const NUMBERS_OUTSIDE: usize = 2;
 
@@ -110,6 +113,20 @@ pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Wei
         };
         sets.insert(place, weighed);
     }
+    // what an impossible set explains no better than a possible one of as many numbers does is no other load
+    let least = |numbers: usize| {
+        let possible =
+            sets.iter().filter(|((is_impossible, _), set)| !is_impossible && set.numbers <= numbers);
+        possible.map(|(_, set)| set.losses.iter().sum::<f64>()).fold(f64::INFINITY, f64::min)
+    };
+    let stands_in: Vec<_> = sets
+        .iter()
+        .filter(|((is_impossible, _), set)| {
+            *is_impossible && set.losses.iter().sum::<f64>() >= (1.0 - SAME) * least(set.numbers)
+        })
+        .map(|(place, _)| place.clone())
+        .collect();
+    stands_in.iter().for_each(|place| drop(sets.remove(place)));
     let possible = all.len() + sets.keys().filter(|(is_impossible, _)| !is_impossible).count();
     all.extend(sets.into_values());
     let probabilities = weights(&all, judge, found);

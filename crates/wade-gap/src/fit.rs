@@ -98,7 +98,7 @@ pub(super) fn fit(
     let effect = |m: usize| design.candidates[set[m].candidate].effect;
     let laws: Vec<usize> = (0..set.len()).filter(|&m| effect(m).kind() == Kind::Physics).collect();
     let formula = |m: usize| match effect(m) {
-        Effect::SensorDelay => DELAY,
+        Effect::SensorDelay | Effect::DriveDelay => DELAY,
         _ if laws.contains(&m) => FORMULA,
         _ => 0.0,
     };

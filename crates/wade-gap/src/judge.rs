@@ -511,8 +511,12 @@ impl<'a> Judge<'a> {
 
 /// True for an effect that comes and goes with a rate, as fast as the noise of a motion does.
 pub(super) fn lives_on_a_rate(effect: Effect) -> bool {
-    use Effect::{AddedMass, InertiaError, MassError, SensorDelay, WaterEntrySlamming, WaveMemory};
-    matches!(effect, AddedMass | InertiaError | MassError | SensorDelay | WaterEntrySlamming | WaveMemory)
+    use Effect::{
+        AddedMass, DriveDelay, InertiaError, MassError, RotatingInertia, SensorDelay, WaterEntrySlamming,
+        WaveMemory,
+    };
+    matches!(effect, AddedMass | InertiaError | MassError | RotatingInertia | WaterEntrySlamming | WaveMemory)
+        || matches!(effect, DriveDelay | SensorDelay)
 }
 
 /// The fewest that together hold [`TELLING`] of the energy.

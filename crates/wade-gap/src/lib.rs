@@ -19,6 +19,7 @@ mod base_drag;
 mod calibrate;
 mod candidates;
 mod carriers;
+mod color;
 mod compose;
 mod config;
 mod design;

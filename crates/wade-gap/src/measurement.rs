@@ -41,6 +41,8 @@ pub(super) struct Motion {
     pub moments: Vec<[Vec3; 3]>,
     /// The dry twin's weight times the direction in which it rolls, over its mass; 0 without one [m/s2].
     pub dry_rolling: Vec<f64>,
+    /// The dry twin's acceleration, where there is one [m/s2].
+    pub dry_acceleration: Option<Vec<Vec3>>,
 }
 
 /// The dry twin of a trial, where it has one.
@@ -71,6 +73,7 @@ pub(super) fn measurement(
         moment: turning(manifest, trial, |inertia, rate, change| moment(&inertia, rate, change)),
         moments: turning(manifest, trial, of_each_axis),
         dry_rolling: vec![0.0; trial.len()],
+        dry_acceleration: None,
     };
     if let Some(twin) = twin {
         take_off(&mut motion, &mut other, manifest, trial, twin)?;
@@ -199,9 +202,12 @@ fn take_off(
     };
     let dry_moment = turning(manifest, twin, |inertia, rate, change| moment(&inertia, rate, change));
     let dry_moments = turning(manifest, twin, of_each_axis);
+    let mut dry_acceleration = vec![Vec3::zeros(); trial.len()];
     for axis in 0..3 {
         let acceleration = at(&|i| twin.acceleration[i][axis]);
-        motion.acceleration.iter_mut().zip(acceleration).for_each(|(wet, dry)| wet[axis] -= dry);
+        for ((wet, own), dry) in motion.acceleration.iter_mut().zip(&mut dry_acceleration).zip(acceleration) {
+            (wet[axis], own[axis]) = (wet[axis] - dry, dry);
+        }
         let up = at(&|i| twin.up(i)[axis]);
         motion.up.iter_mut().zip(up).for_each(|(wet, dry)| wet[axis] -= dry);
         let whole = at(&|i| dry_moment[i][axis]);
@@ -211,6 +217,7 @@ fn take_off(
             motion.moments.iter_mut().zip(one).for_each(|(wet, dry)| wet[alone][axis] -= dry);
         }
     }
+    motion.dry_acceleration = Some(dry_acceleration);
     motion.dry_rolling = at(&|i| GRAVITY * twin.up(i).z * rolling_direction(twin.velocity[i].x));
     let dry = of_columns(&twin.other_forces, twin.len());
     for component in 0..6 {

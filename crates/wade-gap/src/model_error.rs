@@ -69,6 +69,7 @@ impl ModelError {
                 let size = series.binned(|i| smooth * series.uncertainty[i][component]);
                 let mut of_trial = DMatrix::from_diagonal(&DVector::from_vec(size)) * weights;
                 for mut column in of_trial.column_iter_mut() {
+                    noise.whiten(column.as_mut_slice(), series, component);
                     noise.center(column.as_mut_slice(), trial, component);
                 }
                 z.rows_mut(first, weights.nrows()).copy_from(&of_trial);

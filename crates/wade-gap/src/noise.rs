@@ -3,6 +3,7 @@
 //! From the part of the gap that changes within a tenth of a second, scaled by what repeats show beyond that; never below the
 //! noise that `trials.toml` states. The model's own uncertainty stands beside it.
 
+use super::color::Color;
 use super::design::RowNoise;
 use super::model_error::ROUGH;
 use super::rates::mean_step;
@@ -221,9 +222,11 @@ pub(super) fn row_noise(
     components: &[usize],
     (floors, manifest): (&[Floor; 6], &Manifest),
     smoothing: Smoothing,
+    colors: [Option<Color>; 6],
 ) -> RowNoise {
     let model = components.iter().any(|&c| floors[c].model > 0.0);
-    let mut noise = RowNoise { bin: [1.0; 6], offset: vec![[0.0; 6]; all.len()], model, smoothing };
+    let mut noise =
+        RowNoise { bin: [1.0; 6], offset: vec![[0.0; 6]; all.len()], model, smoothing, color: [None; 6] };
     for &component in components {
         let mut variances = Vec::new();
         for &trial in trials {
@@ -240,6 +243,7 @@ pub(super) fn row_noise(
         let size = rms(all, trials, component);
         let bin = bin.max(1e-3 * size).max(1e-12);
         noise.bin[component] = bin.hypot(floors[component].rough());
+        noise.color[component] = colors[component].map(|color| color.with(floors[component].rough().powi(2)));
         for (offset, series) in noise.offset.iter_mut().zip(all) {
             offset[component] = manifest.trial_offset_of(&series.name, WRENCH[component]);
         }

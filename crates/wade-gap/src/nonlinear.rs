@@ -7,6 +7,7 @@ use super::holdout::explained;
 use super::judge::Member;
 use super::series::Series;
 use wade_core::effects::current::Current;
+use wade_core::effects::drive::DriveDelay;
 use wade_core::effects::sensor::SensorDelay;
 use wade_core::effects::{Effect, Kind, Shape};
 use wade_core::frame::GRAVITY;
@@ -53,7 +54,9 @@ fn iterate(design: &mut Design, all: &[Series], setting: &Setting, member: &Memb
 fn estimate(shape: &Shape) -> Option<[f64; 2]> {
     match *shape {
         Shape::Current(Current { east_mps, north_mps, .. }) => Some([east_mps, north_mps]),
-        Shape::SensorDelay(SensorDelay { delay_s }) => Some([delay_s, 0.0]),
+        Shape::SensorDelay(SensorDelay { delay_s }) | Shape::DriveDelay(DriveDelay { delay_s, .. }) => {
+            Some([delay_s, 0.0])
+        }
         _ => None,
     }
 }
@@ -63,6 +66,7 @@ fn with_estimate(shape: Shape, [first, second]: [f64; 2]) -> Shape {
     match shape {
         Shape::Current(law) => Shape::Current(Current { east_mps: first, north_mps: second, ..law }),
         Shape::SensorDelay(_) => Shape::SensorDelay(SensorDelay { delay_s: first }),
+        Shape::DriveDelay(law) => Shape::DriveDelay(DriveDelay { delay_s: first, ..law }),
         other => other,
     }
 }

@@ -3,6 +3,7 @@
 use super::base_drag::BaseDrag;
 use super::calibrate::calibrate;
 use super::candidates::{Setting, shapes, unavailable};
+use super::color::Color;
 use super::compose::{compose, is_disproved};
 use super::design::{Design, Rows};
 use super::explanations::weigh;
@@ -14,12 +15,13 @@ use super::nonlinear::{refine, see, settle, through_sensors};
 use super::plausible;
 use super::report::{Report, Verdict};
 use super::series::{Series, one_clock, series};
-use super::smoothing::Smoothing;
+use super::smoothing::{Smoothing, smoothed};
 use super::split::hold_out;
 use super::statistics::median;
 use super::verdict::{Found, floor_loss};
 use super::{Asked, Config, GapError, Predicted};
 use wade_core::effects::{Block, Body, Effect, Shape};
+use wade_core::frame::GRAVITY;
 use wade_learn::trials::Trials;
 
 /// The body that `trials.toml` describes, for another simulator's prediction; its wheels are as large as they roll.
@@ -80,8 +82,17 @@ pub fn run(
         let (blocks, block_s, folds) = (rows.blocks, config.block_s, config.folds);
         return Err(GapError::TooShort { blocks, block_s, folds });
     }
-    let smoothing = if setting.computed { Smoothing::default() } else { calibrate(&mut all) };
-    let noise = row_noise(&all, &naming, &setting.components, (&floors, &trials.manifest), smoothing);
+    let mut smoothing = if setting.computed { Smoothing::default() } else { calibrate(&mut all) };
+    let colors = colors(&all, &naming, &setting);
+    from_forces(&mut all, &setting, &colors);
+    // what is weighed by the spectrum of its noise needs no smoothing
+    smoothing
+        .0
+        .iter_mut()
+        .zip(&colors)
+        .filter(|(_, color)| color.is_some())
+        .for_each(|(length, _)| *length = 0.0);
+    let noise = row_noise(&all, &naming, &setting.components, (&floors, &trials.manifest), smoothing, colors);
     let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
     settle(&mut design, &all, &setting);
     let general = General::new(&all, &design, &setting.components);
@@ -127,6 +138,46 @@ pub fn run(
         is_tried = true;
         members = next;
         see(&mut design, &mut all, &setting, &[]);
+    }
+}
+
+/// The color of the noise of forces that were inferred from the motion of the trials themselves. Moments are left out: the rates in their
+/// columns are the recorded ones.
+fn colors(all: &[Series], naming: &[usize], setting: &Setting) -> [Option<Color>; 6] {
+    let are_colored = !setting.computed && all.iter().all(|series| series.inertia.is_some());
+    std::array::from_fn(|component| {
+        let is_colored = are_colored && component < 3 && setting.components.contains(&component);
+        if is_colored { Color::of(all, naming, component) } else { None }
+    })
+}
+
+/// Sets the accelerations that effects see to those that the known forces and the prediction give, `m a = F - m g up`, with as much of
+/// the gap as stands above its noise. A recorded acceleration has the noise that stands in the inferred wrench, and would agree
+/// with it (instrumental variables; Fuller, Measurement Error Models, section 1.4).
+fn from_forces(all: &mut [Series], setting: &Setting, colors: &[Option<Color>; 6]) {
+    /// Length over which a dry twin's acceleration is smoothed where the gap says nothing [s].
+    const SLOW: f64 = 1.0;
+    for (axis, color) in colors.iter().enumerate() {
+        let Some(color) = color else { continue };
+        for series in all.iter_mut() {
+            let slow = color.above_s.map(|length| smoothed(series, length, |i| series.gap[i][axis]));
+            let length = color.above_s.unwrap_or(SLOW);
+            let dry = series.dry_acceleration.as_ref().map(|dry| smoothed(series, length, |i| dry[i][axis]));
+            for sample in 0..series.t.len() {
+                let slow = slow.as_ref().map_or(0.0, |slow| slow[sample]);
+                let inertia = (series.other[sample][axis] + series.seen[sample][axis] + slow) / setting.mass;
+                // a twin drives with the same attitude
+                let acceleration = match &dry {
+                    Some(dry) => inertia + dry[sample],
+                    None => inertia - GRAVITY * series.conditions[sample].up[axis],
+                };
+                series.calibrated[sample].acceleration[axis] = acceleration;
+                series.conditions[sample].acceleration[axis] = acceleration;
+                if let Some(stated) = &mut series.inertia {
+                    stated[sample][axis] = inertia;
+                }
+            }
+        }
     }
 }
 

@@ -51,6 +51,8 @@ pub(super) struct Series {
     pub turning: Option<Vec<[Vec3; 3]>>,
     /// What the dry twin's rolling resistance takes off, over its mass and the coefficient [m/s2]; 0 without a twin.
     pub dry_rolling: Vec<f64>,
+    /// The acceleration of the dry twin that was taken off, where there is one [m/s2].
+    pub dry_acceleration: Option<Vec<Vec3>>,
     /// Rates of velocity and angular velocity, wetting rate and angular velocities: how far each hangs together.
     pub coherence: [Coherence; 10],
     /// Samples of each bin.
@@ -264,6 +266,7 @@ fn of_trial(
         wetting_rate,
         inertia: motion.as_ref().map(|motion| inertia(&trial.t, &pieces, motion)),
         turning: motion.as_ref().map(|motion| turning(&trial.t, &pieces, motion)),
+        dry_acceleration: motion.as_ref().and_then(|motion| motion.dry_acceleration.clone()),
         dry_rolling: motion.map_or_else(|| vec![0.0; count], |motion| motion.dry_rolling),
         coherence,
         wheels,

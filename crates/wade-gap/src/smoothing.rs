@@ -46,13 +46,19 @@ pub(super) fn bins(series: &Series, length: f64, value: impl Fn(usize) -> f64) -
     if length == 0.0 {
         return series.binned(value);
     }
+    let values = smoothed(series, length, value);
+    series.binned(|sample| values[sample])
+}
+
+/// Values that were smoothed by two running means of a length [s] within each stretch without a hole.
+pub(super) fn smoothed(series: &Series, length: f64, value: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut values: Vec<f64> = (0..series.t.len()).map(value).collect();
     let half = half(length, mean_step(&series.t));
     for piece in series.pieces() {
         running_mean(&mut values[piece.clone()], half);
         running_mean(&mut values[piece], half);
     }
-    series.binned(|sample| values[sample])
+    values
 }
 
 /// Samples to either side of a running mean of some seconds.

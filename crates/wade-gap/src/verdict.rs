@@ -230,7 +230,7 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     };
     setting.computed && above()
         || structure.deviate > STRUCTURE && size > least
-        || deviate > bar && energy > 2.0 * lasts.max(0.5)
+        || !design.noise.is_colored() && deviate > bar && energy > 2.0 * lasts.max(0.5)
         || kept.most.deviate > LASTS && kept.most.rms > lasts
         || moving.most.deviate > LOUD[0] && moving.most.rms > LOUD[1].max(lasts)
         || moving.together.deviate > LOUD[0] && moving.together.rms > HUGE.max(least)

@@ -105,6 +105,7 @@ mod tests {
             (Effect::WheelPaddleThrust, &[[1.0, 0.0, 0.0]]),
             (Effect::BedMotion, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
             (Effect::SensorDelay, &[[0.1, 0.0, 0.0]]),
+            (Effect::DriveDelay, &[[0.1, 0.0, 0.0], [0.1, 1.0, 0.0]]),
             (Effect::SensorBiasStep, &[[0.0, 3.0, 0.0], [1.0, 2.5, 0.0]]),
             (Effect::SensorDrift, &[[1.0, 0.0, 0.0]]),
             (Effect::SensorGain, &[[1.0, 0.0, 0.0]]),

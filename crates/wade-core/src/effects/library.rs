@@ -7,8 +7,8 @@ use super::law::{Law, Numbers, ShapeFault};
 use super::spec::{Coefficient, EffectSpec, Kind};
 use super::{
     added_mass, bed_motion, channel_blockage, current, density_error, drag_coefficient_error, drive,
-    hull_flooding, linear_damping, rotation, sensor, squat, water_entry_slamming, water_level_offset,
-    wave_memory, wheel_paddle_thrust,
+    hull_flooding, hull_lift, linear_damping, rotation, sensor, squat, water_entry_slamming,
+    water_level_offset, wave_memory, wheel_paddle_thrust,
 };
 use crate::wrench::Wrench;
 
@@ -111,6 +111,9 @@ effects! {
     drive::DriveGain,
     drive::MassError,
     drive::InertiaError,
+    drive::RotatingInertia,
+    drive::DriveDelay,
+    hull_lift::HullLift,
 }
 
 /// Most coefficients of one effect.

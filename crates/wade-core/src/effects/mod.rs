@@ -25,6 +25,7 @@ pub mod density_error;
 pub mod drag_coefficient_error;
 pub mod drive;
 pub mod hull_flooding;
+pub mod hull_lift;
 pub mod linear_damping;
 pub mod rotation;
 pub mod sensor;

@@ -65,6 +65,7 @@ fn effects_of_the_water_are_named_with_their_size() {
         ("added_mass", "surge", 1.0),
         ("linear_damping", "surge", 1.0),
         ("rotation", "drag_coefficient", 3.0),
+        ("hull_lift", "yaw_of_drift", 3.0),
         ("water_level_offset", "offset", 3.0),
         ("wave_memory", "surge", 3.0),
         ("squat", "sinkage", 1.0),

@@ -271,6 +271,8 @@ pub fn planted(name: &str, motion: &[State]) -> Vec<[f64; 6]> {
                 ]
             }
             "drag_coefficient_error" => at_center(-0.5 * RHO * WIDTH * d * speed * s.v.x),
+            // of a wing as long as the box and as high as it is wet
+            "hull_lift" => [0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * RHO * d * LENGTH * LENGTH * s.v.x * s.v.y],
             "rotation" => {
                 // strips along the sides and the ends
                 let mut sum = [0.0; 6];
