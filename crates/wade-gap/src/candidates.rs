@@ -4,8 +4,9 @@ use nalgebra::Matrix3;
 
 use super::base_drag::BaseDrag;
 use super::measurement::{of_each_axis, rolling_direction};
-use super::rates::mean_step;
+use super::rates::{mean_square, mean_step};
 use super::series::Series;
+use super::statistics::white_variance;
 use wade_core::effects::added_mass::{AddedMass, HeaveMass};
 use wade_core::effects::bed_motion::{BedArea, BedMotion};
 use wade_core::effects::channel_blockage::ChannelBlockage;
@@ -236,6 +237,7 @@ fn physics(shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Col
 
 fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns: &mut [Column]) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
+    let drives = drives(series);
     for (sample, p) in series.seen.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();
@@ -271,7 +273,9 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
                 let dry = setting.mass * series.dry_rolling[sample];
                 columns[0][sample][0] = dry - load * rolling_direction(state.ground_velocity.x);
             }
-            Shape::DriveGain(_) => columns[0][sample] = series.other[sample],
+            Shape::DriveGain(_) => {
+                (0..6).filter(|&c| drives[c]).for_each(|c| columns[0][sample][c] = series.other[sample][c])
+            }
             Shape::MassError(_) => {
                 // a wrench that comes inferred was so with an acceleration that nobody knows: with what is expected of it
                 let inertia = match &series.inertia {
@@ -309,6 +313,15 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
         Shape::DriveDelay(law) => late(series, law, &mut columns[0]),
         _ => {}
     }
+}
+
+/// The components in which known forces are more than their own noise, which stands in the gap as well: that of the same command
+/// with and without water, one less the other, is not.
+fn drives(series: &Series) -> [bool; 6] {
+    std::array::from_fn(|component| {
+        let values: Vec<f64> = series.other.iter().map(|other| other[component]).collect();
+        white_variance(&values) < 0.5 * mean_square(&values)
+    })
 }
 
 /// Change of the known force `D` per second of delay or time constant `tau`: `(D(t - tau) - D(t)) / tau`, or what a lag of first

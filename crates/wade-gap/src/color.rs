@@ -43,7 +43,7 @@ impl Color {
         let parts = fitted(&fast);
         let is_noise =
             |&[frequency, power]: &[f64; 2]| power < ABOVE * power_of(parts, difference(frequency));
-        let first = points.iter().position(|point| is_noise(point)).unwrap_or(points.len());
+        let first = points.iter().position(is_noise).unwrap_or(points.len());
         // up to the middle between the last that stands above and the first that does not
         let above_s = (first > 0).then(|| {
             let end =

@@ -128,6 +128,13 @@ impl<'a> Judge<'a> {
         set.iter().any(|member| self.effect(member).kind() == Kind::Sensor)
     }
 
+    /// The names of a set in the order of the library.
+    pub fn sorted_names(&self, set: &[Member]) -> Vec<&'static str> {
+        let mut effects: Vec<Effect> = set.iter().map(|member| self.effect(member)).collect();
+        effects.sort();
+        effects.into_iter().map(Effect::name).collect()
+    }
+
     /// The names of a set.
     pub fn names(&self, set: &[Member]) -> Vec<&'static str> {
         set.iter().map(|member| self.effect(member).name()).collect()

@@ -103,7 +103,7 @@ pub fn run(
         judge.select(&library)
     };
     // the set of the search while a more probable one is tried in its place, and the names of one that the held-out trials disproved
-    let (mut searched, mut refuted): (Option<Vec<Member>>, Vec<&str>) = (None, Vec::new());
+    let (mut searched, mut refuted): (Option<(Vec<Member>, Verdict)>, Vec<&str>) = (None, Vec::new());
     let mut is_tried = false;
     loop {
         let asked = members.clone();
@@ -115,21 +115,19 @@ pub fn run(
         let mut found = Found::of(&judge, &members, &library, &general, &gap_structure);
         let weighed = weigh(&judge, &found, &library);
         let is_disproved = |set: &[Member]| is_disproved(&judge, set, &held);
-        let names = |set: &[Member]| {
-            let mut names = judge.names(set);
-            names.sort_unstable();
-            names
-        };
+        let names = |set: &[Member]| judge.sorted_names(set);
         let next = match searched.take() {
-            Some(searched) => {
-                let is_whole = found.verdict == Verdict::Named && names(&members) == names(&asked);
+            Some((searched, verdict)) => {
+                // as open as what was searched for, or not at all
+                let is_named = found.verdict == Verdict::Named || found.verdict == verdict;
+                let is_whole = is_named && names(&members) == names(&asked);
                 if is_disproved(&members) {
                     refuted = names(&asked);
                 }
                 (!is_whole || !refuted.is_empty()).then_some(searched)
             }
             None if is_tried => None,
-            None => found.set_to_name(&weighed).inspect(|_| searched = Some(asked)),
+            None => found.set_to_name(&judge, &weighed).inspect(|_| searched = Some((asked, found.verdict))),
         };
         let Some(next) = next else {
             found.heed(&weighed, |set| names(set) != refuted && !is_disproved(set));

@@ -127,9 +127,7 @@ impl Found {
             _ => Verdict::Ambiguous,
         };
         let of_gap = gap_structure.clone();
-        let mut effects: Vec<Effect> = members.iter().map(|member| judge.effect(member)).collect();
-        effects.sort();
-        let names = effects.into_iter().map(Effect::name).collect();
+        let names = judge.sorted_names(members);
         Self {
             verdict,
             members: members.to_vec(),
@@ -149,11 +147,13 @@ impl Found {
         weighed.iter().find(|weighed| weighed.explanation.effects == self.names)
     }
 
-    /// The set of the effects that are more probable than not, where it is another than what was found: a search that adds one effect
+    /// The set of the effects that are more probable than not, where it is none of what was found: a search that adds one effect
     /// after the other can end in a set too many or too few.
-    pub fn set_to_name(&self, weighed: &[Weighed]) -> Option<Vec<Member>> {
+    pub fn set_to_name(&self, judge: &Judge, weighed: &[Weighed]) -> Option<Vec<Member>> {
         let likely = more_probable_than_not(weighed);
-        let is_another = self.verdict == Verdict::Named && !likely.is_empty() && likely != self.names;
+        let is_named = matches!(self.verdict, Verdict::Named | Verdict::Ambiguous);
+        let stands_beside = self.alternatives.iter().any(|set| judge.sorted_names(set) == likely);
+        let is_another = is_named && !likely.is_empty() && likely != self.names && !stands_beside;
         let set = weighed.iter().find(|weighed| is_another && weighed.explanation.effects == likely)?;
         Some(set.set.clone())
     }
