@@ -10,6 +10,9 @@ use wade_learn::trials::{Method, Trials};
 const TRIALS: usize = 16;
 const SAMPLES: usize = 1000;
 
+/// What a log makes of the true drive force along a motion.
+type Record = dyn Fn(&[State], Vec<f64>) -> Vec<f64>;
+
 /// Drive force that the true motion needs [N].
 fn pull(state: &State, load: f64) -> f64 {
     planted::MASS * state.a.x - planted::simulate(state)[0] - load
@@ -17,11 +20,7 @@ fn pull(state: &State, load: f64) -> f64 {
 
 /// Trials whose force along x is inferred from a pose with white noise [m], differentiated twice by a filter of nine samples.
 /// `load` acts on the vehicle and is not in the prediction; `recorded` is what the log holds of a true drive force.
-fn driven(
-    pose: f64,
-    load: &dyn Fn(&[State]) -> Vec<f64>,
-    recorded: &dyn Fn(&[State], Vec<f64>) -> Vec<f64>,
-) -> Trials {
+fn driven(pose: f64, load: &dyn Fn(&[State]) -> Vec<f64>, recorded: &Record) -> Trials {
     let mut motions = pushes(TRIALS, SAMPLES, 51);
     // to and fro, or a current could stand for what goes with speed
     motions.iter_mut().step_by(2).flatten().for_each(|state| state.yaw = std::f64::consts::PI);
@@ -105,10 +104,7 @@ fn a_drive_that_lags_is_named_with_its_time_constant_and_one_that_is_recorded_la
     let late = |motion: &[State], force: Vec<f64>| -> Vec<f64> {
         (0..motion.len()).map(|i| force[i.saturating_sub(LATE)]).collect()
     };
-    for (recorded, truth) in [
-        (&before_lag as &dyn Fn(&[State], Vec<f64>) -> Vec<f64>, LAG),
-        (&late, -(LATE as f64) / planted::RATE),
-    ] {
+    for (recorded, truth) in [(&before_lag as &Record, LAG), (&late, -(LATE as f64) / planted::RATE)] {
         let report = run(&driven(0.1e-3, &no_load, recorded));
         assert_eq!(names(&report), ["drive_delay"], "{} {:?}", report.summary, report.rejected);
         let found = report.effects[0].parameters["delay"].value;
