@@ -49,6 +49,7 @@ LIBRARY = {
     "squat": Spec(_plain(sinkage=0.3, trim=0.1), _plain(faded_at=0.0)),
     "wheel_paddle_thrust": Spec(_plain(thrust=0.4, torque=0.0)),
     "bed_motion": Spec(_plain(drag=0.1, lift=0.1)),
+    "hull_lift": Spec(_plain(sway_of_yaw=0.2, yaw_of_drift=-0.3)),
 }
 
 
