@@ -37,6 +37,7 @@ class Effect(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     EFFECT_SQUAT: _ClassVar[Effect]
     EFFECT_WHEEL_PADDLE_THRUST: _ClassVar[Effect]
     EFFECT_BED_MOTION: _ClassVar[Effect]
+    EFFECT_HULL_LIFT: _ClassVar[Effect]
 
 class LeftOut(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -89,6 +90,7 @@ EFFECT_CHANNEL_BLOCKAGE: Effect
 EFFECT_SQUAT: Effect
 EFFECT_WHEEL_PADDLE_THRUST: Effect
 EFFECT_BED_MOTION: Effect
+EFFECT_HULL_LIFT: Effect
 LEFT_OUT_UNSPECIFIED: LeftOut
 LEFT_OUT_NO_SESSION: LeftOut
 LEFT_OUT_NO_HEADING: LeftOut
