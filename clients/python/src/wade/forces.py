@@ -50,6 +50,7 @@ class Effect(IntEnum):
     SQUAT = 12
     WHEEL_PADDLE_THRUST = 13
     BED_MOTION = 14
+    HULL_LIFT = 27
 
 
 class LeftOut(IntEnum):
