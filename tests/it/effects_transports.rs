@@ -10,7 +10,7 @@ use crate::common::{
 };
 use wade_client::{Client, InProcess, Method, Reply};
 use wade_core::bundle;
-use wade_core::effects::{Effect, LeftOut, PHYSICS};
+use wade_core::effects::{Effect, LeftOut};
 use wade_core::model::kernel::Isa;
 use wade_wire::State;
 use wade_wire::shm::Wait;
@@ -52,7 +52,7 @@ fn every_transport_answers_the_same_bits_with_every_effect() {
         for state in states(50) {
             for state in [state, State { implicit_added_mass: true, wheel_speeds: None, ..state }] {
                 let expected = comparable(library.evaluate(&state).expect("valid"));
-                assert!(expected.effects.len() == PHYSICS && expected.added_mass.is_some());
+                assert!(expected.effects.len() == 15 && expected.added_mass.is_some());
                 for (name, client) in &mut clients {
                     let reply = comparable(client.evaluate(&state).expect("answered"));
                     assert_eq!(reply, expected, "{vehicle} over {name}: {state:?}");
@@ -130,7 +130,7 @@ fn a_server_says_what_was_added_to_a_vehicle() {
     let folder = copy_with_every_effect();
     let served = Served::with(|config| config.vehicles = folder.path().to_owned());
     let vehicle = served.tcp("husky", Method::Unary).vehicle().expect("known");
-    assert_eq!(vehicle.effects.len(), PHYSICS);
+    assert_eq!(vehicle.effects.len(), 15);
     let added_mass = &vehicle.effects[0];
     assert_eq!((added_mass.name.as_str(), added_mass.effect), ("added_mass", 1));
     assert!(added_mass.equation.contains("M_A") && !added_mass.provisional);

@@ -135,7 +135,7 @@ def test_a_batch_has_the_effects_of_its_states_alone(client: Any, server: Server
     for implicit in (False, True):
         states = wade.State(depth_m=[0.1, 0.15, 0.2], velocity_mps=(0.5, 0.1, 0), implicit_added_mass=implicit, **TOLD)
         batch = client.evaluate_batch("husky", states)
-        assert batch.effect_force_n.shape == (3, len(LIBRARY), 3) and batch.added_mass.shape == (3, 6, 6)
+        assert batch.effect_force_n.shape == (3, 15, 3) and batch.added_mass.shape == (3, 6, 6)
         assert not batch.session_begins.any()
         for i in range(3):
             single = client.evaluate("husky", row(states, i))
