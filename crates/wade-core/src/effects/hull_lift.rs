@@ -64,7 +64,7 @@ mod tests {
     use super::*;
     use crate::condition::Condition;
     use crate::effects::{Body, Immersion};
-    use crate::vehicle::{PerWheel, shipped};
+    use crate::vehicle::shipped;
 
     /// Loads of both coefficients at 1, at `[u, v, r]`.
     fn loads([u, v, r]: [f64; 3]) -> [Wrench; 2] {
@@ -73,17 +73,7 @@ mod tests {
             Condition { angular_velocity: Vec3::z() * r, ..Condition::level(Vec3::new(u, v, 0.0), 0.17) };
         let mut immersion = Immersion::default();
         body.immerse(&condition, &mut immersion);
-        let input = Input {
-            body: &body,
-            condition: &condition,
-            immersion: &immersion,
-            predicted: Wrench::default(),
-            base_drag: Vec3::zeros(),
-            yaw: 0.0,
-            wetting_rate: 0.0,
-            channel_width: None,
-            wheel_speeds: PerWheel::none(),
-        };
+        let input = Input::of_motion(&body, &condition, &immersion);
         let mut found = [Wrench::default(); 2];
         HullLift.basis(&Memory::default(), &input, &mut |coefficient, _, load| found[coefficient] += load);
         found

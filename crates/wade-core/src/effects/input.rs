@@ -49,6 +49,24 @@ pub struct Input<'a> {
     pub wheel_speeds: PerWheel<Option<f64>>,
 }
 
+#[cfg(test)]
+impl<'a> Input<'a> {
+    /// A motion in open water of a vehicle of whose wheels, heading and model nothing is known.
+    pub(super) fn of_motion(body: &'a Body, condition: &'a Condition, immersion: &'a Immersion) -> Self {
+        Self {
+            body,
+            condition,
+            immersion,
+            predicted: Wrench::default(),
+            base_drag: Vec3::zeros(),
+            yaw: 0.0,
+            wetting_rate: 0.0,
+            channel_width: None,
+            wheel_speeds: PerWheel::none(),
+        }
+    }
+}
+
 impl Input<'_> {
     /// Velocity of the hull through the water at a point [m/s]: `v + omega x r`.
     pub fn local_velocity(&self, point: &Vec3) -> Vec3 {

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
     use crate::condition::Condition;
     use crate::effects::{Body, Immersion};
-    use crate::vehicle::{PerWheel, shipped};
+    use crate::vehicle::shipped;
 
     #[test]
     fn second_moments_give_what_four_points_give() {
@@ -72,17 +72,7 @@ mod tests {
         };
         let mut immersion = Immersion::default();
         body.immerse(&condition, &mut immersion);
-        let input = Input {
-            body: &body,
-            condition: &condition,
-            immersion: &immersion,
-            predicted: Wrench::default(),
-            base_drag: Vec3::zeros(),
-            yaw: 0.0,
-            wetting_rate: 0.0,
-            channel_width: None,
-            wheel_speeds: PerWheel::none(),
-        };
+        let input = Input::of_motion(&body, &condition, &immersion);
         let mut found = [Wrench::default(); 3];
         LinearDamping.basis(&Memory::default(), &input, &mut |axis, _, load| found[axis] += load);
         let scale = 1000.0 * (GRAVITY * body.length).sqrt();

@@ -107,24 +107,14 @@ mod tests {
     use crate::condition::Condition;
     use crate::effects::{Body, Immersion};
     use crate::frame::up_from_roll_pitch;
-    use crate::vehicle::{PerWheel, shipped};
+    use crate::vehicle::shipped;
 
     /// Sum of a coefficient.
     fn load(wet_at: f64, state: &Condition, wetting_rate: f64, coefficient: usize) -> (Body, Wrench) {
         let body = Body::of_vehicle(&shipped::husky().unwrap().vehicle().unwrap());
         let mut immersion = Immersion::default();
         body.immerse(state, &mut immersion);
-        let input = Input {
-            body: &body,
-            condition: state,
-            immersion: &immersion,
-            predicted: Wrench::default(),
-            base_drag: Vec3::zeros(),
-            yaw: 0.0,
-            wetting_rate,
-            channel_width: None,
-            wheel_speeds: PerWheel::none(),
-        };
+        let input = Input { wetting_rate, ..Input::of_motion(&body, state, &immersion) };
         let mut sum = Wrench::default();
         let law = WaterEntrySlamming::Wedge { wet_at_m: wet_at };
         law.basis(&Memory::default(), &input, &mut |index, _, wrench| {
