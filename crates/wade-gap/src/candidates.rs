@@ -237,7 +237,6 @@ fn physics(shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Col
 
 fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns: &mut [Column]) {
     let since_start = |sample: usize| series.t[sample] - series.t[0];
-    let drives = drives(series);
     for (sample, p) in series.seen.iter().enumerate() {
         let state = &series.conditions[sample];
         let up = state.up.into_inner();
@@ -273,9 +272,6 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
                 let dry = setting.mass * series.dry_rolling[sample];
                 columns[0][sample][0] = dry - load * rolling_direction(state.ground_velocity.x);
             }
-            Shape::DriveGain(_) => {
-                (0..6).filter(|&c| drives[c]).for_each(|c| columns[0][sample][c] = series.other[sample][c])
-            }
             Shape::MassError(_) => {
                 // a wrench that comes inferred was so with an acceleration that nobody knows: with what is expected of it
                 let inertia = match &series.inertia {
@@ -310,18 +306,21 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
     }
     match *shape {
         Shape::SensorDelay(SensorDelay { delay_s }) => delayed(series, delay_s, &mut columns[0]),
+        Shape::DriveGain(_) => driven(series, &mut columns[0]),
         Shape::DriveDelay(law) => late(series, law, &mut columns[0]),
         _ => {}
     }
 }
 
-/// The components in which known forces are more than their own noise, which stands in the gap as well: that of the same command
-/// with and without water, one less the other, is not.
-fn drives(series: &Series) -> [bool; 6] {
-    std::array::from_fn(|component| {
+/// The known forces in the components in which they are more than their own noise, which stands in the gap as well: that of the same
+/// command with and without water, one less the other, is not.
+fn driven(series: &Series, column: &mut Column) {
+    for component in 0..6 {
         let values: Vec<f64> = series.other.iter().map(|other| other[component]).collect();
-        white_variance(&values) < 0.5 * mean_square(&values)
-    })
+        if white_variance(&values) < 0.5 * mean_square(&values) {
+            column.iter_mut().zip(values).for_each(|(column, value)| column[component] = value);
+        }
+    }
 }
 
 /// Change of the known force `D` per second of delay or time constant `tau`: `(D(t - tau) - D(t)) / tau`, or what a lag of first

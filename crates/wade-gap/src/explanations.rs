@@ -92,13 +92,13 @@ pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Wei
     let outside = trials.map(|(&trial, loss)| loss - found.of_gap.gains[trial]).collect();
     let mut all =
         vec![of(NOTHING, nothing, 0), of(OUTSIDE_LIBRARY, outside, NUMBERS_OUTSIDE * design.rows.width)];
+    let whole = |losses: &[f64]| losses.iter().sum::<f64>();
     // the best of each set of effects; the impossible ones come last
     let mut sets: BTreeMap<(bool, Vec<Effect>), Weighed> = BTreeMap::new();
     for Set { members: set, is_possible } in sets_to_weigh(judge, found, library) {
         let Some(losses) = judge.losses(&set) else { continue };
         let mut effects: Vec<Effect> = set.iter().map(|member| judge.effect(member)).collect();
         effects.sort();
-        let whole = |losses: &[f64]| losses.iter().sum::<f64>();
         let place = (!is_possible, effects);
         if sets.get(&place).is_some_and(|known| whole(&known.losses) <= whole(&losses)) {
             continue;
@@ -114,19 +114,15 @@ pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Wei
         sets.insert(place, weighed);
     }
     // what an impossible set explains no better than a possible one of as many numbers does is no other load
-    let least = |numbers: usize| {
-        let possible =
-            sets.iter().filter(|((is_impossible, _), set)| !is_impossible && set.numbers <= numbers);
-        possible.map(|(_, set)| set.losses.iter().sum::<f64>()).fold(f64::INFINITY, f64::min)
-    };
-    let stands_in: Vec<_> = sets
+    let possible: Vec<(usize, f64)> = sets
         .iter()
-        .filter(|((is_impossible, _), set)| {
-            *is_impossible && set.losses.iter().sum::<f64>() >= (1.0 - SAME) * least(set.numbers)
-        })
-        .map(|(place, _)| place.clone())
+        .filter(|((is_impossible, _), _)| !is_impossible)
+        .map(|(_, set)| (set.numbers, whole(&set.losses)))
         .collect();
-    stands_in.iter().for_each(|place| drop(sets.remove(place)));
+    sets.retain(|(is_impossible, _), set| {
+        let mut alike = possible.iter().filter(|(numbers, _)| *numbers <= set.numbers);
+        !*is_impossible || !alike.any(|(_, loss)| whole(&set.losses) >= (1.0 - SAME) * loss)
+    });
     let possible = all.len() + sets.keys().filter(|(is_impossible, _)| !is_impossible).count();
     all.extend(sets.into_values());
     let probabilities = weights(&all, judge, found);
