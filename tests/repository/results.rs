@@ -43,6 +43,7 @@ fn table(name: &str) -> String {
         "driving" => cfd::driving(),
         "benchmark" => gap::benchmark(),
         "baselines" => gap::baselines(),
+        "motion" => gap::motion(),
         "ramps" => gap::ramps(),
         "physical effects" => effects::physics(),
         "totals" => effects::totals(),

@@ -1,4 +1,4 @@
-//! The gap workflow: the benchmark, plain regressions beside it, computed ramps.
+//! The gap workflow: the benchmark, plain regressions beside it, motion alone, computed ramps.
 
 use serde_json::Value;
 
@@ -95,6 +95,35 @@ pub fn baselines() -> String {
         out += &format!("{}\n\n{}\n", condition(&result), markdown(&header, rows.collect()));
     }
     out
+}
+
+/// Driven vehicles whose wrench is inferred from their motion: first what has a target, then each group of cases in a row.
+pub fn motion() -> String {
+    let result = json(newest("gap-bench-motion.json"));
+    let all = result["measures"].as_array().expect("a list");
+    let grade = |group: &str, grade: &str| {
+        all.iter()
+            .find(|row| word(&row["measure"]) == format!("{group}: {grade}"))
+            .expect("each has all three")
+    };
+    let groups = all.iter().filter_map(|row| word(&row["measure"]).strip_suffix(": right"));
+    let groups = groups.map(|group| {
+        let right = grade(group, "right");
+        let others =
+            ["abstained", "wrong"].map(|other| format!("{:.3}", number(&grade(group, other)["value"])));
+        let [abstained, wrong] = others;
+        vec![group.to_owned(), with_interval(right), abstained, wrong, right["count"].to_string()]
+    });
+    let header = ["group", "right (90 % interval)", "abstained", "wrong", "count"];
+    let groups = markdown(&header, groups.collect());
+    let graded = |row: &Value| {
+        ["right", "abstained", "wrong"]
+            .iter()
+            .any(|grade| word(&row["measure"]).ends_with(&format!(": {grade}")))
+    };
+    let mut judged = result.clone();
+    judged["measures"].as_array_mut().expect("a list").retain(|row| !graded(row));
+    format!("{}\n{groups}", measures(&judged))
 }
 
 /// What the workflow makes of computed ramps, by the trials that were held out.
