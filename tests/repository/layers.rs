@@ -32,7 +32,7 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
     (
         "crates/wade-core/src",
         &[
-            &["at", "condition", "digest", "domain", "forces", "frame", "lanes", "named_enum", "wrench"],
+            &["at", "condition", "digest", "domain", "forces", "frame", "lanes", "named_enum", "real", "wrench"],
             &["geometry", "vehicle"],
             &["features", "physics"],
             &["analytic", "anchor", "effects"],

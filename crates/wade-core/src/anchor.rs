@@ -21,14 +21,14 @@
 //! surface on the plane of symmetry only what does not change under reflection, with lateral answers multiplied by
 //! something that does. So the mirror image of a state gets the mirror image of the answer, by construction.
 
-use nalgebra::UnitVector3;
+use nalgebra::{UnitVector3, Vector3};
 
-use crate::condition::{Condition, GroundContact};
-use crate::features::direction;
+use crate::condition::{Condition, GroundContact, LEAST_UPRIGHT};
 use crate::forces::SurfaceForce;
 use crate::frame::{GRAVITY, VISCOSITY, Vec3};
 use crate::geometry::mesh::Bounds;
 use crate::geometry::wetting::{Wetting, WettingTable};
+use crate::real::{Real, norm};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
@@ -135,79 +135,125 @@ impl Windward {
     }
 
     /// Share of the side that motion along an axis meets.
-    fn share(&self, axis: usize, ahead: f64) -> f64 {
-        self.0[axis][usize::from(ahead < 0.0)]
+    fn share<T: Real>(&self, axis: usize, ahead: T) -> f64 {
+        self.0[axis][usize::from(ahead.value() < 0.0)]
     }
 }
 
 /// What is known of a state.
-#[derive(Debug, Clone, Default)]
-pub struct Reading {
+#[derive(Debug, Clone)]
+pub struct Reading<T = f64> {
     /// Dynamic pressure [Pa].
-    pub pressure: f64,
+    pub pressure: T,
     /// Features of the state.
-    pub global: [f64; GLOBAL],
+    pub global: [T; GLOBAL],
     /// Where the state lies among the cases that were learnt from.
-    pub coordinates: [f64; COORDINATES],
+    pub coordinates: [T; COORDINATES],
     /// One entry a surface, in the vehicle's order.
-    pub surfaces: Vec<SurfaceReading>,
-    wetting: Vec<Wetting>,
+    pub surfaces: Vec<SurfaceReading<T>>,
+    wetting: Vec<Wetting<T>>,
+}
+
+impl<T: Real> Default for Reading<T> {
+    fn default() -> Self {
+        Self::with_capacity(0)
+    }
 }
 
 /// What is known of a surface in a state; body frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SurfaceReading {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceReading<T = f64> {
     /// Share under water.
-    pub wet_fraction: f64,
+    pub wet_fraction: T,
     /// Centroid of the soaked part [m]; of the whole surface where it is dry.
-    pub center: Vec3,
+    pub center: Vector3<T>,
     /// Load of still water about the body origin [N, N m].
-    pub hydrostatic: Wrench,
+    pub hydrostatic: Wrench<T>,
     /// Simple drag [N].
-    pub drag: Vec3,
+    pub drag: Vector3<T>,
     /// How far loads have set in: 0 above still water, 1 where water stands a few centimeters high on the surface.
-    pub onset: f64,
+    pub onset: T,
     /// `q A_s`: what a coefficient of one is worth [N].
-    pub unit: f64,
+    pub unit: T,
     /// Length that a coefficient of a moment has beside `unit` [m].
     pub arm: f64,
     /// Factors of the two lateral coefficients.
-    pub lateral: [f64; 2],
+    pub lateral: [T; 2],
     /// The box around the part that the water may reach, up to the head of the stream above still water [m].
-    pub reach: [Vec3; 2],
+    pub reach: [Vector3<T>; 2],
     /// Features.
-    pub dynamic: [f32; DYNAMIC],
+    pub dynamic: [T; DYNAMIC],
 }
 
-impl Reading {
+impl<T: Real> Default for SurfaceReading<T> {
+    fn default() -> Self {
+        let (zero, none) = (T::zero(), Vector3::zeros());
+        Self {
+            wet_fraction: zero,
+            center: none,
+            hydrostatic: Wrench::default(),
+            drag: none,
+            onset: zero,
+            unit: zero,
+            arm: 0.0,
+            lateral: [zero; 2],
+            reach: [none; 2],
+            dynamic: [zero; DYNAMIC],
+        }
+    }
+}
+
+impl<T: Real> Reading<T> {
     /// Room for a vehicle of so many surfaces.
     pub fn with_capacity(surfaces: usize) -> Self {
         Self {
             surfaces: Vec::with_capacity(surfaces),
             wetting: Vec::with_capacity(surfaces),
-            ..Self::default()
+            pressure: T::zero(),
+            global: [T::zero(); GLOBAL],
+            coordinates: [T::zero(); COORDINATES],
         }
     }
 
+    /// What the water reaches, for [`Anchor::read_wet`].
+    pub(crate) fn wetting_mut(&mut self) -> &mut Vec<Wetting<T>> {
+        &mut self.wetting
+    }
+}
+
+impl Reading {
     /// What coefficients of one on all surfaces are worth [N].
     pub fn dynamic_load(&self) -> f64 {
         self.surfaces.iter().map(|surface| surface.unit).sum()
     }
 }
 
+impl<T: Real> SurfaceReading<T> {
+    /// The dynamic force and its moment about the centroid of the wet part that the network's answer means [N, N m].
+    pub fn dynamic_load(&self, output: &[T; OUTPUTS]) -> Wrench<T> {
+        let o = output;
+        let aside = o[1] * self.lateral[0] + o[3] * self.lateral[1];
+        let force = self.drag + Vector3::new(o[0], aside, o[2]) * self.unit;
+        let aside = self.lateral[0];
+        let moment = Vector3::new(o[4] * aside, o[5], o[6] * aside) * (self.unit * self.arm);
+        Wrench { force, moment }
+    }
+}
+
 impl SurfaceReading {
+    /// Features as the network takes them. The cast to single precision happens here and nowhere else.
+    pub fn told(&self) -> [f32; DYNAMIC] {
+        self.dynamic.map(|x| x as f32)
+    }
+
     /// The dynamic force that the network's answer means [N].
     pub fn force(&self, output: &[f32; OUTPUTS]) -> Vec3 {
-        let o = output.map(f64::from);
-        let aside = o[1] * self.lateral[0] + o[3] * self.lateral[1];
-        self.drag + Vec3::new(o[0], aside, o[2]) * self.unit
+        self.dynamic_load(&output.map(f64::from)).force
     }
 
     /// The moment of the dynamic force that the network's answer means, about the centroid of the wet part [N m].
     pub fn moment(&self, output: &[f32; OUTPUTS]) -> Vec3 {
-        let o = output.map(f64::from);
-        let aside = self.lateral[0];
-        Vec3::new(o[4] * aside, o[5], o[6] * aside) * (self.unit * self.arm)
+        self.dynamic_load(&output.map(f64::from)).moment
     }
 
     /// The whole load that the network's answer means, hydrostatics included, as a force at one point: on the line along
@@ -270,26 +316,36 @@ impl Anchor {
 
     /// Reads a state. Allocates nothing once `out` has held this vehicle.
     pub fn read(&self, vehicle: &Vehicle, condition: &Condition, out: &mut Reading) {
-        let plane = condition.water_plane(vehicle.z0);
         out.wetting.resize(self.surfaces.len(), Wetting::default());
-        self.table.wetting_into(&plane, &mut out.wetting);
+        self.table.wetting_into(&condition.water_plane(vehicle.z0), &mut out.wetting);
+        self.read_wet(vehicle, condition, out);
+    }
+
+    /// Reads a state of which `out` holds what the water reaches.
+    pub(crate) fn read_wet<T: Real>(
+        &self,
+        vehicle: &Vehicle,
+        condition: &Condition<T>,
+        out: &mut Reading<T>,
+    ) {
+        let plane = condition.water_plane(vehicle.z0);
         let flow = Flow::of(vehicle, condition);
-        out.pressure = 0.5 * condition.density * flow.speed * flow.speed;
+        out.pressure = condition.density * 0.5 * flow.speed * flow.speed;
         out.global = flow.global(vehicle, condition);
         out.coordinates = self.coordinates(&flow, condition);
         out.surfaces.clear();
         let surroundings = Surroundings { vehicle, condition, flow: &flow };
         for (index, (surface, wetting)) in self.surfaces.iter().zip(&out.wetting).enumerate() {
             let mut reading = self.surface(&surroundings, surface, wetting);
-            if reading.wet_fraction == 0.0 {
-                reading.center = vehicle.surfaces[index].centroid;
+            if reading.wet_fraction.value() == 0.0 {
+                reading.center = vehicle.surfaces[index].centroid.map(T::from);
             }
             out.surfaces.push(reading);
         }
         if condition.ground_contact == GroundContact::Dry {
             for patch in &vehicle.contacts {
                 let reading = &mut out.surfaces[patch.surface];
-                if reading.wet_fraction > 0.0 {
+                if reading.wet_fraction.value() > 0.0 {
                     reading.hydrostatic += patch.lost_pressure(&plane, condition.density, &Vec3::zeros());
                 }
             }
@@ -314,12 +370,12 @@ impl Anchor {
         })
     }
 
-    fn surface(
+    fn surface<T: Real>(
         &self,
-        state: &Surroundings<'_>,
+        state: &Surroundings<'_, T>,
         surface: &AnchorSurface,
-        wetting: &Wetting,
-    ) -> SurfaceReading {
+        wetting: &Wetting<T>,
+    ) -> SurfaceReading<T> {
         let Surroundings { vehicle, condition, flow } = *state;
         let Some(center) = wetting.centroid() else { return SurfaceReading::default() };
         let (length, width, height) =
@@ -327,33 +383,32 @@ impl Anchor {
         let plane = condition.water_plane(vehicle.z0);
         let Bounds { min, max } = surface.bounds;
         // of next to nothing it is the quotient of two roundings
-        let center = center.sup(&min).inf(&max);
+        let center = Vector3::from_fn(|axis, _| center[axis].clamp(min[axis], max[axis]));
         // the water level in the body frame where the surface is; a vehicle on its side has none
-        let level = center.z + plane.depth_below(&center) / plane.normal.z.max(0.1);
-        let top = max.z.min(level.max(min.z));
-        let wet = Vec3::new(max.x - min.x, max.y - min.y, top - min.z);
-        let wet_fraction = (wetting.area / surface.area).min(1.0);
-        let fraction = (wetting.soaked_area / surface.area).min(1.0);
-        let weight = density_times_gravity(condition);
-        let hydrostatic =
-            Wrench { force: wetting.pressure.force * weight, moment: wetting.pressure.moment * weight };
+        let level = center.z + plane.depth_below(&center) / plane.normal.z.max(LEAST_UPRIGHT.into());
+        let top = level.clamp(min.z, max.z);
+        let high = top - min.z;
+        let wet_fraction = (wetting.area / surface.area).min(T::one());
+        let fraction = (wetting.soaked_area / surface.area).min(T::one());
+        let hydrostatic = wetting.pressure * (condition.density * GRAVITY);
         let ahead = &flow.direction;
         // pressure acts along the sides' normals: across for the sides, along for the ends
-        let met = |axis: usize| surface.windward.share(axis, ahead[axis]) * ahead[axis];
-        let front = Vec3::new(wet.y * met(0), wet.x * met(1), 0.0) * wet.z;
+        let met = |axis: usize| ahead[axis] * surface.windward.share(axis, ahead[axis]);
+        let sides = [max.y - min.y, max.x - min.x];
+        let front = Vector3::new(met(0) * sides[0] * high, met(1) * sides[1] * high, T::zero());
         let place = center.dot(ahead) / flow.half_length(&self.bounds);
-        let shelter = 0.5 * (1.0 + SHELTERING * place.clamp(-1.0, 1.0));
-        let pressure = 0.5 * condition.density * flow.speed * flow.speed;
+        let shelter = (place.clamp(-1.0, 1.0) * SHELTERING + 1.0) * 0.5;
+        let pressure = condition.density * 0.5 * flow.speed * flow.speed;
         let head = flow.speed * flow.speed / (2.0 * GRAVITY);
         let reached = ((level + head - min.z) / (max.z - min.z).max(RAMP)).clamp(0.0, 1.0);
         let onset = ramp(level - min.z);
-        let facing = surface.normal.dot(ahead);
+        let facing = ahead.dot(&surface.normal.map(T::from));
         let off_track = (center.x * ahead.y - center.y * ahead.x).abs();
         let dynamic = [
             fraction,
             plane.depth_below(&center) / height,
-            surface.side * ahead.y,
-            surface.side * condition.up.y,
+            ahead.y * surface.side,
+            condition.up.y * surface.side,
             facing,
             facing.abs() * fraction,
             center.dot(ahead) / length,
@@ -361,24 +416,26 @@ impl Anchor {
             ((level - min.z) / height).clamp(0.0, 2.0),
             ((level - max.z) / height).clamp(-1.0, 1.0),
             wetting.soaked_area / (length * width),
-            ((min.z - vehicle.z0) / condition.depth.max(LEAST_DEPTH)).clamp(0.0, 4.0),
+            (T::from(min.z - vehicle.z0) / condition.depth.max(LEAST_DEPTH.into())).clamp(0.0, 4.0),
         ];
-        let reach_top = max.z.min(level.max(min.z) + head).max(center.z);
+        let [low, high] = [min, max].map(|corner| corner.map(T::from));
+        let reach_top = (level.max(min.z.into()) + head).min(high.z).max(center.z);
+        let lateral = [ahead.y, condition.up.y];
         SurfaceReading {
             wet_fraction,
             center,
             hydrostatic,
-            drag: front * -(CD0 * shelter * pressure),
+            drag: front * -(shelter * pressure * CD0),
             onset,
             unit: pressure * surface.area * reached * onset,
             arm: surface.area.sqrt(),
-            lateral: if surface.side == 0.0 { [ahead.y, condition.up.y] } else { [surface.side, 0.0] },
-            reach: [min, Vec3::new(max.x, max.y, reach_top)],
-            dynamic: dynamic.map(|x| x as f32),
+            lateral: if surface.side == 0.0 { lateral } else { [surface.side.into(), T::zero()] },
+            reach: [low, Vector3::new(high.x, high.y, reach_top)],
+            dynamic,
         }
     }
 
-    fn coordinates(&self, flow: &Flow, condition: &Condition) -> [f64; COORDINATES] {
+    fn coordinates<T: Real>(&self, flow: &Flow<T>, condition: &Condition<T>) -> [T; COORDINATES] {
         [
             bounded(flow.froude_depth),
             flow.froude_length,
@@ -393,52 +450,50 @@ impl Anchor {
 }
 
 /// 0 to 1 over the first [`RAMP`] of a height, with no kink.
-fn ramp(height: f64) -> f64 {
+fn ramp<T: Real>(height: T) -> T {
     let x = (height / RAMP).clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
+    x * x * (-(x * 2.0) + 3.0)
 }
 
 /// `x / (1 + x)`: a Froude number of any size, in 0 to 1.
-fn bounded(x: f64) -> f64 {
-    x / (1.0 + x)
-}
-
-fn density_times_gravity(condition: &Condition) -> f64 {
-    condition.density * GRAVITY
+fn bounded<T: Real>(x: T) -> T {
+    x / (x + 1.0)
 }
 
 /// What every surface of a vehicle is read in.
-struct Surroundings<'a> {
+struct Surroundings<'a, T: Real> {
     vehicle: &'a Vehicle,
-    condition: &'a Condition,
-    flow: &'a Flow,
+    condition: &'a Condition<T>,
+    flow: &'a Flow<T>,
 }
 
 /// The motion through the water.
-struct Flow {
-    speed: f64,
-    direction: Vec3,
-    froude_depth: f64,
-    froude_length: f64,
+struct Flow<T> {
+    speed: T,
+    direction: Vector3<T>,
+    froude_depth: T,
+    froude_length: T,
     /// How much of the velocity through the water the bed sees: 1 driving in still water, 0 parked in a current.
-    bed: f64,
+    bed: T,
 }
 
-impl Flow {
-    fn of(vehicle: &Vehicle, condition: &Condition) -> Self {
-        let speed = condition.velocity.norm();
-        let ahead = direction(&condition.velocity);
-        let bed = if speed > 0.0 { condition.ground_velocity.dot(&ahead) / speed } else { 0.0 };
+impl<T: Real> Flow<T> {
+    fn of(vehicle: &Vehicle, condition: &Condition<T>) -> Self {
+        let speed = norm(&condition.velocity);
+        let moves = speed.value() > 0.0;
+        let ahead = if moves { condition.velocity / speed } else { Vector3::zeros() };
+        let bed = if moves { condition.ground_velocity.dot(&ahead) / speed } else { T::zero() };
+        let depth = condition.depth.max(LEAST_DEPTH.into());
         Self {
             speed,
             direction: ahead,
-            froude_depth: speed / (GRAVITY * condition.depth.max(LEAST_DEPTH)).sqrt(),
+            froude_depth: speed / (depth * GRAVITY).sqrt(),
             froude_length: speed / (GRAVITY * vehicle.dimensions.length).sqrt(),
             bed: bed.clamp(-2.0, 2.0),
         }
     }
 
-    fn global(&self, vehicle: &Vehicle, condition: &Condition) -> [f64; GLOBAL] {
+    fn global(&self, vehicle: &Vehicle, condition: &Condition<T>) -> [T; GLOBAL] {
         let dimensions = &vehicle.dimensions;
         let reynolds = condition.density * self.speed * dimensions.length / VISCOSITY;
         [
@@ -447,19 +502,19 @@ impl Flow {
             condition.depth / dimensions.height,
             self.direction.x,
             self.direction.y * self.direction.y,
-            reynolds.max(LEAST_REYNOLDS).log10() - 6.0,
+            reynolds.max(LEAST_REYNOLDS.into()).log10() - 6.0,
             self.bed,
             condition.up.x,
             condition.up.y * condition.up.y,
-            dimensions.width / dimensions.length,
-            dimensions.height / dimensions.length,
+            (dimensions.width / dimensions.length).into(),
+            (dimensions.height / dimensions.length).into(),
         ]
     }
 
     /// Half the length of the hull along the motion [m].
-    fn half_length(&self, bounds: &Bounds) -> f64 {
+    fn half_length(&self, bounds: &Bounds) -> T {
         let half = bounds.extent() * 0.5;
-        (half.x * self.direction.x.abs() + half.y * self.direction.y.abs() + half.z * self.direction.z.abs())
-            .max(1e-6)
+        let along = self.direction.map(T::abs);
+        (along.x * half.x + along.y * half.y + along.z * half.z).max(1e-6.into())
     }
 }

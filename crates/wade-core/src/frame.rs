@@ -5,6 +5,8 @@
 
 use nalgebra::{UnitQuaternion, UnitVector3, Vector3};
 
+use crate::real::Real;
+
 /// A vector in the body frame unless its name says otherwise.
 pub type Vec3 = Vector3<f64>;
 
@@ -29,11 +31,11 @@ pub fn up_from_quaternion(world_from_body: &UnitQuaternion<f64>) -> UnitVector3<
 
 /// The undisturbed water surface as a plane in the body frame: points with `normal . x <= offset` are under water.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WaterPlane {
+pub struct WaterPlane<T: Real = f64> {
     /// World up in the body frame.
-    pub normal: UnitVector3<f64>,
+    pub normal: UnitVector3<T>,
     /// Distance of the plane from the body origin along `normal` [m].
-    pub offset: f64,
+    pub offset: T,
 }
 
 impl WaterPlane {
@@ -51,9 +53,12 @@ impl WaterPlane {
     pub fn is_level(&self) -> bool {
         self.normal.x == 0.0 && self.normal.y == 0.0
     }
+}
 
+impl<T: Real> WaterPlane<T> {
     /// Depth of a point below the surface [m]; negative in air.
-    pub fn depth_below(&self, point: &Vec3) -> f64 {
+    #[inline]
+    pub fn depth_below(&self, point: &Vector3<T>) -> T {
         self.offset - self.normal.dot(point)
     }
 }

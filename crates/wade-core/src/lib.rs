@@ -18,6 +18,7 @@ pub mod forces;
 pub mod frame;
 mod lanes;
 mod named_enum;
+pub mod real;
 pub mod wrench;
 
 pub mod geometry;

@@ -2,44 +2,52 @@
 
 use std::ops::{Add, AddAssign, Mul};
 
-use crate::frame::Vec3;
+use nalgebra::Vector3;
+
+use crate::real::Real;
 
 /// A force and its moment about a reference point that the owner of the value states, body frame [N, N m].
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wrench {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wrench<T = f64> {
     /// Force [N].
-    pub force: Vec3,
+    pub force: Vector3<T>,
     /// Moment about the reference point [N m].
-    pub moment: Vec3,
+    pub moment: Vector3<T>,
 }
 
-impl Wrench {
+impl<T: Real> Wrench<T> {
     /// The wrench about `about` of a force acting at `point`.
-    pub fn from_force_at(force: Vec3, point: &Vec3, about: &Vec3) -> Self {
+    pub fn from_force_at(force: Vector3<T>, point: &Vector3<T>, about: &Vector3<T>) -> Self {
         Self { force, moment: (point - about).cross(&force) }
     }
 
     /// The same load taken about a point that lies at `new` where this wrench was taken about `old`.
-    pub fn moved(self, old: &Vec3, new: &Vec3) -> Self {
+    pub fn moved(self, old: &Vector3<T>, new: &Vector3<T>) -> Self {
         Self { force: self.force, moment: self.moment + (old - new).cross(&self.force) }
     }
 }
 
-impl Add for Wrench {
+impl<T: Real> Default for Wrench<T> {
+    fn default() -> Self {
+        Self { force: Vector3::zeros(), moment: Vector3::zeros() }
+    }
+}
+
+impl<T: Real> Add for Wrench<T> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self { force: self.force + other.force, moment: self.moment + other.moment }
     }
 }
 
-impl Mul<f64> for Wrench {
+impl<T: Real> Mul<T> for Wrench<T> {
     type Output = Self;
-    fn mul(self, factor: f64) -> Self {
+    fn mul(self, factor: T) -> Self {
         Self { force: self.force * factor, moment: self.moment * factor }
     }
 }
 
-impl AddAssign for Wrench {
+impl<T: Real> AddAssign for Wrench<T> {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
@@ -48,6 +56,7 @@ impl AddAssign for Wrench {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::Vec3;
 
     #[test]
     fn moving_the_reference_agrees_with_taking_it_there() {

@@ -9,13 +9,14 @@
 //! area, in which a place counts by its depth over the first centimeter: the mean of the wet areas of all water levels
 //! from here to a centimeter lower.
 
-use nalgebra::{Matrix3, SMatrix};
+use nalgebra::{Matrix3, SMatrix, UnitVector3, Vector3};
 
 use super::flats::merged;
 use super::mesh::Bounds;
 use super::surfaces::Hull;
 use crate::frame::{Vec3, WaterPlane};
 use crate::lanes::{Instructions, run_for};
+use crate::real::{Dual, Real};
 use crate::wrench::Wrench;
 
 /// Intervals of level water that are stored for all surfaces together; a finer hull is clipped at every query.
@@ -41,24 +42,49 @@ const QUANTITIES: usize = 11;
 const FILM: f64 = 0.01;
 
 /// What the water reaches on one surface; body frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wetting {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wetting<T = f64> {
     /// Pressure load about the body origin in a fluid with `rho g = 1` [m3, m4].
-    pub pressure: Wrench,
+    pub pressure: Wrench<T>,
     /// Wet area [m2]. It steps where the water reaches a level face.
-    pub area: f64,
+    pub area: T,
     /// Integral of `min(depth / 1 cm, 1)` over the wet area: the same without steps [m2].
-    pub soaked_area: f64,
+    pub soaked_area: T,
     /// Integral of the position over the soaked area [m3].
-    pub soaked_moment: Vec3,
+    pub soaked_moment: Vector3<T>,
+}
+
+impl<T: Real> Default for Wetting<T> {
+    fn default() -> Self {
+        Self {
+            pressure: Wrench::default(),
+            area: T::zero(),
+            soaked_area: T::zero(),
+            soaked_moment: Vector3::zeros(),
+        }
+    }
+}
+
+impl<T: Real> Wetting<T> {
+    /// The same in other numbers.
+    pub fn map<U: Real>(&self, with: impl Fn(T) -> U) -> Wetting<U> {
+        let vector = |v: &Vector3<T>| v.map(&with);
+        let Wrench { force, moment } = &self.pressure;
+        Wetting {
+            pressure: Wrench { force: vector(force), moment: vector(moment) },
+            area: with(self.area),
+            soaked_area: with(self.soaked_area),
+            soaked_moment: vector(&self.soaked_moment),
+        }
+    }
+
+    /// Centroid of the soaked area [m]; `None` where nothing is wet.
+    pub fn centroid(&self) -> Option<Vector3<T>> {
+        (self.soaked_area.value() > 0.0).then(|| self.soaked_moment / self.soaked_area)
+    }
 }
 
 impl Wetting {
-    /// Centroid of the soaked area [m]; `None` where nothing is wet.
-    pub fn centroid(&self) -> Option<Vec3> {
-        (self.soaked_area > 0.0).then(|| self.soaked_moment / self.soaked_area)
-    }
-
     fn values(&self) -> [f64; QUANTITIES] {
         let (f, m, s) = (self.pressure.force, self.pressure.moment, self.soaked_moment);
         [f.x, f.y, f.z, m.x, m.y, m.z, self.area, self.soaked_area, s.x, s.y, s.z]
@@ -173,6 +199,23 @@ impl WettingTable {
         run_for!(self.instructions, WettingTable::wet(self, plane: &WaterPlane, out: &mut [Wetting]));
     }
 
+    /// `known`, which [`Self::wetting_into`] found at this plane, with derivatives, but for those of the wet area, on which no load
+    /// depends.
+    pub fn dual_into<const N: usize>(
+        &self,
+        plane: &WaterPlane<Dual<N>>,
+        known: &[Wetting],
+        out: &mut [Wetting<Dual<N>>],
+    ) {
+        let normal = plane.normal.into_inner();
+        let up = normal.map(Real::value);
+        // it is a unit vector already
+        let values = WaterPlane { normal: UnitVector3::new_unchecked(up), offset: plane.offset.value };
+        for ((table, known), out) in self.surfaces.iter().zip(known).zip(out) {
+            *out = table.moments(&values).wetting(known, &plane.offset, &normal);
+        }
+    }
+
     #[inline(always)]
     fn wet(&self, plane: &WaterPlane, out: &mut [Wetting]) {
         let mut clipping = Clipping::default();
@@ -238,6 +281,98 @@ impl SurfaceTable {
             index = node.next;
         }
         out[surface] += soaked.wetting(plane);
+    }
+}
+
+/// Moments of what is wet, which are the derivatives of a [`Wetting`] with respect to the plane `up . x = c`.
+#[derive(Default)]
+struct Moments {
+    /// `int dA`, `int dA x^T` with the area vectors, and their moments `int x cross dA`, `int (x cross dA) x^T`.
+    area_vector: Vec3,
+    first: Matrix3<f64>,
+    moment: Vec3,
+    second: Matrix3<f64>,
+    /// Over [`FILM`], of what is wet and not soaked: `int |dA|`, `int |dA| x`, `int |dA| x x^T`.
+    film_area: f64,
+    film_first: Vec3,
+    film_second: Matrix3<f64>,
+}
+
+impl SurfaceTable {
+    fn moments(&self, plane: &WaterPlane) -> Moments {
+        let across = plane.normal.abs();
+        let lower = WaterPlane { offset: plane.offset - FILM, ..*plane };
+        let mut moments = Moments::default();
+        let mut index = 0;
+        while let Some(node) = self.boxes.get(index) {
+            let (depth, reach) = (plane.depth_below(&node.center), across.dot(&node.half));
+            if depth - reach >= FILM {
+                moments.add_soaked(&self.terms[index]);
+            } else if depth + reach > 0.0 {
+                let [from, to] = node.faces;
+                if from == to {
+                    index += 1;
+                    continue;
+                }
+                for face in &self.faces[from..to] {
+                    let below = face.below(plane);
+                    moments.add_wet(face, &below);
+                    moments.add_film(&below, 1.0);
+                    moments.add_film(&face.below(&lower), -1.0);
+                }
+            }
+            index = node.next;
+        }
+        moments
+    }
+}
+
+impl Moments {
+    fn add_soaked(&mut self, terms: &Terms) {
+        self.area_vector += terms.area_vector;
+        self.first += terms.first;
+        self.moment += terms.moment;
+        self.second += terms.second;
+    }
+
+    fn add_wet(&mut self, face: &Face, (area, first, second): &(f64, Vec3, Matrix3<f64>)) {
+        self.area_vector += face.normal * *area;
+        self.first += face.normal * first.transpose();
+        self.moment += first.cross(&face.normal);
+        self.second -= face.normal.cross_matrix() * second;
+    }
+
+    fn add_film(&mut self, (area, first, second): &(f64, Vec3, Matrix3<f64>), sign: f64) {
+        self.film_area += area * (sign / FILM);
+        self.film_first += first * (sign / FILM);
+        self.film_second += second * (sign / FILM);
+    }
+
+    fn wetting<const N: usize>(
+        &self,
+        value: &Wetting,
+        offset: &Dual<N>,
+        up: &Vector3<Dual<N>>,
+    ) -> Wetting<Dual<N>> {
+        // of a quantity that grows by `with_offset` and by `with_up`
+        let dual = |value: f64, with_offset: f64, with_up: [f64; 3]| {
+            let slope = |n: usize| {
+                with_offset * offset.slope[n] + (0..3).map(|k| with_up[k] * up[k].slope[n]).sum::<f64>()
+            };
+            Dual { value, slope: std::array::from_fn(slope) }
+        };
+        let vector = |value: &Vec3, with_offset: &Vec3, with_up: &Matrix3<f64>| {
+            Vector3::from_fn(|k, _| dual(value[k], with_offset[k], with_up.row(k).transpose().into()))
+        };
+        Wetting {
+            pressure: Wrench {
+                force: vector(&value.pressure.force, &-self.area_vector, &self.first),
+                moment: vector(&value.pressure.moment, &-self.moment, &self.second),
+            },
+            area: value.area.into(),
+            soaked_area: dual(value.soaked_area, self.film_area, (-self.film_first).into()),
+            soaked_moment: vector(&value.soaked_moment, &self.film_first, &-self.film_second),
+        }
     }
 }
 
@@ -343,6 +478,38 @@ impl Face {
         self.corners.iter().sum::<Vec3>() / 3.0
     }
 
+    /// Area, first and second moment of the part below a plane.
+    fn below(&self, plane: &WaterPlane) -> (f64, Vec3, Matrix3<f64>) {
+        let depths = self.corners.map(|corner| plane.depth_below(&corner));
+        if depths.iter().all(|depth| *depth <= 0.0) {
+            return (0.0, Vec3::zeros(), Matrix3::zeros());
+        }
+        let mut polygon = [Vec3::zeros(); 4];
+        let mut count = 0;
+        let mut push = |point: Vec3| {
+            polygon[count] = point;
+            count += 1;
+        };
+        for (here, there) in [(0, 1), (1, 2), (2, 0)] {
+            if depths[here] > 0.0 {
+                push(self.corners[here]);
+            }
+            if (depths[here] > 0.0) != (depths[there] > 0.0) {
+                let share = depths[here] / (depths[here] - depths[there]);
+                push(self.corners[here] + (self.corners[there] - self.corners[here]) * share);
+            }
+        }
+        let mut sum = (0.0, Vec3::zeros(), Matrix3::zeros());
+        for last in 2..count {
+            let corners = [polygon[0], polygon[last - 1], polygon[last]];
+            let [a, b, c] = corners;
+            let (area, whole) = ((b - a).cross(&(c - a)).dot(&self.normal) * 0.5, a + b + c);
+            let squares = corners.iter().fold(whole * whole.transpose(), |sum, x| sum + x * x.transpose());
+            sum = (sum.0 + area, sum.1 + whole * (area / 3.0), sum.2 + squares * (area / 12.0));
+        }
+        sum
+    }
+
     fn bounds(&self) -> Bounds {
         let [a, b, c] = &self.corners;
         Bounds { min: a.inf(b).inf(c), max: a.sup(b).sup(c) }
@@ -354,7 +521,7 @@ impl Clipping {
     #[inline(always)]
     fn add(&mut self, surface: usize, face: &Face, plane: &WaterPlane, out: &mut [Wetting]) {
         // with a sign of its own a zero would be cut from a zero
-        let depths = face.corners.map(|corner| plane.depth_below(&corner) + 0.0);
+        let depths = three(|corner| plane.depth_below(&face.corners[corner]) + 0.0);
         let (lane, faces) = (self.count, &mut self.faces);
         self.surfaces[lane] = surface;
         for (axis, depth) in depths.into_iter().enumerate() {
@@ -385,10 +552,10 @@ impl Clipping {
     fn flush(&mut self, out: &mut [Wetting]) {
         let (faces, values) = (&self.faces, &mut self.values);
         for i in 0..LANES {
-            let depths = [0, 1, 2].map(|corner| faces.depths[corner][i]);
-            let n = [0, 1, 2].map(|axis| faces.normal[axis][i]);
+            let depths = three(|corner| faces.depths[corner][i]);
+            let n = three(|axis| faces.normal[axis][i]);
             let (area, depth, m) = faces.below(i, depths);
-            let (_, lower_depth, lower_m) = faces.below(i, depths.map(|depth| depth - FILM));
+            let (_, lower_depth, lower_m) = faces.below(i, three(|corner| depths[corner] - FILM));
             for axis in 0..3 {
                 let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
                 values[axis][i] = -n[axis] * depth;
@@ -401,7 +568,9 @@ impl Clipping {
         let surfaces = &self.surfaces[..self.count];
         if surfaces.iter().all(|surface| *surface == surfaces[0]) {
             // lanes without a face hold nothing
-            out[surfaces[0]] += Wetting::from_values(&values.each_ref().map(sum));
+            let mut sums = [0.0; QUANTITIES];
+            sums.iter_mut().zip(&*values).for_each(|(out, lane)| *out = sum(lane));
+            out[surfaces[0]] += Wetting::from_values(&sums);
         } else {
             for (lane, surface) in surfaces.iter().enumerate() {
                 out[*surface] += Wetting::from_values(&values.each_ref().map(|value| value[lane]));
@@ -409,6 +578,12 @@ impl Clipping {
         }
         self.count = 0;
     }
+}
+
+/// Of each corner or axis; not `array::from_fn`, which is inlined here by chance and costs a tilted query a quarter where it is not.
+#[inline(always)]
+fn three<T>(of: impl Fn(usize) -> T) -> [T; 3] {
+    [of(0), of(1), of(2)]
 }
 
 /// In one order whatever the instruction set.
@@ -423,7 +598,7 @@ impl Faces {
     /// the centroid of a sliver lies on it. Without a branch, so that all lanes go the same way.
     #[inline(always)]
     fn below(&self, i: usize, depths: [f64; 3]) -> Below {
-        let dry = depths.map(negative);
+        let dry = three(|corner| negative(depths[corner]));
         // the corner that is alone on its side of the surface comes first
         let second = (dry[1] ^ dry[0]) & (dry[1] ^ dry[2]);
         let third = (dry[2] ^ dry[0]) & (dry[2] ^ dry[1]);
@@ -435,15 +610,15 @@ impl Faces {
             ]
         };
         let [da, db, dc] = turned(depths);
-        let [x, y, z] = [0, 1, 2].map(|axis| turned([0, 1, 2].map(|corner| self.corners[corner][axis][i])));
-        let [a, b, c] = [0, 1, 2].map(|corner| [x[corner], y[corner], z[corner]]);
+        let [x, y, z] = three(|axis| turned(three(|corner| self.corners[corner][axis][i])));
+        let [a, b, c] = three(|corner| [x[corner], y[corner], z[corner]]);
         let (first_dry, others_dry) = (negative(da), negative(db));
         let (tip, blunt) = (!first_dry & others_dry, first_dry & !others_dry);
         // where an edge meets the surface, from its wet end, so that the two faces of an edge agree; the share that is wet
         let cut = |other: [f64; 3], depth: f64| {
             let (under, over) = (select(tip, da, depth), select(tip, depth, da));
             let share = under / (under - over);
-            let point: [f64; 3] = std::array::from_fn(|axis| {
+            let point = three(|axis| {
                 let (from, to) = (select(tip, a[axis], other[axis]), select(tip, other[axis], a[axis]));
                 from + (to - from) * share
             });
@@ -451,7 +626,7 @@ impl Faces {
         };
         let ((p, to_p), (q, to_q)) = (cut(b, db), cut(c, dc));
         let choose = |condition: u64, yes: [f64; 3], no: [f64; 3]| -> [f64; 3] {
-            std::array::from_fn(|axis| select(condition, yes[axis], no[axis]))
+            three(|axis| select(condition, yes[axis], no[axis]))
         };
         let corners = [choose(blunt, p, a), choose(tip, p, b), choose(tip, q, c)];
         let (depth, moment) =
@@ -461,12 +636,11 @@ impl Faces {
         let near = select(tip, area * to_p * to_q, select(blunt, area * to_p, whole));
         // the other triangle of a quadrilateral, of which one corner is under water
         let far = select(blunt, area * (1.0 - to_p) * to_q, 0.0);
-        let beyond: [f64; 3] =
-            std::array::from_fn(|axis| select(blunt, dc * (p[axis] + 2.0 * c[axis] + q[axis]), 0.0));
+        let beyond = three(|axis| select(blunt, dc * (p[axis] + 2.0 * c[axis] + q[axis]), 0.0));
         (
             near + far,
             (near * depth + far * dc) * THIRD,
-            std::array::from_fn(|axis| (near * moment[axis] + far * beyond[axis]) * TWELFTH),
+            three(|axis| (near * moment[axis] + far * beyond[axis]) * TWELFTH),
         )
     }
 }
@@ -491,7 +665,7 @@ fn weighted([a, b, c]: [[f64; 3]; 3], [da, db, dc]: [f64; 3]) -> (f64, [f64; 3])
     (sum, [moment(0), moment(1), moment(2)])
 }
 
-impl std::ops::AddAssign for Wetting {
+impl<T: Real> std::ops::AddAssign for Wetting<T> {
     fn add_assign(&mut self, other: Self) {
         self.pressure += other.pressure;
         self.area += other.area;

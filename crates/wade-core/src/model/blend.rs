@@ -5,8 +5,10 @@
 //! `P` to a hull whose base takes `P_0`, it is scaled by `k(r)` of `r = P / P_0`, 1 up to a half and `(1 - 1 / 4r) / r` from
 //! there, which is smooth and leaves `k r < 1`.
 
-use super::{Anchored, Learned, SPREAD, faded, moment_deviation};
-use crate::anchor::Reading;
+use nalgebra::Vector3;
+
+use super::{Anchored, Learned, SPREAD, moment_deviation};
+use crate::anchor::{OUTPUTS, Reading, SurfaceReading};
 use crate::condition::Condition;
 use crate::domain::Quantity;
 use crate::forces::{self, Forces, SurfaceForce};
@@ -14,6 +16,7 @@ use crate::frame::Vec3;
 use crate::model::kernel::{MAX_OUTPUTS, WetSurface};
 use crate::physics::drag::SurfaceDrag;
 use crate::physics::{BaseLoads, origin_from};
+use crate::real::Real;
 use crate::vehicle::{MAX_SURFACES, Vehicle};
 use crate::wrench::Wrench;
 
@@ -32,20 +35,47 @@ pub struct Blend<'a> {
 }
 
 /// The state with the part of its motion that weights know: level, without turning.
-pub fn level(condition: &Condition) -> Condition {
+pub fn level<T: Real>(condition: &Condition<T>) -> Condition<T> {
     let up = condition.up.into_inner();
-    let flat = |v: &Vec3| v - up * up.dot(v);
+    let flat = |v: &Vector3<T>| v - up * up.dot(v);
     Condition {
         velocity: flat(&condition.velocity),
         ground_velocity: flat(&condition.ground_velocity),
-        angular_velocity: Vec3::zeros(),
+        angular_velocity: Vector3::zeros(),
         ..*condition
     }
 }
 
 /// Share of a learned part that is let through, of one whose power is `ratio` of what the base takes.
-fn let_through(ratio: f64) -> f64 {
-    if ratio <= 0.5 { 1.0 } else { (1.0 - 0.25 / ratio) / ratio }
+fn let_through<T: Real>(ratio: T) -> T {
+    if ratio.value() <= 0.5 { T::one() } else { (-(T::from(0.25) / ratio) + 1.0) / ratio }
+}
+
+/// The learned part of a surface about the body origin: the load that the network's answer means less the base's, as far as it
+/// counts.
+pub fn part<T: Real>(
+    (known, answer): (&SurfaceReading<T>, &[T; OUTPUTS]),
+    base: &Wrench<T>,
+    share: T,
+) -> Wrench<T> {
+    let Wrench { force, moment } = known.dynamic_load(answer);
+    (Wrench { force, moment: moment + known.center.cross(&force) } + *base * -T::one()) * share
+}
+
+/// Share of a learned part that is let through beside the drag of the base.
+pub fn through<T: Real>(condition: &Condition<T>, learned: &Wrench<T>, loads: &BaseLoads<T>) -> T {
+    let power =
+        |load: &Wrench<T>| load.force.dot(&condition.velocity) + load.moment.dot(&condition.angular_velocity);
+    let drag = loads.surfaces.iter().fold(Wrench::default(), |sum, s| sum + s.drag);
+    let taken = loads.shaft_power.max(T::zero()) - power(&drag);
+    let given = power(learned);
+    if given.value() <= 0.0 {
+        T::one()
+    } else if taken.value() <= 0.0 {
+        T::zero()
+    } else {
+        let_through(given / taken)
+    }
 }
 
 impl<'a> Blend<'a> {
@@ -81,11 +111,10 @@ impl<'a> Blend<'a> {
         for (WetSurface { surface, .. }, output) in wet.iter().zip(outputs) {
             let (known, base) = (&reading.surfaces[*surface], &level_drag[*surface]);
             spread += known.unit * Anchored::softplus(output[SPREAD]);
-            let answer = faded(output, 1.0);
-            let force = known.force(&answer);
-            let moment = known.moment(&answer) + known.center.cross(&force);
+            let answer = std::array::from_fn(|i| f64::from(output[i]));
             let share = trust * learned.coverage[*surface];
-            self.learned[*surface] = (Wrench { force, moment } + base.load * -1.0) * share;
+            self.learned[*surface] = part((known, &answer), &base.load, share);
+            let force = known.dynamic_load(&answer).force;
             doubtful += (force - base.load.force).abs() * Anchored::doubt(distance).min(share);
         }
         self.learned_deviation = Vec3::from(form.spread.map(f64::from)) * spread + doubtful;
@@ -95,20 +124,9 @@ impl<'a> Blend<'a> {
     /// Limits the learned part and sums.
     pub fn finish(self, vehicle: &Vehicle, forces: &mut Forces) {
         let Self { condition, loads, .. } = self;
-        let power = |load: &Wrench| {
-            load.force.dot(&condition.velocity) + load.moment.dot(&condition.angular_velocity)
-        };
         let learned = self.learned[..loads.surfaces.len()].iter().fold(Wrench::default(), |sum, l| sum + *l);
         let drag = loads.surfaces.iter().fold(Wrench::default(), |sum, s| sum + s.drag);
-        let taken = loads.shaft_power.max(0.0) - power(&drag);
-        let given = power(&learned);
-        let through = if given <= 0.0 {
-            1.0
-        } else if taken <= 0.0 {
-            0.0
-        } else {
-            let_through(given / taken)
-        };
+        let through = through(condition, &learned, loads);
         let about = &vehicle.center_of_mass;
         let hull = loads.hull.moved(&Vec3::zeros(), about);
         let wet: f64 = wet_areas(vehicle, loads).sum();

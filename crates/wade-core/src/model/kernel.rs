@@ -17,12 +17,17 @@
 )]
 #![allow(clippy::too_many_arguments, reason = "the arguments of a tile are registers")]
 
+mod slopes;
+
 use super::network::{Network, WIDTH};
+pub use slopes::{DIRECTIONS, FeatureSlopes, SlopeBuffers};
 
 /// Features of a surface that change with the state, at most.
 pub const MAX_DYNAMIC: usize = 12;
 /// Answers for a surface, at most.
 pub const MAX_OUTPUTS: usize = 8;
+/// Features that change with the state, at most: those of a surface, then those of the state.
+const MAX_CHANGING: usize = MAX_DYNAMIC + 12;
 /// Dynamic features that are multiplied in one pass over a row.
 const PASS: usize = 3;
 
@@ -111,6 +116,11 @@ impl Buffers {
         }
     }
 
+    /// What the network answered last for so many surfaces.
+    pub fn outputs(&self, surfaces: usize) -> &[[f32; MAX_OUTPUTS]] {
+        &self.outputs[..surfaces]
+    }
+
     /// Splits rows into the fewest blocks of at most [`BLOCK_ROWS`], as equal as can be, and finds their live inputs.
     #[inline(always)]
     fn find_live(&mut self, rows: usize) {
@@ -191,6 +201,8 @@ pub struct Kernel {
     /// In passes: a network with fewer features has zeros in the last.
     w1_dynamic: Vec<[Row; PASS]>,
     w1_static: Vec<Row>,
+    /// Of each unit of layer 1 the weights of the dynamic features and of the global ones.
+    w1_units: Vec<[f32; MAX_CHANGING]>,
     b1: Row,
     /// Tiles of columns, each with one stretch of `tile_width` weights an input: `[tile][input][column]`.
     w2: Vec<Row>,
@@ -207,12 +219,22 @@ impl Kernel {
     /// When the network has no dynamic features, or more of them or of outputs than there is room for.
     pub fn new(network: &Network, (fixed, dynamic): (usize, usize), isa: Isa) -> Self {
         assert!(
-            (1..=MAX_DYNAMIC).contains(&dynamic) && network.outputs <= MAX_OUTPUTS,
+            (1..=MAX_DYNAMIC).contains(&dynamic)
+                && network.inputs - fixed - dynamic <= MAX_CHANGING - MAX_DYNAMIC
+                && network.outputs <= MAX_OUTPUTS,
             "the buffers have room for it"
         );
         let column =
             |input: usize| Row(std::array::from_fn(|unit| network.w1[unit * network.inputs + input]));
         let row = |values: &[f32]| Row(std::array::from_fn(|i| values[i]));
+        let unit = |unit: usize| {
+            let mut changing = [0.0; MAX_CHANGING];
+            let weights = &network.w1[unit * network.inputs..][..network.inputs];
+            changing[..dynamic].copy_from_slice(&weights[fixed..fixed + dynamic]);
+            changing[MAX_DYNAMIC..][..network.inputs - fixed - dynamic]
+                .copy_from_slice(&weights[fixed + dynamic..]);
+            changing
+        };
         let pass = |first: usize| {
             let column = |i| if first + i < dynamic { column(fixed + first + i) } else { Row::ZERO };
             std::array::from_fn(column)
@@ -220,6 +242,7 @@ impl Kernel {
         Self {
             isa,
             w1_static: (0..fixed).map(column).collect(),
+            w1_units: (0..WIDTH).map(unit).collect(),
             w1_dynamic: (0..dynamic).step_by(PASS).map(pass).collect(),
             w1_global: (fixed + dynamic..network.inputs).map(column).collect(),
             b1: row(&network.b1),
@@ -267,7 +290,7 @@ impl Kernel {
             Kind::Neon => self.forward_plain::<true>(global, statics, wet, buffers),
             Kind::Portable => self.forward_plain::<false>(global, statics, wet, buffers),
         }
-        &buffers.outputs[..wet.len()]
+        buffers.outputs(wet.len())
     }
 
     #[cfg(target_arch = "x86_64")]

@@ -5,11 +5,13 @@
 //! them it is the base's, and `Blend` keeps the sum from ever putting power into the hull.
 
 mod blend;
+mod jacobian;
 pub mod kernel;
 pub mod network;
 mod reference;
 mod weights;
 
+pub use jacobian::{COLUMNS, Jacobian, JacobianWorkspace};
 pub use weights::{Anchored, Form, Paper, SPREAD, Weights};
 
 use crate::anchor::{self, Anchor, Reading};
@@ -111,7 +113,7 @@ impl Learned {
         wet.clear();
         for (index, surface) in reading.surfaces.iter().enumerate() {
             if surface.wet_fraction > 0.0 {
-                wet.push(WetSurface { surface: index, dynamic: surface.dynamic });
+                wet.push(WetSurface { surface: index, dynamic: surface.told() });
             }
         }
         self.kernel.forward(&form.standardize(&reading.global), &self.statics, wet, buffers)
@@ -230,7 +232,9 @@ impl Model {
                     // learned from hulls that neither rise nor turn
                     let level = blend::level(condition);
                     base.drag_into(&level, loads, level_drag);
-                    anchor.read(&self.vehicle, &level, reading);
+                    // it stands in the same water
+                    loads.wetting_into(|x| x, reading.wetting_mut());
+                    anchor.read_wet(&self.vehicle, &level, reading);
                     let outputs = learned.answer(form, (reading, wet, buffers));
                     blend.add((learned, form, reading), (wet, outputs), level_drag, forces);
                 }

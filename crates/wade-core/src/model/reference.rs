@@ -53,7 +53,7 @@ impl Model {
             if known.wet_fraction == 0.0 {
                 return Vec3::zeros();
             }
-            let of_surface = fixed.into_iter().chain(known.dynamic);
+            let of_surface = fixed.into_iter().chain(known.told());
             let row: Vec<f32> = of_surface.chain(form.standardize(&reading.global)).collect();
             let output = learned.weights.network.forward(&row);
             let answer: [f32; anchor::OUTPUTS] = std::array::from_fn(|i| output[i] * (trust * learnt) as f32);

@@ -3,6 +3,7 @@
 use crate::anchor::{Anchor, COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS};
 use crate::condition::GroundContact;
 use crate::model::network::{Network, OUTPUTS, Scaling};
+use crate::real::{Dual, Real};
 use crate::vehicle::Vehicle;
 
 /// What the weights are and where they come from.
@@ -76,6 +77,23 @@ impl Anchored {
         f64::from(nearest.sqrt() / self.near)
     }
 
+    /// The same with derivatives: those of the distance to the case that is nearest.
+    pub fn distance_dual<const N: usize>(&self, coordinates: &[Dual<N>; COORDINATES]) -> Dual<N> {
+        let here = self.place(&coordinates.map(Real::value));
+        let squared = |case: &[f32; COORDINATES]| {
+            here.iter().zip(case).fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
+        };
+        let distances = self.cases.iter().map(|case| (squared(case), case));
+        let nearest = distances.reduce(|best, next| if next.0 < best.0 { next } else { best });
+        let Some((_, nearest)) = nearest else { return f64::INFINITY.into() };
+        let sum = (0..COORDINATES).fold(Dual::default(), |sum, axis| {
+            let unit = f64::from(self.coordinate_scale[axis]);
+            let gap = coordinates[axis] / unit - f64::from(nearest[axis]);
+            sum + gap * gap
+        });
+        sum.sqrt() / f64::from(self.near)
+    }
+
     /// How far loads had set in on each surface of a vehicle in the case that wetted it most: what was dry in all has nothing
     /// learnt, and what the network says of it is anybody's guess.
     pub fn learnt(&self, anchor: &Anchor, vehicle: &Vehicle) -> Vec<f64> {
@@ -94,9 +112,9 @@ impl Anchored {
     }
 
     /// How much of the learnt part counts at a distance: all of it up to 2, nothing from 4, smooth between.
-    pub fn trust(distance: f64) -> f64 {
-        let x = ((FADES[1] - distance) / (FADES[1] - FADES[0])).clamp(0.0, 1.0);
-        x * x * (3.0 - 2.0 * x)
+    pub fn trust<T: Real>(distance: T) -> T {
+        let x = ((-distance + FADES[1]) / (FADES[1] - FADES[0])).clamp(0.0, 1.0);
+        x * x * (-(x * 2.0) + 3.0)
     }
 
     /// How much of the learnt part may be wrong because the state is a stranger: none as near to a case as is usual, all of it

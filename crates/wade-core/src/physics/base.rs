@@ -7,7 +7,7 @@
 //! share `ENTRY` that conserves energy; it acts while `y` rises alone, so that a hull that leaves the water gets nothing
 //! back. So the energy of body, added mass, memory and position never rises by what the water does.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::drag::{Drag, SurfaceDrag};
 use super::elements::{COUNT, elements};
@@ -17,6 +17,7 @@ use crate::condition::{Condition, GroundContact};
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::geometry::hydrostatics::float_depth;
 use crate::geometry::wetting::{Wetting, WettingTable};
+use crate::real::{Dual, Real};
 use crate::vehicle::{ContactPatch, MAX_SURFACES, Vehicle};
 use crate::wrench::Wrench;
 
@@ -45,16 +46,22 @@ const ENTRY: f64 = 0.5;
 /// Share of a surface that is wet from which its elements bear all of their drag [-].
 const REACHED: f64 = 0.05;
 /// What is remembered from state to state: waves made, and the acceleration of explicit integration.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Memory {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Memory<T = f64> {
     /// Output of each oscillator and its integral.
-    waves: [[Vector6<f64>; 2]; POLES],
+    waves: [[Vector6<T>; 2]; POLES],
     /// Acceleration that the added mass resists in explicit integration.
-    rate: Option<Vector6<f64>>,
+    rate: Option<Vector6<T>>,
     /// The states are of a recording.
     recorded: bool,
     /// Time has passed.
     begun: bool,
+}
+
+impl<T: Real> Default for Memory<T> {
+    fn default() -> Self {
+        Self { waves: [[Vector6::zeros(); 2]; POLES], rate: None, recorded: false, begun: false }
+    }
 }
 
 impl Memory {
@@ -64,8 +71,14 @@ impl Memory {
         Self { recorded: true, ..Self::default() }
     }
 
-    fn is_empty(&self) -> bool {
-        *self == Self { recorded: self.recorded, ..Self::default() }
+    fn with_slopes<const N: usize>(&self) -> Memory<Dual<N>> {
+        let dual = |vector: &Vector6<f64>| vector.map(Dual::from);
+        Memory {
+            waves: self.waves.each_ref().map(|wave| wave.each_ref().map(dual)),
+            rate: self.rate.as_ref().map(dual),
+            recorded: self.recorded,
+            begun: self.begun,
+        }
     }
 
     /// Energy in the oscillators over the density, `sum (y^2 + w^2 q^2) / 2` [m5/s2].
@@ -78,48 +91,67 @@ impl Memory {
 }
 
 /// The load of the base on one surface; body frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SurfaceLoad {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceLoad<T = f64> {
     /// Pressure of still water about the body origin [N, N m].
-    pub hydrostatic: Wrench,
+    pub hydrostatic: Wrench<T>,
     /// Drag and friction about the body origin [N, N m].
-    pub drag: Wrench,
+    pub drag: Wrench<T>,
     /// Share under water.
-    pub wet_fraction: f64,
+    pub wet_fraction: T,
     /// Centroid of the wet part; of the surface where it is dry [m].
-    pub center: Vec3,
+    pub center: Vector3<T>,
 }
 
 /// What the base says of a state. Reused from query to query.
-#[derive(Debug, Clone, Default)]
-pub struct BaseLoads {
+#[derive(Debug, Clone)]
+pub struct BaseLoads<T = f64> {
     /// One entry a surface.
-    pub surfaces: Vec<SurfaceLoad>,
+    pub surfaces: Vec<SurfaceLoad<T>>,
     /// Added mass and waves about the body origin [N, N m]: loads of the whole hull.
-    pub hull: Wrench,
+    pub hull: Wrench<T>,
     /// Added mass and inertia about the body origin, forces first [kg, kg m, kg m2].
-    pub added_mass: Matrix6<f64>,
+    pub added_mass: Matrix6<T>,
     /// Derivative of the linear wave load with respect to the velocity, with the sign changed [kg/s, kg m/s, kg m2/s].
     pub damping: Matrix6<f64>,
     /// Clearance over the bed that was used [m].
-    pub bed_clearance: f64,
+    pub bed_clearance: T,
     /// Share of the motion through the water that is motion over the bed, as used.
-    pub bed: f64,
+    pub bed: T,
     /// Power that the shafts of the wheels put in [W].
-    pub shaft_power: f64,
-    wetting: Vec<Wetting>,
-    drags: Vec<SurfaceDrag>,
+    pub shaft_power: T,
+    wetting: Vec<Wetting<T>>,
+    drags: Vec<SurfaceDrag<T>>,
 }
 
-impl BaseLoads {
+impl<T: Real> Default for BaseLoads<T> {
+    fn default() -> Self {
+        Self::with_capacity(0)
+    }
+}
+
+impl<T: Real> BaseLoads<T> {
     /// Room for a vehicle of so many surfaces.
     pub fn with_capacity(surfaces: usize) -> Self {
         Self {
             surfaces: Vec::with_capacity(surfaces),
             wetting: Vec::with_capacity(surfaces),
             drags: Vec::with_capacity(surfaces),
-            ..Self::default()
+            hull: Wrench::default(),
+            added_mass: Matrix6::zeros(),
+            damping: Matrix6::zeros(),
+            bed_clearance: T::zero(),
+            bed: T::zero(),
+            shaft_power: T::zero(),
         }
+    }
+}
+
+impl<T: Real> BaseLoads<T> {
+    /// What the water reaches on each surface, in other numbers.
+    pub(crate) fn wetting_into<U: Real>(&self, with: impl Fn(T) -> U, out: &mut Vec<Wetting<U>>) {
+        out.clear();
+        out.extend(self.wetting.iter().map(|wetting| wetting.map(&with)));
     }
 }
 
@@ -218,6 +250,18 @@ impl Base {
         out.drags.resize(count, SurfaceDrag::default());
         self.table.wetting_into(&plane, &mut out.wetting);
         self.drag.evaluate(&plane, condition, motion.wheel_speeds, &mut out.drags);
+        self.combine(condition, motion, memory, out);
+    }
+
+    /// The loads in a state from what the water reaches and the motion does, which `out` holds.
+    fn combine<T: Real>(
+        &self,
+        condition: &Condition<T>,
+        motion: &Motion<'_>,
+        memory: Option<&mut Memory<T>>,
+        out: &mut BaseLoads<T>,
+    ) {
+        let plane = condition.water_plane(self.z0);
         if motion.physics == Physics::Hydrostatic {
             out.drags.iter_mut().for_each(|drag| (drag.load, drag.shaft_power) = Default::default());
         }
@@ -225,7 +269,7 @@ impl Base {
         if condition.ground_contact == GroundContact::Dry {
             for patch in &self.contacts {
                 let surface = &mut out.surfaces[patch.surface];
-                if surface.wet_fraction > 0.0 {
+                if surface.wet_fraction.value() > 0.0 {
                     surface.hydrostatic += patch.lost_pressure(&plane, condition.density, &Vec3::zeros());
                 }
             }
@@ -241,6 +285,39 @@ impl Base {
         }
     }
 
+    /// The same with derivatives, of a session that stays as it is; `values` holds the loads of the state.
+    pub fn evaluate_dual<const N: usize>(
+        &self,
+        condition: &Condition<Dual<N>>,
+        motion: &Motion<'_>,
+        (values, memory): (&BaseLoads, Option<&Memory>),
+        out: &mut BaseLoads<Dual<N>>,
+    ) {
+        let plane = condition.water_plane(self.z0);
+        let count = self.areas.len();
+        out.wetting.resize(count, Wetting::default());
+        out.drags.resize(count, SurfaceDrag::default());
+        self.table.dual_into(&plane, &values.wetting, &mut out.wetting);
+        self.drag.evaluate_dual(&plane, condition, motion.wheel_speeds, &mut out.drags);
+        let mut memory = memory.map(Memory::with_slopes);
+        self.combine(condition, motion, memory.as_mut(), out);
+    }
+
+    /// The same as [`Self::drag_into`] with derivatives, in water that reaches as far as `wetting` says.
+    pub fn drag_dual_into<const N: usize>(
+        &self,
+        condition: &Condition<Dual<N>>,
+        wetting: &[Wetting<Dual<N>>],
+        out: &mut Vec<SurfaceDrag<Dual<N>>>,
+    ) {
+        out.resize(self.areas.len(), SurfaceDrag::default());
+        let plane = condition.water_plane(self.z0);
+        self.drag.evaluate_dual(&plane, condition, &STATED_NONE[..self.areas.len()], out);
+        for ((drag, wetting), area) in out.iter_mut().zip(wetting).zip(&self.areas) {
+            drag.load = drag.load * reached(wetting, *area);
+        }
+    }
+
     /// Drag and friction on each surface of the same hull in the same water, moving in another way, about the body origin; `of`
     /// holds the loads of the state asked for.
     pub fn drag_into(&self, condition: &Condition, of: &BaseLoads, out: &mut Vec<SurfaceDrag>) {
@@ -252,37 +329,37 @@ impl Base {
         }
     }
 
-    fn sum_surfaces(&self, condition: &Condition, out: &mut BaseLoads) {
+    fn sum_surfaces<T: Real>(&self, condition: &Condition<T>, out: &mut BaseLoads<T>) {
         let weight = condition.density * GRAVITY;
         out.surfaces.clear();
-        out.shaft_power = 0.0;
+        out.shaft_power = T::zero();
         for (index, (wetting, drag)) in out.wetting.iter().zip(&out.drags).enumerate() {
             let reached = reached(wetting, self.areas[index]);
             out.shaft_power += drag.shaft_power * reached;
             out.surfaces.push(SurfaceLoad {
                 hydrostatic: wetting.pressure * weight,
                 drag: drag.load * reached,
-                wet_fraction: (wetting.area / self.areas[index]).min(1.0),
-                center: wetting.centroid().unwrap_or(self.centers[index]),
+                wet_fraction: (wetting.area / self.areas[index]).min(T::one()),
+                center: wetting.centroid().unwrap_or_else(|| self.centers[index].map(T::from)),
             });
         }
     }
 
     /// Clearance of a hull of which nobody stated it [m]: it stands on the bed up to the level at which it floats, and is lifted
     /// smoothly from there.
-    fn usual_clearance(&self, immersion: f64) -> f64 {
-        LIFTED * self.height * self.lifted(immersion).powi(2)
+    fn usual_clearance<T: Real>(&self, immersion: T) -> T {
+        self.lifted(immersion).powi(2) * (LIFTED * self.height)
     }
 
-    fn add_waves(
+    fn add_waves<T: Real>(
         &self,
-        condition: &Condition,
+        condition: &Condition<T>,
         motion: &Motion<'_>,
-        ([immersion, immersion_rate], memory): ([f64; 2], Option<&mut Memory>),
-        out: &mut BaseLoads,
+        ([immersion, immersion_rate], memory): ([T; 2], Option<&mut Memory<T>>),
+        out: &mut BaseLoads<T>,
     ) {
-        let soaked: f64 = out.wetting.iter().map(|wetting| wetting.soaked_area).sum();
-        if soaked <= 0.0 {
+        let soaked = out.wetting.iter().fold(T::zero(), |sum, wetting| sum + wetting.soaked_area);
+        if soaked.value() <= 0.0 {
             if let Some(memory) = memory {
                 memory.advance(&self.radiation.poles, &[Vector6::zeros(); POLES], motion.time_step);
             }
@@ -304,26 +381,26 @@ impl Base {
         for &(row, weight, slope) in &place.rows {
             let deep = mass_of(0, row);
             let added = mass_of(1, row) - deep;
-            far_from_bed += deep * weight;
-            growth += (deep + added * bed.share) * slope;
-            bed_adds += added * weight;
+            far_from_bed += times(&deep, weight);
+            growth += (deep.map(T::from) + times(&added, bed.share)) * slope;
+            bed_adds += times(&added, weight);
         }
         let mass = (far_from_bed + bed_adds * bed.share) * density;
         // entry gives momentum to the water; so does a hull that sinks toward the bed
         let closing = match condition.bed_clearance {
-            Some(_) => (-up.dot(&condition.ground_velocity)).max(0.0),
-            None => (-self.clearance_rate(immersion, immersion_rate)).max(0.0),
+            Some(_) => (-up.dot(&condition.ground_velocity)).max(T::zero()),
+            None => (-self.clearance_rate(immersion, immersion_rate)).max(T::zero()),
         };
-        let entry = growth * place.rate.max(0.0) + bed_adds * (bed.closing * closing);
+        let entry = growth * place.rate.max(T::zero()) + bed_adds * (bed.closing * closing);
         // what the bed adds resists motion toward it, and turns with nothing
-        let mut load = -(entry * nu) * (ENTRY * density) - cross_terms(&(far_from_bed * density), &v, &omega);
+        let mut load = -(entry * nu) * (density * ENTRY) - cross_terms(&(far_from_bed * density), &v, &omega);
         let rate = joined(
             &(condition.acceleration - omega.cross(&condition.velocity)),
             &condition.angular_acceleration,
         );
         if let Some(memory) = memory {
             let factors = self.factors(&place, bed.share);
-            let push: [Vector6<f64>; POLES] = std::array::from_fn(|m| factors[m].transpose() * nu);
+            let push: [Vector6<T>; POLES] = std::array::from_fn(|m| factors[m].transpose() * nu);
             memory.advance(&self.radiation.poles, &push, motion.time_step);
             for (factor, [output, _]) in factors.iter().zip(&memory.waves) {
                 load -= factor * output * density;
@@ -335,12 +412,17 @@ impl Base {
             let mut damping = Matrix6::zeros();
             for &(row, weight, _) in &place.rows {
                 let (deep, standing) = (self.steady[0][row].damping, self.steady[1][row].damping);
-                damping += (deep + (standing - deep) * bed.share) * weight;
+                damping += (deep.map(T::from) + times(&(standing - deep), bed.share)) * weight;
             }
             // only what moves up and down or tilts makes waves in steady motion
-            let lifting = lifting(&up);
-            out.damping = lifting * damping * lifting * density;
-            load -= out.damping * nu;
+            load -= lifted(&up, &(damping * lifted(&up, &nu))) * density;
+            let (up, damping) = (up.map(Real::value), damping.map(Real::value));
+            let lifted_columns = |matrix: &Matrix6<f64>| {
+                Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|i| {
+                    lifted(&up, &matrix.column(i).into_owned())
+                }))
+            };
+            out.damping = lifted_columns(&lifted_columns(&damping).transpose()) * density.value();
             if !motion.implicit_added_mass {
                 load -= mass * rate;
             }
@@ -357,29 +439,29 @@ impl Base {
     }
 
     /// How much of what the bed adds is left at a clearance, and how that grows as it closes [-, 1/m].
-    fn near_bed(&self, clearance: f64) -> NearBed {
-        let x = 1.0 + clearance.max(0.0) / self.radiation.bed_reach;
-        NearBed { share: x.powi(-2), closing: 2.0 * x.powi(-3) / self.radiation.bed_reach }
+    fn near_bed<T: Real>(&self, clearance: T) -> NearBed<T> {
+        let x = clearance.max(T::zero()) / self.radiation.bed_reach + 1.0;
+        NearBed { share: x.powi(-2), closing: x.powi(-3) * 2.0 / self.radiation.bed_reach }
     }
 
     /// Rate of [`Self::usual_clearance`] [m/s].
-    fn clearance_rate(&self, immersion: f64, rate: f64) -> f64 {
-        LIFTED * self.height * 2.0 * self.lifted(immersion) * rate
+    fn clearance_rate<T: Real>(&self, immersion: T, rate: T) -> T {
+        self.lifted(immersion) * (LIFTED * self.height * 2.0) * rate
     }
 
     /// How much deeper a hull is than afloat, over its height, up to 1.
-    fn lifted(&self, immersion: f64) -> f64 {
+    fn lifted<T: Real>(&self, immersion: T) -> T {
         (immersion - self.float_share).clamp(0.0, 1.0)
     }
 
     /// Square roots of the gains at a place.
-    fn factors(&self, place: &Place, near_bed: f64) -> [Matrix6<f64>; POLES] {
+    fn factors<T: Real>(&self, place: &Place<T>, near_bed: T) -> [Matrix6<T>; POLES] {
         std::array::from_fn(|m| {
             let mut gain = Matrix6::zeros();
             for &(row, weight, _) in &place.rows {
                 let (deep, standing) =
                     (self.radiation.deep[row].gains[m], self.radiation.standing[row].gains[m]);
-                gain += (deep + (standing - deep) * near_bed) * weight;
+                gain += (deep.map(T::from) + times(&(standing - deep), near_bed)) * weight;
             }
             factor(&gain)
         })
@@ -390,61 +472,67 @@ impl Base {
 pub const STATED_NONE: [f64; MAX_SURFACES] = [f64::NAN; MAX_SURFACES];
 
 /// How much of the loads of its elements a surface bears: these know its lowest points by their spread alone.
-fn reached(wetting: &Wetting, area: f64) -> f64 {
-    (wetting.soaked_area / (REACHED * area)).min(1.0)
+fn reached<T: Real>(wetting: &Wetting<T>, area: f64) -> T {
+    (wetting.soaked_area / (REACHED * area)).min(T::one())
 }
 
 /// Place in the table: rows with weights and slopes, and the rate of the coordinate [1/s].
-struct Place {
-    rows: [(usize, f64, f64); 3],
-    rate: f64,
+struct Place<T> {
+    rows: [(usize, T, T); 3],
+    rate: T,
 }
 
 /// Where a hull is in the table at an immersion, and how fast it goes down there.
-fn place(immersion: f64, immersion_rate: f64) -> Place {
+fn place<T: Real>(immersion: T, immersion_rate: T) -> Place<T> {
     // a row weighs most in the middle of its step
-    let y = immersion.max(0.0) / STEP;
+    let y = immersion.max(T::zero()) / STEP;
     let rate = immersion_rate / STEP;
     let end = NODES as f64 - 1e-9;
-    let (y, rate) = if y < end { (y, rate) } else { (end, 0.0) };
-    let row = (y.floor() as usize).min(NODES - 1);
+    let (y, rate) = if y.value() < end { (y, rate) } else { (end.into(), T::zero()) };
+    let row = (y.value().floor() as usize).min(NODES - 1);
     let t = y - row as f64;
     // quadratic B-splines: weights that are never negative, sums with a continuous slope
-    let last = (0.5 * t * t, t);
+    let last = (t * 0.5 * t, t);
     // the row before the first is dry as well, so that the slope begins at zero
     let [a, b] = match row {
-        0 => [(0.0, 0.0); 2],
-        _ => [(0.5 * (1.0 - t).powi(2), t - 1.0), (0.5 + t - t * t, 1.0 - 2.0 * t)],
+        0 => [(T::zero(), T::zero()); 2],
+        _ => [((-t + 1.0).powi(2) * 0.5, t - 1.0), (t + 0.5 - t * t, -(t * 2.0) + 1.0)],
     };
     let next = (row + 1).min(NODES - 1);
     let before = row.saturating_sub(1);
     Place { rows: [(before, a.0, a.1), (row, b.0, b.1), (next, last.0, last.1)], rate }
 }
 
-struct NearBed {
-    share: f64,
-    closing: f64,
+struct NearBed<T> {
+    share: T,
+    closing: T,
 }
 
-impl Memory {
+impl<T: Real> Memory<T> {
+    fn is_empty(&self) -> bool {
+        *self == Self { recorded: self.recorded, ..Self::default() }
+    }
+
     /// Moves on by a time step under a push that is constant meanwhile, exactly.
-    fn advance(&mut self, poles: &[Pole; POLES], push: &[Vector6<f64>; POLES], dt: f64) {
+    fn advance(&mut self, poles: &[Pole; POLES], push: &[Vector6<T>; POLES], dt: f64) {
         let begins_in_motion = self.recorded && !self.begun;
         self.begun = true;
         for ((pole, push), [output, integral]) in poles.iter().zip(push).zip(&mut self.waves) {
             if begins_in_motion {
-                *integral = push / pole.frequency.powi(2);
+                *integral = push / T::from(pole.frequency.powi(2));
             }
             let decay = pole.damping * pole.frequency;
             let swing = pole.frequency * (1.0 - pole.damping * pole.damping).sqrt();
             // q'' + 2 zeta w q' + w^2 q = u about its resting place
-            let rest = push / pole.frequency.powi(2);
+            let rest = push / T::from(pole.frequency.powi(2));
             let (q, p) = (*integral - rest, *output);
             let (sine, cosine) = (swing * dt).sin_cos();
             let fade = (-decay * dt).exp();
             let s = sine / swing;
-            *integral = rest + (q * (cosine + decay * s) + p * s) * fade;
-            *output = (p * (cosine - decay * s) - q * (pole.frequency.powi(2) * s)) * fade;
+            let [q_stays, p_adds] = [cosine + decay * s, s].map(T::from);
+            let [p_stays, q_adds] = [cosine - decay * s, pole.frequency.powi(2) * s].map(T::from);
+            *integral = rest + (q * q_stays + p * p_adds) * T::from(fade);
+            *output = (p * p_stays - q * q_adds) * T::from(fade);
         }
     }
 
@@ -453,17 +541,17 @@ impl Memory {
     fn settled(
         &mut self,
         rigid: &Matrix6<f64>,
-        added: &Matrix6<f64>,
-        measured: Vector6<f64>,
+        added: &Matrix6<T>,
+        measured: Vector6<T>,
         dt: f64,
-    ) -> Vector6<f64> {
+    ) -> Vector6<T> {
         if self.recorded {
             return measured;
         }
         let before = self.rate.unwrap_or(measured);
         if dt > 0.0 || self.rate.is_none() {
-            let right = rigid * measured + added * before;
-            self.rate = Some((rigid + added).cholesky().map_or(measured, |both| both.solve(&right)));
+            let rigid = rigid.map(T::from);
+            self.rate = Some(solved(&(rigid + added), rigid * measured + added * before));
         }
         self.rate.unwrap_or(measured)
     }
@@ -495,42 +583,58 @@ fn rigid_mass(vehicle: &Vehicle) -> Matrix6<f64> {
 }
 
 /// Kirchhoff's `C_A(nu) nu`: momentum that turns with the body.
-fn cross_terms(mass: &Matrix6<f64>, v: &Vec3, omega: &Vec3) -> Vector6<f64> {
+fn cross_terms<T: Real>(mass: &Matrix6<T>, v: &Vector3<T>, omega: &Vector3<T>) -> Vector6<T> {
     let momentum = mass * joined(v, omega);
     let linear = momentum.fixed_rows::<3>(0).into_owned();
     let angular = momentum.fixed_rows::<3>(3).into_owned();
     joined(&omega.cross(&linear), &(omega.cross(&angular) + v.cross(&linear)))
 }
 
-fn joined(linear: &Vec3, angular: &Vec3) -> Vector6<f64> {
+fn joined<T: Real>(linear: &Vector3<T>, angular: &Vector3<T>) -> Vector6<T> {
     Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 }
 
-/// Projection on motion up and down and on turning about horizontal axes.
-fn lifting(up: &Vec3) -> Matrix6<f64> {
-    let vertical = up * up.transpose();
-    let mut matrix = Matrix6::identity();
-    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&vertical);
-    let level = matrix.fixed_view::<3, 3>(3, 3).into_owned() - vertical;
-    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&level);
-    matrix
+/// The part of a motion, or of a load, that is up and down or about horizontal axes.
+fn lifted<T: Real>(up: &Vector3<T>, of: &Vector6<T>) -> Vector6<T> {
+    let (linear, angular) = (of.fixed_rows::<3>(0).into_owned(), of.fixed_rows::<3>(3).into_owned());
+    joined(&(up * up.dot(&linear)), &(angular - up * up.dot(&angular)))
+}
+
+/// A matrix by a factor.
+fn times<T: Real>(matrix: &Matrix6<f64>, factor: T) -> Matrix6<T> {
+    matrix.map(|x| factor * x)
 }
 
 /// A lower triangle `L` with `L L^T` the matrix, which is not negative; rows without size are zero.
-fn factor(matrix: &Matrix6<f64>) -> Matrix6<f64> {
-    let mut lower = Matrix6::<f64>::zeros();
+fn factor<T: Real>(matrix: &Matrix6<T>) -> Matrix6<T> {
+    let mut lower = Matrix6::zeros();
     for column in 0..6 {
-        let square: f64 = (0..column).map(|k| lower[(column, k)] * lower[(column, k)]).sum();
+        let square = (0..column).fold(T::zero(), |sum, k| sum + lower[(column, k)] * lower[(column, k)]);
         let pivot = matrix[(column, column)] - square;
-        if pivot <= 1e-12 * matrix[(column, column)].abs() || pivot <= 0.0 {
+        if pivot.value() <= 1e-12 * matrix[(column, column)].value().abs() || pivot.value() <= 0.0 {
             continue;
         }
         let pivot = pivot.sqrt();
         lower[(column, column)] = pivot;
         for row in column + 1..6 {
-            let dot: f64 = (0..column).map(|k| lower[(row, k)] * lower[(column, k)]).sum();
+            let dot = (0..column).fold(T::zero(), |sum, k| sum + lower[(row, k)] * lower[(column, k)]);
             lower[(row, column)] = (matrix[(row, column)] - dot) / pivot;
         }
     }
     lower
+}
+
+/// `x` of `matrix x = right`, of a symmetric and positive matrix.
+fn solved<T: Real>(matrix: &Matrix6<T>, right: Vector6<T>) -> Vector6<T> {
+    let lower = factor(matrix);
+    let mut x = right;
+    for row in 0..6 {
+        let known = (0..row).fold(T::zero(), |sum, k| sum + lower[(row, k)] * x[k]);
+        x[row] = (x[row] - known) / lower[(row, row)];
+    }
+    for row in (0..6).rev() {
+        let known = (row + 1..6).fold(T::zero(), |sum, k| sum + lower[(k, row)] * x[k]);
+        x[row] = (x[row] - known) / lower[(row, row)];
+    }
+    x
 }

@@ -21,10 +21,13 @@
 //! Every term opposes the velocity of its own element and every factor is positive, so the sum over the elements takes
 //! power from the motion through the water in every state; wheels and tracks that turn put in their shaft power at most.
 
+use nalgebra::Vector3;
+
 use super::elements::{Element, LANES};
 use crate::condition::Condition;
 use crate::frame::{VISCOSITY, Vec3, WaterPlane};
 use crate::lanes::{Instructions, run_for};
+use crate::real::{Dual, Real, norm};
 use crate::vehicle::{SurfaceKind, Vehicle};
 use crate::wrench::Wrench;
 
@@ -43,6 +46,8 @@ const BOTTOM_FILM: f64 = 0.5;
 /// plates of a coefficient of 1.2.
 /// Uncertain by a factor of two.
 pub const TREAD: f64 = 0.12;
+/// Half the height of an element below which it is level [m]: rounding.
+const FLAT: f64 = 1e-7;
 /// Reynolds number below which the friction line is held.
 const LEAST_REYNOLDS: f64 = 1e4;
 
@@ -73,13 +78,19 @@ struct Turning {
 
 /// A turning surface in a state: what its elements need of it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Skin {
+struct Skin<T = f64> {
     /// Speed of a wheel [rad/s], or of the belt of a track [m/s].
     speed: f64,
     axle_x: f64,
     axle_z: f64,
     /// Tangential coefficient of the lugs.
-    lugs: f64,
+    lugs: T,
+}
+
+impl<const N: usize> Skin<Dual<N>> {
+    fn value(self) -> Skin {
+        Skin { speed: self.speed, axle_x: self.axle_x, axle_z: self.axle_z, lugs: self.lugs.value }
+    }
 }
 
 /// [`LANES`] elements, in lock step.
@@ -95,27 +106,81 @@ struct Block {
 }
 
 /// What the motion does on one surface, about the body origin.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SurfaceDrag {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceDrag<T = f64> {
     /// Force and moment about the body origin [N, N m].
-    pub load: Wrench,
+    pub load: Wrench<T>,
     /// Power that a turning wheel must be given at its shaft [W]: what the rim's own velocity takes.
-    pub shaft_power: f64,
+    pub shaft_power: T,
+}
+
+impl<T: Real> Default for SurfaceDrag<T> {
+    fn default() -> Self {
+        Self { load: Wrench::default(), shaft_power: T::zero() }
+    }
 }
 
 /// The state in the form that every block uses.
-struct Flow {
-    up: [f64; 3],
-    offset: f64,
-    velocity: [f64; 3],
-    rate: [f64; 3],
+struct Flow<T = f64> {
+    up: [T; 3],
+    offset: T,
+    velocity: [T; 3],
+    rate: [T; 3],
     /// Horizontal direction of motion over half the length of the hull along it, times how much of the motion it is [1/m].
-    ahead: [f64; 3],
+    ahead: [T; 3],
     /// Mean sheltering: half of [`SHELTERING`] times how much of the motion is along the hull.
-    sheltering: f64,
-    friction: f64,
-    half_density: f64,
+    sheltering: T,
+    friction: T,
+    half_density: T,
 }
+
+impl<const N: usize> Flow<Dual<N>> {
+    fn value(&self) -> Flow {
+        let values = |vector: [Dual<N>; 3]| vector.map(Real::value);
+        Flow {
+            up: values(self.up),
+            offset: self.offset.value,
+            velocity: values(self.velocity),
+            rate: values(self.rate),
+            ahead: values(self.ahead),
+            sheltering: self.sheltering.value,
+            friction: self.friction.value,
+            half_density: self.half_density.value,
+        }
+    }
+
+    /// What the loads of the elements depend on, in the order of [`Columns`].
+    fn inputs(&self, lugs: Dual<N>) -> [Dual<N>; INPUTS] {
+        let Self { velocity: v, rate: w, up: u, ahead: a, .. } = *self;
+        [
+            v[0],
+            v[1],
+            v[2],
+            w[0],
+            w[1],
+            w[2],
+            self.offset,
+            u[0],
+            u[1],
+            u[2],
+            a[0],
+            a[1],
+            a[2],
+            self.sheltering,
+            self.friction,
+            lugs,
+        ]
+    }
+}
+
+/// Numbers that the loads of a surface's elements depend on, besides the density.
+const INPUTS: usize = 16;
+/// Components of a load: force, moment, and power at the shaft.
+const COMPONENTS: usize = 7;
+/// Derivatives of a load with respect to each input: velocity and rate of the hull, level, up, direction of the motion,
+/// sheltering, friction and the coefficient of the lugs.
+type Columns = [[Lane; COMPONENTS]; INPUTS];
+const NO_COLUMNS: Columns = [[[0.0; LANES]; COMPONENTS]; INPUTS];
 
 impl Drag {
     /// Prepares the elements of a vehicle; those of a surface stand side by side.
@@ -182,47 +247,92 @@ impl Drag {
         );
     }
 
+    /// The same with derivatives.
+    pub fn evaluate_dual<const N: usize>(
+        &self,
+        plane: &WaterPlane<Dual<N>>,
+        condition: &Condition<Dual<N>>,
+        wheel_speeds: &[f64],
+        out: &mut [SurfaceDrag<Dual<N>>],
+    ) {
+        let inputs = self.flow(plane, condition);
+        let flow = &inputs.value();
+        let mut work = Work { sums: Sums::default(), slopes: Slopes::NONE, columns: NO_COLUMNS, wet: false };
+        for (surface, out) in out.iter_mut().enumerate() {
+            let (skin, is_track) = self.skin(condition, surface, wheel_speeds[surface]);
+            work.begin();
+            let (part, into) = ((surface, skin.value(), is_track), &mut work);
+            run_for!(
+                self.instructions,
+                Drag::sum_columns(self, flow: &Flow, part: (usize, Skin, bool), into: &mut Work)
+            );
+            *out = work.finish((&inputs.inputs(skin.lugs), condition.density));
+        }
+    }
+
+    #[inline(always)]
+    fn sum_columns(&self, flow: &Flow, (surface, skin, is_track): (usize, Skin, bool), work: &mut Work) {
+        let [from, to] = self.ranges[surface];
+        let Work { sums, slopes, columns, wet } = work;
+        for block in &self.blocks[from..to] {
+            match is_track {
+                true => block.add::<true, true>(flow, skin, sums, slopes),
+                false => block.add::<false, true>(flow, skin, sums, slopes),
+            }
+            if slopes.share.iter().any(|share| *share > 0.0) {
+                slopes.add_to(columns, &block.center);
+                *wet = true;
+            }
+        }
+    }
+
     #[inline(always)]
     fn sum(&self, flow: &Flow, condition: &Condition, wheel_speeds: &[f64], out: &mut [SurfaceDrag]) {
         for (surface, out) in out.iter_mut().enumerate() {
+            let (skin, is_track) = self.skin(condition, surface, wheel_speeds[surface]);
+            // which stay unused
+            let (mut sums, mut slopes) = (Sums::default(), Slopes::NONE);
             let [from, to] = self.ranges[surface];
-            let speed = wheel_speeds[surface];
-            let turning = self.turning[surface].filter(|_| !speed.is_nan());
-            let mut sums = Sums::default();
-            let skin = turning.map(|Turning { center, radius, is_track }| {
-                let axle = condition.velocity + condition.angular_velocity.cross(&center);
-                let rim = speed * radius;
-                let (spin, past) = (rim.powi(2), axle.norm_squared());
-                let slip = ((rim - axle.x) / rim).abs().min(1.0);
-                let lugs = if spin > 0.0 { TREAD * slip * spin / (spin + past) } else { 0.0 };
-                let speed = if is_track { speed * radius } else { speed };
-                Skin { speed, axle_x: center.x, axle_z: center.z, lugs }
-            });
-            let skin = skin.unwrap_or_default();
-            let is_track = turning.is_some_and(|turning| turning.is_track);
             for block in &self.blocks[from..to] {
                 match is_track {
-                    true => block.add::<true>(flow, skin, &mut sums),
-                    false => block.add::<false>(flow, skin, &mut sums),
+                    true => block.add::<true, false>(flow, skin, &mut sums, &mut slopes),
+                    false => block.add::<false, false>(flow, skin, &mut sums, &mut slopes),
                 }
             }
             *out = sums.finish();
         }
     }
 
-    fn flow(&self, plane: &WaterPlane, condition: &Condition) -> Flow {
+    /// A surface that turns at a speed, where one is stated, and whether it is a track.
+    #[inline(always)]
+    fn skin<T: Real>(&self, condition: &Condition<T>, surface: usize, speed: f64) -> (Skin<T>, bool) {
+        let turning = self.turning[surface].filter(|_| !speed.is_nan());
+        let skin = turning.map(|Turning { center, radius, is_track }| {
+            let axle = condition.velocity + condition.angular_velocity.cross(&center.map(T::from));
+            let rim = speed * radius;
+            let (spin, past) = (rim.powi(2), axle.dot(&axle));
+            let slip = ((-axle.x + rim) / rim).abs().min(T::one());
+            let lugs = if spin > 0.0 { slip * TREAD * spin / (past + spin) } else { T::zero() };
+            let speed = if is_track { speed * radius } else { speed };
+            Skin { speed, axle_x: center.x, axle_z: center.z, lugs }
+        });
+        (skin.unwrap_or_default(), turning.is_some_and(|turning| turning.is_track))
+    }
+
+    fn flow<T: Real>(&self, plane: &WaterPlane<T>, condition: &Condition<T>) -> Flow<T> {
         let up = plane.normal.into_inner();
         let v = condition.velocity;
         let level = v - up * up.dot(&v);
-        let turning = condition.angular_velocity.norm() * self.half_length;
-        let along = level.norm_squared();
-        let all = v.norm_squared() + turning * turning;
-        let share = if all > 0.0 { along / all } else { 0.0 };
-        let direction = level.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
-        let half = self.half_length * direction.x.abs() + self.half_width * direction.y.abs();
-        let ahead = direction / half.max(0.1 * self.half_width);
+        let turning = norm(&condition.angular_velocity) * self.half_length;
+        let along = level.dot(&level);
+        let all = v.dot(&v) + turning * turning;
+        let share = if all.value() > 0.0 { along / all } else { T::zero() };
+        let ahead = norm(&level);
+        let direction = if ahead.value() > 0.0 { level / ahead } else { Vector3::zeros() };
+        let half = direction.x.abs() * self.half_length + direction.y.abs() * self.half_width;
+        let ahead = direction / half.max((0.1 * self.half_width).into());
         let speed = all.sqrt();
-        let reynolds = (condition.density * speed * self.length / VISCOSITY).max(LEAST_REYNOLDS);
+        let reynolds = (condition.density * speed * self.length / VISCOSITY).max(LEAST_REYNOLDS.into());
         let line = reynolds.log10() - 2.0;
         Flow {
             up: up.into(),
@@ -230,10 +340,53 @@ impl Drag {
             velocity: v.into(),
             rate: condition.angular_velocity.into(),
             ahead: ahead.into(),
-            sheltering: 0.5 * SHELTERING * share,
-            friction: 0.075 / (line * line),
-            half_density: 0.5 * condition.density,
+            sheltering: share * (0.5 * SHELTERING),
+            friction: T::from(0.075) / (line * line),
+            half_density: condition.density * 0.5,
         }
+    }
+}
+
+/// Sums over the elements of a surface, with their derivatives.
+struct Work {
+    sums: Sums,
+    slopes: Slopes,
+    columns: Columns,
+    /// Some element is wet, so that the columns hold something.
+    wet: bool,
+}
+
+impl Work {
+    fn begin(&mut self) {
+        self.sums = Sums::default();
+        if self.wet {
+            (self.columns, self.wet) = (NO_COLUMNS, false);
+        }
+    }
+
+    /// With the derivatives that follow from those of the inputs and of the density, to which a load is proportional.
+    fn finish<const N: usize>(
+        &self,
+        (inputs, density): (&[Dual<N>; INPUTS], Dual<N>),
+    ) -> SurfaceDrag<Dual<N>> {
+        if !self.wet {
+            return SurfaceDrag::default();
+        }
+        let SurfaceDrag { load: Wrench { force: f, moment: m }, shaft_power } = self.sums.finish();
+        let values = [f.x, f.y, f.z, m.x, m.y, m.z, shaft_power];
+        let mut duals = values.map(|value| density * (value / density.value));
+        for (column, input) in self.columns.iter().zip(inputs) {
+            for (dual, lane) in duals.iter_mut().zip(column) {
+                let [a, b, c, d, e, f, g, h] = *lane;
+                let slope = ((a + e) + (c + g)) + ((b + f) + (d + h));
+                for (own, of_input) in dual.slope.iter_mut().zip(input.slope) {
+                    *own += slope * of_input;
+                }
+            }
+        }
+        let [fx, fy, fz, mx, my, mz, shaft_power] = duals;
+        let load = Wrench { force: Vector3::new(fx, fy, fz), moment: Vector3::new(mx, my, mz) };
+        SurfaceDrag { load, shaft_power }
     }
 }
 
@@ -279,7 +432,13 @@ impl Block {
     }
 
     #[inline(always)]
-    fn add<const IS_TRACK: bool>(&self, flow: &Flow, skin: Skin, sums: &mut Sums) {
+    fn add<const IS_TRACK: bool, const SLOPES: bool>(
+        &self,
+        flow: &Flow,
+        skin: Skin,
+        sums: &mut Sums,
+        slopes: &mut Slopes,
+    ) {
         let [ux, uy, uz] = flow.up;
         let Skin { speed, axle_x, axle_z, lugs } = skin;
         let pi = std::f64::consts::PI;
@@ -344,6 +503,120 @@ impl Block {
             sums.moment[1][i] += z * fx - x * fz;
             sums.moment[2][i] += x * fy - y * fx;
             sums.power[i] -= fx * skin[0] + fz * skin[1];
+            if !SLOPES {
+                continue;
+            }
+            let n = [nx, ny, nz];
+            // with the velocity of the hull here: of the square, of Rayleigh's term, and of the load
+            let below = 4.0 * total + pi * across.abs() + f64::MIN_POSITIVE;
+            let share_of_all = across / below;
+            // at rest there is a kink
+            let linear = if total + across.abs() > 0.0 { (4.0 + pi) / below } else { 0.0 };
+            let sign = if across > 0.0 { pi } else { -pi };
+            let grows = 2.0 * (across - 2.0 * total * share_of_all);
+            let turns = (across - of_hull) * grows + squared * (1.0 - sign * share_of_all);
+            let (press, rub) = (scale * coefficient * linear, scale * tangential);
+            let bend = if slip > 0.0 { rub / slip } else { 0.0 };
+            for k in 0..3 {
+                let of_rayleigh = press * (hull[k] * grows + n[k] * turns) - rub * slip * n[k];
+                for c in 0..3 {
+                    let own = if c == k { rub * slip } else { 0.0 };
+                    slopes.of_velocity[k][c][i] = own + n[c] * of_rayleigh + bend * along[c] * along[k];
+                }
+            }
+            // with the share that is wet, where it changes
+            let partly = if share > 0.0 && share < 1.0 { 1.0 / range } else { 0.0 };
+            let all_wet = -flow.half_density * exposed * self.area[i] * partly;
+            let (normal, tangent) = (all_wet * coefficient * rayleigh, all_wet * tangential * slip);
+            let of_film = 6.0 * (self.film[1] - self.film[0]) * square * square * facing * share;
+            // an element that is level has none
+            let of_reach = if reach > FLAT { (1.0 - 2.0 * share) / (2.0 * reach) } else { 0.0 };
+            let of_variance = [
+                2.0 * s(0) * ux + s(3) * uy + s(4) * uz,
+                2.0 * s(1) * uy + s(3) * ux + s(5) * uz,
+                2.0 * s(2) * uz + s(4) * ux + s(5) * uy,
+            ];
+            // with what shelters
+            let sheltered = if place.abs() < 1.0 { flow.sheltering / exposed } else { 0.0 };
+            let (force, at) = ([fx, fy, fz], [x, y, z]);
+            for k in 0..3 {
+                slopes.force[k][i] = force[k];
+                slopes.of_share[k][i] = normal * n[k] + tangent * along[k];
+                slopes.of_friction[k][i] = scale * slip * along[k];
+                slopes.share_of_up[k][i] = of_variance[k] * of_reach - at[k] - of_film * n[k];
+                slopes.shelter_of_ahead[k][i] = sheltered * at[k];
+            }
+            slopes.of_sheltering[i] = (place - 1.0) / exposed;
+            slopes.tread[i] = 1.0 - ny * ny;
+            (slopes.skin[0][i], slopes.skin[1][i]) = (skin[0], skin[1]);
+            slopes.share[i] = share;
+        }
+    }
+}
+
+/// Derivatives of the force on each of [`LANES`] elements, in the form of few factors.
+struct Slopes {
+    /// With each component of the velocity of the hull here.
+    of_velocity: [[Lane; 3]; 3],
+    force: [Lane; 3],
+    /// With the share that is wet, over the range in which it grows, and how that goes with up.
+    of_share: [Lane; 3],
+    share_of_up: [Lane; 3],
+    share: Lane,
+    of_friction: [Lane; 3],
+    tread: Lane,
+    /// Over the force.
+    of_sheltering: Lane,
+    shelter_of_ahead: [Lane; 3],
+    skin: [Lane; 2],
+}
+
+impl Slopes {
+    const NONE: Self = Self {
+        of_velocity: [[[0.0; LANES]; 3]; 3],
+        force: [[0.0; LANES]; 3],
+        of_share: [[0.0; LANES]; 3],
+        share_of_up: [[0.0; LANES]; 3],
+        share: [0.0; LANES],
+        of_friction: [[0.0; LANES]; 3],
+        tread: [0.0; LANES],
+        of_sheltering: [0.0; LANES],
+        shelter_of_ahead: [[0.0; LANES]; 3],
+        skin: [[0.0; LANES]; 2],
+    };
+
+    /// Adds the derivatives of force, moment and power with each of the [`INPUTS`].
+    #[inline(always)]
+    fn add_to(&self, columns: &mut Columns, at: &[Lane; 3]) {
+        let of = &self.of_velocity;
+        for k in 0..3 {
+            let (next, last) = ((k + 1) % 3, (k + 2) % 3);
+            self.add(&mut columns[k], at, |c, i| of[k][c][i]);
+            // a rate moves the place across its axis
+            self.add(&mut columns[3 + k], at, |c, i| {
+                of[last][c][i] * at[next][i] - of[next][c][i] * at[last][i]
+            });
+            self.add(&mut columns[7 + k], at, |c, i| self.of_share[c][i] * self.share_of_up[k][i]);
+            self.add(&mut columns[10 + k], at, |c, i| self.force[c][i] * self.shelter_of_ahead[k][i]);
+        }
+        self.add(&mut columns[6], at, |c, i| self.of_share[c][i]);
+        self.add(&mut columns[13], at, |c, i| self.force[c][i] * self.of_sheltering[i]);
+        self.add(&mut columns[14], at, |c, i| self.of_friction[c][i]);
+        self.add(&mut columns[15], at, |c, i| self.of_friction[c][i] * self.tread[i]);
+    }
+
+    #[inline(always)]
+    fn add(&self, column: &mut [Lane; COMPONENTS], at: &[Lane; 3], force: impl Fn(usize, usize) -> f64) {
+        for i in 0..LANES {
+            let [fx, fy, fz] = [force(0, i), force(1, i), force(2, i)];
+            let [x, y, z] = [at[0][i], at[1][i], at[2][i]];
+            column[0][i] += fx;
+            column[1][i] += fy;
+            column[2][i] += fz;
+            column[3][i] += y * fz - z * fy;
+            column[4][i] += z * fx - x * fz;
+            column[5][i] += x * fy - y * fx;
+            column[6][i] -= fx * self.skin[0][i] + fz * self.skin[1][i];
         }
     }
 }

@@ -1,8 +1,11 @@
 //! How far a hull is under water in any attitude, as one number that changes smoothly.
 
+use nalgebra::Vector3;
+
 use crate::condition::Condition;
 use crate::frame::{Vec3, WaterPlane};
 use crate::geometry::mesh::Mesh;
+use crate::real::{Real, norm};
 
 /// Directions in which the ellipsoid is compared with the hull.
 const DIRECTIONS: usize = 500;
@@ -32,8 +35,8 @@ impl Ellipsoid {
     }
 
     /// Half its height along an upward direction [m].
-    fn reach(&self, up: &Vec3) -> f64 {
-        up.component_mul(&self.half).norm().max(f64::MIN_POSITIVE)
+    fn reach<T: Real>(&self, up: &Vector3<T>) -> T {
+        norm(&up.component_mul(&self.half.map(T::from))).max(f64::MIN_POSITIVE.into())
     }
 
     /// Height over the body origin, upright, at which a share of it is under water [m].
@@ -42,19 +45,20 @@ impl Ellipsoid {
     }
 
     /// Share of its height that is under water [-]: below 0 above the water, over 1 where it is covered.
-    pub fn share_under(&self, plane: &WaterPlane) -> f64 {
-        0.5 + 0.5 * plane.depth_below(&self.center) / self.reach(&plane.normal)
+    pub fn share_under<T: Real>(&self, plane: &WaterPlane<T>) -> T {
+        plane.depth_below(&self.center.map(T::from)) * 0.5 / self.reach(&plane.normal) + 0.5
     }
 
     /// [`Self::share_under`] and its rate [-, 1/s].
-    pub fn immersion(&self, condition: &Condition, plane: &WaterPlane) -> [f64; 2] {
+    pub fn immersion<T: Real>(&self, condition: &Condition<T>, plane: &WaterPlane<T>) -> [T; 2] {
         let up = plane.normal.into_inner();
         let (reach, share) = (self.reach(&up), self.share_under(plane));
         // in body axes up turns against the body
         let turning = up.cross(&condition.angular_velocity);
-        let reach_rate = up.component_mul(&self.half).dot(&turning.component_mul(&self.half)) / reach;
-        let sinking = -up.dot(&(condition.velocity + condition.angular_velocity.cross(&self.center)));
-        [share, (0.5 * sinking - (share - 0.5) * reach_rate) / reach]
+        let [center, half] = [self.center, self.half].map(|vector| vector.map(T::from));
+        let reach_rate = up.component_mul(&half).dot(&turning.component_mul(&half)) / reach;
+        let sinking = -up.dot(&(condition.velocity + condition.angular_velocity.cross(&center)));
+        [share, (sinking * 0.5 - (share - 0.5) * reach_rate) / reach]
     }
 }
 

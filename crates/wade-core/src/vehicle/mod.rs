@@ -25,6 +25,7 @@ pub use wheels::{MAX_WHEELS, PerWheel, by_axle};
 use crate::condition::{Condition, GroundContact};
 use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::geometry::hydrostatics::surface_hydrostatics;
+use crate::real::Real;
 use crate::wrench::Wrench;
 use spec::BodyFromStl;
 
@@ -115,9 +116,10 @@ impl ContactPatch {
     ///
     /// `F = -rho g delta A z` with the depth `delta` of the center: add it to the hydrostatics of the surface for
     /// `GroundContact::Dry`.
-    pub fn lost_pressure(&self, plane: &WaterPlane, density: f64, about: &Vec3) -> Wrench {
-        let depth = plane.depth_below(&self.center).max(0.0);
-        Wrench::from_force_at(Vec3::z() * -(depth * self.area * (density * GRAVITY)), &self.center, about)
+    pub fn lost_pressure<T: Real>(&self, plane: &WaterPlane<T>, density: T, about: &Vec3) -> Wrench<T> {
+        let [center, about, up] = [self.center, *about, Vec3::z()].map(|vector| vector.map(T::from));
+        let depth = plane.depth_below(&center).max(T::zero());
+        Wrench::from_force_at(up * -(depth * self.area * (density * GRAVITY)), &center, &about)
     }
 }
 

@@ -49,7 +49,7 @@ fn loads(vehicle: &Vehicle, anchor: &Anchor, condition: &Condition) -> Vec<(Vec3
     let mut reading = Reading::default();
     anchor.read(vehicle, condition, &mut reading);
     let load = |(surface, fixed): (&SurfaceReading, &[f32; STATIC])| {
-        let output = answer(&reading.global, fixed, &surface.dynamic);
+        let output = answer(&reading.global, fixed, &surface.told());
         (surface.force(&output), surface.moment(&output))
     };
     reading.surfaces.iter().zip(&fixed).map(load).collect()
@@ -167,7 +167,7 @@ fn a_force_acts_where_the_water_may_reach_and_has_the_moment_of_the_answer_where
             let reading = read(&vehicle, &state);
             for (surface, fixed) in reading.surfaces.iter().zip(&fixed).filter(|(s, _)| s.wet_fraction > 0.0)
             {
-                let output = answer(&reading.global, fixed, &surface.dynamic).map(|x| 0.02 * x);
+                let output = answer(&reading.global, fixed, &surface.told()).map(|x| 0.02 * x);
                 let load = surface.load(&output);
                 let [low, high] = surface.reach;
                 let strictly = |margin: f64| {

@@ -1,11 +1,15 @@
 //! Promise: the fast path answers as the plain-loop reference does, on every instruction set of this CPU.
 
 use crate::common::{Numbers, VEHICLES, model_on, paper_on, without_base_on};
+use wade_core::anchor;
 use wade_core::condition::Condition;
 use wade_core::features;
 use wade_core::forces::Forces;
 use wade_core::frame::{GRAVITY, Vec3};
-use wade_core::model::kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, WetSurface};
+use wade_core::model::kernel::{
+    Buffers, DIRECTIONS, FeatureSlopes, Isa, Kernel, MAX_DYNAMIC, SlopeBuffers, WetSurface,
+};
+use wade_core::model::network::Network;
 use wade_core::model::{Form, Model, Weights, Workspace};
 
 /// Size of the terms that a surface's force is a sum of, by which its rounding is measured [N].
@@ -99,5 +103,82 @@ fn a_query_leaves_nothing_behind_in_its_workspace() {
         assert_ne!(forces, first);
         model.evaluate(&deep, &mut workspace, &mut forces);
         assert_eq!(forces, first, "{}", isa.name());
+    }
+}
+
+/// The outputs of a network and their derivatives along a direction, by plain loops in double precision.
+fn plain_slopes(network: &Network, row: &[f64], along: &[f64]) -> Vec<f64> {
+    let mut layer = (row.to_vec(), along.to_vec());
+    for (weights, biases) in
+        [(&network.w1, &network.b1), (&network.w2, &network.b2), (&network.w3, &network.b3)]
+    {
+        let inputs = layer.0.len();
+        let sum = |values: &[f64], unit: usize| -> f64 {
+            (0..inputs).map(|i| f64::from(weights[unit * inputs + i]) * values[i]).sum()
+        };
+        let units = 0..biases.len();
+        let values: Vec<f64> = units.clone().map(|u| sum(&layer.0, u) + f64::from(biases[u])).collect();
+        let slopes: Vec<f64> = units.map(|unit| sum(&layer.1, unit)).collect();
+        if biases.len() == network.outputs {
+            return slopes;
+        }
+        let passes = |(value, slope): (&f64, &f64)| if *value > 0.0 { *slope } else { 0.0 };
+        layer.1 = values.iter().zip(&slopes).map(passes).collect();
+        layer.0 = values.iter().map(|value| value.max(0.0)).collect();
+    }
+    unreachable!("the last layer has the outputs")
+}
+
+#[test]
+fn slopes_are_those_of_the_network_on_every_instruction_set() {
+    let model = model_on("husky", Isa::available()[0]);
+    let (vehicle, network) = (model.vehicle(), &model.weights().expect("weights").network);
+    for isa in Isa::available() {
+        let kernel = Kernel::new(network, (anchor::STATIC, anchor::DYNAMIC), isa);
+        let count = vehicle.surfaces.len();
+        let mut numbers = Numbers::new(29);
+        let fixed: Vec<[f32; anchor::STATIC]> =
+            (0..count).map(|_| [(); anchor::STATIC].map(|()| numbers.between(-1.0, 1.0))).collect();
+        let statics = kernel.static_rows(&fixed);
+        let (mut buffers, mut slopes) = (Buffers::new(count), SlopeBuffers::new(count));
+        for _ in 0..20 {
+            let global = [(); anchor::GLOBAL].map(|()| numbers.between(-2.0, 2.0));
+            let of_global =
+                [(); anchor::GLOBAL].map(|()| [(); DIRECTIONS].map(|()| numbers.between(-2.0, 2.0)));
+            let wet: Vec<WetSurface> = (0..count)
+                .map(|surface| WetSurface {
+                    surface,
+                    dynamic: [(); MAX_DYNAMIC].map(|()| numbers.between(-1.0, 1.0)),
+                })
+                .collect();
+            let mut of_surface =
+                || [(); MAX_DYNAMIC].map(|()| [(); DIRECTIONS].map(|()| numbers.between(-1.0, 1.0)));
+            let of_wet: Vec<FeatureSlopes> = wet.iter().map(|_| of_surface()).collect();
+            kernel.forward(&global, &statics, &wet, &mut buffers);
+            let found = kernel.slopes((&of_global, &of_wet), &buffers, &mut slopes);
+            for ((surface, of_surface), found) in wet.iter().zip(&of_wet).zip(found) {
+                let fixed = fixed[surface.surface];
+                let joined = |fixed: [f32; anchor::STATIC],
+                              dynamic: [f32; MAX_DYNAMIC],
+                              global: [f32; anchor::GLOBAL]| {
+                    let all = fixed.into_iter().chain(dynamic).chain(global);
+                    all.map(f64::from).collect::<Vec<_>>()
+                };
+                let row = joined(fixed, surface.dynamic, global);
+                for k in 0..DIRECTIONS {
+                    let along = joined(
+                        [0.0; anchor::STATIC],
+                        of_surface.map(|slope| slope[k]),
+                        of_global.map(|slope| slope[k]),
+                    );
+                    let expected = plain_slopes(network, &row, &along);
+                    let size = expected.iter().map(|x| x.abs()).fold(0.0, f64::max);
+                    for (found, expected) in found.iter().map(|slope| slope[k]).zip(&expected) {
+                        let error = (f64::from(found) - expected).abs();
+                        assert!(error <= 1e-4 * size, "{}: {found} against {expected}", isa.name());
+                    }
+                }
+            }
+        }
     }
 }

@@ -14,6 +14,7 @@ mod closed_forms;
 mod effects_bundle;
 mod effects_served;
 mod hydrostatics;
+mod jacobian;
 mod kernel;
 mod kvlcc2;
 mod mesh;

@@ -20,11 +20,11 @@ use crate::release::{Release, turns};
 
 const STATES: usize = 100_000;
 
-struct Subject {
-    vehicle: Vehicle,
-    base: Base,
+pub struct Subject {
+    pub vehicle: Vehicle,
+    pub base: Base,
     /// Weights and base, of what is shipped.
-    model: Option<Model>,
+    pub model: Option<Model>,
 }
 
 /// Room for answers.
@@ -35,7 +35,7 @@ struct Answer {
     workspace: Workspace,
 }
 
-fn subjects() -> &'static [Subject] {
+pub fn subjects() -> &'static [Subject] {
     static ALL: std::sync::OnceLock<Vec<Subject>> = std::sync::OnceLock::new();
     ALL.get_or_init(|| {
         let subject = |vehicle: Vehicle| {
@@ -63,7 +63,7 @@ impl Subject {
     }
 
     /// A state anywhere, wet in most cases.
-    fn random(&self, random: &mut Random) -> Condition {
+    pub fn random(&self, random: &mut Random) -> Condition {
         let up = random.direction();
         let half = 0.5 * self.size();
         let density = 1000.0 + 900.0 * random.unit();

@@ -188,7 +188,7 @@ fn inputs(state: &Known, prepared: &Prepared, form: &Anchored) -> Vec<f32> {
     let global = form.standardize(&state.reading.global);
     let mut inputs = Vec::with_capacity(SIZES.inputs * prepared.fixed.len());
     for (surface, fixed) in state.reading.surfaces.iter().zip(&prepared.fixed) {
-        inputs.extend(fixed.iter().chain(&surface.dynamic).chain(&global));
+        inputs.extend(fixed.iter().chain(&surface.told()).chain(&global));
     }
     inputs
 }

@@ -1,0 +1,206 @@
+//! The derivatives of the wrench are those of the wrench, in random states of the whole space.
+
+use nalgebra::{SVector, UnitQuaternion, UnitVector3};
+use wade_core::condition::{Condition, GroundContact};
+use wade_core::forces::Forces;
+use wade_core::frame::Vec3;
+use wade_core::model::{COLUMNS, Jacobian, JacobianWorkspace, Model, Workspace};
+use wade_core::physics::{BaseLoads, Memory, Motion, Physics, STATED_NONE};
+use wade_core::vehicle::MAX_SURFACES;
+
+use crate::physics::{Subject, subjects};
+use crate::random::Random;
+
+const STATES: usize = 100;
+/// Steps of the differences in the unit of each column.
+const STEP: f64 = 1e-5;
+
+/// The state a step along a column further.
+fn stepped(state: &Condition, z0: f64, column: usize, step: f64) -> Condition {
+    let level = state.water_plane(z0).offset;
+    let mut next = Condition { water_level: Some(level), ..*state };
+    match column {
+        0..3 => {
+            next.velocity[column] += step;
+            next.ground_velocity[column] += step;
+        }
+        3..6 => next.angular_velocity[column - 3] += step,
+        6 => next.water_level = Some(level + step),
+        7..10 => {
+            let turn = UnitQuaternion::from_scaled_axis(Vec3::ith(column - 7, step));
+            next.up = UnitVector3::new_normalize(turn.inverse() * state.up.into_inner());
+        }
+        _ => next.density += step,
+    }
+    next
+}
+
+struct Asked<'a> {
+    model: &'a Model,
+    motion: Motion<'a>,
+    memory: Option<Memory>,
+    workspace: Workspace,
+    forces: Forces,
+}
+
+impl<'a> Asked<'a> {
+    fn of(model: &'a Model, motion: Motion<'a>) -> Self {
+        Self { model, motion, memory: None, workspace: Workspace::new(), forces: Forces::default() }
+    }
+
+    /// Force, and moment over the length of the hull.
+    fn wrench(&mut self, state: &Condition) -> SVector<f64, 6> {
+        let mut memory = self.memory;
+        self.model.evaluate_moving(
+            state,
+            (&self.motion, memory.as_mut()),
+            &mut self.workspace,
+            &mut self.forces,
+        );
+        let (f, m) =
+            (self.forces.wrench.force, self.forces.wrench.moment / self.model.vehicle().dimensions.length);
+        SVector::<f64, 6>::from([f.x, f.y, f.z, m.x, m.y, m.z])
+    }
+
+    fn jacobian(&mut self, state: &Condition, slopes: &mut JacobianWorkspace) -> Jacobian {
+        let mut memory = self.memory;
+        let asked = (&self.motion, memory.as_mut());
+        let room = (&mut self.workspace, slopes);
+        self.model.evaluate_with_jacobian(state, asked, room, &mut self.forces).expect("a base")
+    }
+
+    fn difference(&mut self, state: &Condition, column: usize, step: f64) -> SVector<f64, 6> {
+        let z0 = self.model.vehicle().z0;
+        let [ahead, behind] = [step, -step].map(|step| self.wrench(&stepped(state, z0, column, step)));
+        (ahead - behind) / (2.0 * step)
+    }
+}
+
+/// Errors of the columns over the size of the derivative, rising, of those whose differences of two steps agree, and the share of
+/// the others.
+fn errors(subject: &Subject, asked: &mut Asked<'_>, dry_contact: bool) -> (Vec<f64>, f64) {
+    let mut random = Random::new(5);
+    let mut workspace = JacobianWorkspace::new();
+    let (mut errors, mut kinks) = (Vec::new(), 0.0);
+    for _ in 0..STATES {
+        let state = Condition {
+            acceleration: random.direction() * 3.0,
+            angular_acceleration: random.direction() * 3.0,
+            ground_contact: if dry_contact { GroundContact::Dry } else { GroundContact::Wetted },
+            ..subject.random(&mut random)
+        };
+        let jacobian = asked.jacobian(&state, &mut workspace);
+        let size = asked.wrench(&state).norm();
+        for column in 0..COLUMNS {
+            // the others change by a few units, density by hundreds
+            let step = if column == 10 { 100.0 * STEP } else { STEP };
+            let [coarse, fine] = [step, 0.5 * step].map(|step| asked.difference(&state, column, step));
+            let mut found = jacobian.column(column).into_owned();
+            found.fixed_rows_mut::<3>(3).unscale_mut(subject.vehicle.dimensions.length);
+            let rounding = 1e-13 * size / step;
+            if (coarse - fine).norm() > 1e-5 * fine.norm() + rounding {
+                kinks += 1.0;
+            } else {
+                errors.push(((found - fine).norm() - rounding).max(0.0) / (fine.norm() + 1e-6 * size));
+            }
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    (errors, kinks / (STATES * COLUMNS) as f64)
+}
+
+fn check(subject: &Subject, motion: Motion<'_>, memory: Option<Memory>, dry_contact: bool) {
+    let model = Model::of_physics(subject.vehicle.clone(), 1, subject.base.clone());
+    let mut asked = Asked { memory, ..Asked::of(&model, motion) };
+    let (errors, kinks) = errors(subject, &mut asked, dry_contact);
+    let (worst, name) = (errors[errors.len() - 1], &subject.vehicle.name);
+    println!("{name}: worst of {} {worst:.1e}, {:.2} % at kinks", errors.len(), 100.0 * kinks);
+    assert!(worst < 1e-4 && kinks < 0.02, "{name}: {worst:e}, {kinks} at kinks");
+}
+
+const ALONE: Motion<'_> =
+    Motion { wheel_speeds: &STATED_NONE, time_step: 0.0, implicit_added_mass: false, physics: Physics::Full };
+
+#[test]
+fn derivatives_of_the_base_are_those_of_its_loads() {
+    for subject in subjects() {
+        for physics in [Physics::Hydrostatic, Physics::QuasiSteady, Physics::Full] {
+            check(subject, Motion { physics, ..ALONE }, None, false);
+        }
+        check(subject, Motion { implicit_added_mass: true, ..ALONE }, None, true);
+    }
+}
+
+#[test]
+fn derivatives_with_wheels_and_tracks_that_turn_are_those_of_the_loads() {
+    let mut random = Random::new(11);
+    let speeds: [f64; MAX_SURFACES] = std::array::from_fn(|_| 40.0 * random.unit() - 20.0);
+    for subject in subjects() {
+        check(subject, Motion { wheel_speeds: &speeds, ..ALONE }, None, false);
+    }
+}
+
+/// A session some steps into a motion.
+fn remembered(subject: &Subject, begun: Memory) -> Memory {
+    let (mut memory, mut loads) = (begun, BaseLoads::default());
+    let mut random = Random::new(17);
+    for _ in 0..20 {
+        let state = Condition { up: Vec3::z_axis(), ..subject.random(&mut random) };
+        let motion = Motion { time_step: 0.05, ..ALONE };
+        subject.base.evaluate(&state, &motion, Some(&mut memory), &mut loads);
+    }
+    memory
+}
+
+#[test]
+fn derivatives_in_a_session_are_those_of_the_next_load() {
+    for subject in subjects() {
+        for begun in [Memory::default(), Memory::of_recording()] {
+            let memory = remembered(subject, begun);
+            for implicit_added_mass in [false, true] {
+                check(subject, Motion { time_step: 0.01, implicit_added_mass, ..ALONE }, Some(memory), false);
+            }
+        }
+    }
+}
+
+/// The network computes in single precision, so differences have a long step and see its switches.
+#[test]
+fn derivatives_with_weights_are_those_of_the_wrench() {
+    for subject in subjects() {
+        let Some(model) = &subject.model else { continue };
+        let base = Model::of_physics(subject.vehicle.clone(), 1, subject.base.clone());
+        let [mut asked, mut of_base] = [model, &base].map(|model| Asked::of(model, ALONE));
+        let mut random = Random::new(23);
+        let mut workspace = JacobianWorkspace::new();
+        let (mut errors, mut learned) = (Vec::new(), 0);
+        while learned < STATES {
+            let (sine, cosine) = (std::f64::consts::TAU * random.unit()).sin_cos();
+            let velocity = Vec3::new(cosine, sine, 0.0) * (0.5 + 2.5 * random.unit());
+            let depth = subject.vehicle.dimensions.height * (0.2 + 0.5 * random.unit());
+            let tilt = random.direction() * (0.1 * random.unit());
+            let state = Condition {
+                up: UnitVector3::new_normalize(Vec3::z() + tilt),
+                angular_velocity: random.direction() * 0.2,
+                ..Condition::level(velocity, depth)
+            };
+            let [found, without] =
+                [&mut asked, &mut of_base].map(|asked| asked.jacobian(&state, &mut workspace));
+            if (found - without).norm() < 1e-3 * without.norm() {
+                continue;
+            }
+            learned += 1;
+            for column in 0..COLUMNS {
+                let step = if column == 10 { 1.0 } else { 1e-3 };
+                let difference = asked.difference(&state, column, step);
+                let mut found = found.column(column).into_owned();
+                found.fixed_rows_mut::<3>(3).unscale_mut(subject.vehicle.dimensions.length);
+                errors.push((found - difference).norm() / difference.norm());
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        let [median, most] = [0.5, 0.95].map(|share| errors[(errors.len() as f64 * share) as usize]);
+        println!("{}: median {median:.1e}, 95 % below {most:.1e}", subject.vehicle.name);
+        assert!(median < 2e-3 && most < 5e-2, "{}: {median:e} {most:e}", subject.vehicle.name);
+    }
+}
