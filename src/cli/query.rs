@@ -10,7 +10,7 @@ use wade::service::answer::Answer;
 use wade::service::grpc;
 use wade_client::{Address, Client, GrpcClient, InProcess, Method, Reply, ShmClient};
 use wade_core::domain::Domain;
-use wade_core::model::Model;
+use wade_core::model::{COLUMNS, Model};
 use wade_wire::proto::EvaluateResponse;
 use wade_wire::shm::{NAMESPACE, Wait};
 
@@ -168,6 +168,21 @@ impl Query {
     }
 }
 
+/// Columns of the derivatives; turns are those about the body's axes.
+const DERIVED: [(&str, &str); COLUMNS] = [
+    ("vx", "m/s"),
+    ("vy", "m/s"),
+    ("vz", "m/s"),
+    ("wx", "rad/s"),
+    ("wy", "rad/s"),
+    ("wz", "rad/s"),
+    ("level", "m"),
+    ("turn x", "rad"),
+    ("turn y", "rad"),
+    ("turn z", "rad"),
+    ("rho", "kg/m3"),
+];
+
 fn to_table(vehicle: &str, about: &About, reply: &Reply) -> String {
     use std::fmt::Write;
     let mut text = String::new();
@@ -195,6 +210,17 @@ fn to_table(vehicle: &str, about: &About, reply: &Reply) -> String {
     let outside: Vec<&str> = reply.outside.iter().map(|(quantity, _)| quantity.words()).collect();
     if !outside.is_empty() {
         line(format!("OUTSIDE the training domain: {}", outside.join(", ")));
+    }
+    if let Some(jacobian) = &reply.jacobian {
+        line(format!(
+            "{:<6} {}",
+            "d/d",
+            DERIVED.map(|(name, unit)| format!("{:>10}", format!("{name} [{unit}]"))).join(" ")
+        ));
+        for (row, name) in jacobian.as_chunks::<COLUMNS>().0.iter().zip(["Fx", "Fy", "Fz", "Mx", "My", "Mz"])
+        {
+            line(format!("{name:<6} {}", row.map(|x| format!("{x:>10.4}")).join(" ")));
+        }
     }
     line(format!("computed in {:.1} us", reply.compute_ns as f64 * 1e-3));
     text

@@ -68,6 +68,9 @@ pub struct StateArgs {
     /// Leave the force of added mass out, for a caller who integrates with the matrix
     #[arg(long)]
     implicit_added_mass: bool,
+    /// Answer with the derivatives of force and moment by velocity, angular velocity, water level, attitude and density
+    #[arg(long)]
+    jacobian: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -140,6 +143,7 @@ impl StateArgs {
             time_step: 0.0,
             implicit_added_mass: self.implicit_added_mass,
             physics: self.physics.map(Physics::from),
+            jacobian: self.jacobian,
         }
     }
 }

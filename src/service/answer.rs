@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use wade_core::domain::Quantity;
 use wade_core::effects::{BoxQuantity, Effect, LeftOut};
+use wade_core::model::COLUMNS;
 use wade_wire::proto;
 
 /// The forces in one state, ready to be written.
@@ -25,6 +26,9 @@ pub struct Answer {
     effects_outside: Vec<Outside>,
     /// 6 rows of 6, forces first; none where no effect adds mass.
     added_mass: Option<Vec<[f32; 6]>>,
+    /// 6 rows of 11, forces first, where asked for: with velocity, angular velocity, water level, attitude and density.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    jacobian: Option<Vec<[f32; COLUMNS]>>,
     compute_ns: u64,
     bundle_version: u32,
     surface_force_n: Vec<f32>,
@@ -150,6 +154,7 @@ impl Answer {
                 })
                 .collect(),
             added_mass: Some(response.added_mass.as_chunks::<6>().0.to_vec()).filter(|rows| rows.len() == 6),
+            jacobian: Some(response.jacobian.as_chunks().0.to_vec()).filter(|rows| rows.len() == 6),
             compute_ns: response.compute_ns,
             bundle_version: response.bundle_version,
             uncertainty_n: uncertainty.into(),

@@ -277,6 +277,7 @@ impl Drawn {
             time_step: self.time_step.into(),
             implicit_added_mass: false,
             physics: None,
+            jacobian: false,
         }
     }
 }

@@ -23,6 +23,7 @@ mod http;
 mod import;
 mod inference;
 mod install;
+mod jacobian;
 mod page;
 mod reload;
 mod shipped_weights;

@@ -32,7 +32,18 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
     (
         "crates/wade-core/src",
         &[
-            &["at", "condition", "digest", "domain", "forces", "frame", "lanes", "named_enum", "real", "wrench"],
+            &[
+                "at",
+                "condition",
+                "digest",
+                "domain",
+                "forces",
+                "frame",
+                "lanes",
+                "named_enum",
+                "real",
+                "wrench",
+            ],
             &["geometry", "vehicle"],
             &["features", "physics"],
             &["analytic", "anchor", "effects"],

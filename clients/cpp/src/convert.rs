@@ -65,6 +65,7 @@ impl From<&WadeState> for State {
             time_step: state.time_step_s,
             implicit_added_mass: has(WADE_IMPLICIT_ADDED_MASS),
             physics: PHYSICS.into_iter().find(|(flag, _)| has(*flag)).map(|(_, physics)| physics),
+            jacobian: false,
         }
     }
 }

@@ -34,11 +34,11 @@ class Vehicle:
     def about_m(self) -> tuple[float, float, float]: ...
     @property
     def effects(self) -> list[int]: ...
-    def columns(self, surfaces: bool) -> list[tuple[str, str, tuple[int, ...]]]:
+    def columns(self, surfaces: bool, jacobian: bool) -> list[tuple[str, str, tuple[int, ...]]]:
         """Name, numpy type and shape of each column of an answer, in order and without gaps."""
 
     def evaluate(self, numbers: list[float], flags: int, session: int) -> bytes:
-        """The answer to a state: one row of `columns(True)`."""
+        """The answer to a state: one row of `columns(True, jacobian)`, with derivatives where the flags ask."""
 
     def evaluate_batch(self, numbers: bytes, flags: int, sessions: bytes, surfaces: bool) -> bytes:
         """The answers to N rows of single-precision numbers; `sessions` has a word of 8 bytes for each, or none."""

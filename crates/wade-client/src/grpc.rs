@@ -10,9 +10,9 @@ use super::grpc_link::GrpcLink;
 use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply, nobody_at};
 use wade_core::domain::{Domain, Outside, Quantity, Range};
 use wade_core::effects::{BoxQuantity, Effect, LeftOut, OutsideBox};
-use wade_wire::State;
 use wade_wire::proto;
 use wade_wire::proto::admin_client::AdminClient;
+use wade_wire::{DERIVATIVES, State};
 
 /// How single queries are sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,6 +143,7 @@ pub(super) fn message(state: &State) -> proto::State {
         time_step_s: state.time_step,
         implicit_added_mass: state.implicit_added_mass,
         physics: state.physics.map_or(0, |physics| physics as i32),
+        jacobian: state.jacobian,
     }
 }
 
@@ -154,7 +155,7 @@ fn ground_contact(state: &State) -> proto::GroundContact {
 pub(super) fn shared(state: &State) -> impl PartialEq + use<> {
     let State { heading, depth_rate, wheel_speeds, physics, .. } = state;
     let given = (heading.is_some(), depth_rate.is_some(), wheel_speeds.map(|speeds| speeds.len()));
-    (state.dry_contact, state.implicit_added_mass, *physics, given)
+    (state.dry_contact, state.implicit_added_mass, state.jacobian, *physics, given)
 }
 
 pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateBatchRequest {
@@ -184,6 +185,7 @@ pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateB
             .collect(),
         implicit_added_mass: states.first().is_some_and(|s| s.implicit_added_mass),
         physics: states.first().and_then(|s| s.physics).map_or(0, |physics| physics as i32),
+        jacobian: states.first().is_some_and(|s| s.jacobian),
     }
 }
 
@@ -220,6 +222,7 @@ impl From<proto::EvaluateResponse> for Reply {
             effect_surface_forces: response.effect_surface_force_n.as_chunks::<3>().0.to_vec(),
             effects_outside: outside_box(response.effects_outside.iter()),
             added_mass: response.added_mass.as_slice().try_into().ok(),
+            jacobian: response.jacobian.as_slice().try_into().ok(),
             compute_ns: response.compute_ns,
         }
     }
@@ -275,6 +278,7 @@ impl From<&Reply> for proto::EvaluateResponse {
                 })
                 .collect(),
             added_mass: reply.added_mass.map_or_else(Vec::new, Vec::from),
+            jacobian: reply.jacobian.map_or_else(Vec::new, Vec::from),
         }
     }
 }
@@ -322,6 +326,7 @@ pub fn replies(response: proto::EvaluateBatchResponse) -> Vec<Reply> {
                 response.effects_outside.iter().filter(|outside| outside.index as usize == i),
             ),
             added_mass: response.added_mass.as_chunks::<36>().0.get(i).copied(),
+            jacobian: response.jacobian.as_chunks::<DERIVATIVES>().0.get(i).copied(),
             compute_ns: response.compute_ns,
         }
     };

@@ -20,8 +20,8 @@ use wade_core::domain::Outside;
 use wade_core::effects::{Effect, LeftOut, OutsideBox};
 use wade_core::served::{ServedVehicle, Session};
 use wade_wire::State;
+use wade_wire::{DERIVATIVES, added_mass, by_rows, derivatives, single};
 use wade_wire::{Evaluated, Evaluator};
-use wade_wire::{added_mass, by_rows, single};
 
 /// Nobody answers at a URL, for what an error and its causes say: each reason once, since some repeat their source.
 fn nobody_at(url: &str, error: &dyn std::error::Error) -> ClientError {
@@ -107,13 +107,15 @@ pub struct Reply {
     pub effects_outside: OutsideBox,
     /// Added mass and inertia by rows, forces first [kg, kg m, kg m2], of base and effects together.
     pub added_mass: Option<[f32; 36]>,
+    /// Derivatives of force and moment by rows, where they were asked for: see [`Jacobian`](wade_core::model::Jacobian).
+    pub jacobian: Option<[f32; DERIVATIVES]>,
     /// The server's own time [ns].
     pub compute_ns: u64,
 }
 
 impl Reply {
     fn new(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> Self {
-        let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
+        let (model, Evaluated { forces, effects, jacobian, compute_ns }) = (vehicle.model(), evaluated);
         let surface = |load: &wade_core::forces::SurfaceForce| SurfaceReply {
             force: single(&load.force),
             point: single(&load.point),
@@ -142,6 +144,7 @@ impl Reply {
             effect_surface_forces: effects.surface_forces.iter().map(single).collect(),
             effects_outside: effects.outside.map(|excess| f64::from(excess as f32)),
             added_mass: added_mass(effects),
+            jacobian: jacobian.map(derivatives),
             compute_ns: *compute_ns,
         }
     }

@@ -170,6 +170,8 @@ impl From<&Answer> for Reply {
             },
             effects_outside: answer.effects_outside(),
             added_mass: (answer.flags & HAS_ADDED_MASS != 0).then_some(answer.added_mass),
+            // the page of an answer has no room for them
+            jacobian: None,
             compute_ns: answer.compute_ns,
         }
     }

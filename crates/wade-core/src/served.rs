@@ -3,7 +3,7 @@
 use crate::condition::Condition;
 use crate::effects::{ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, EffectsSession};
 use crate::forces::Forces;
-use crate::model::{Form, Model, Workspace};
+use crate::model::{Form, Jacobian, JacobianWorkspace, Model, Workspace};
 use crate::physics::{Memory, Motion, Physics};
 
 /// What a served vehicle answers. Reused from query to query.
@@ -13,10 +13,14 @@ pub struct Loads {
     pub forces: Forces,
     /// The loads of the effects.
     pub effects: EffectLoads,
+    /// Derivatives of the net wrench where they were asked for; none of a vehicle that has none ([`ServedVehicle::has_jacobian`]).
+    pub jacobian: Option<Jacobian>,
     /// The model at the edge of the box of the effects.
     edge: Forces,
     /// Buffers of the model.
     workspace: Workspace,
+    /// Buffers of its derivatives.
+    slopes: JacobianWorkspace,
 }
 
 /// What lasts from state to state: waves of the base, and the memory of effects. Starts at rest and dry.
@@ -78,6 +82,12 @@ impl ServedVehicle {
         self.effects.as_ref().map(ActiveEffects::file)
     }
 
+    /// Whether the derivatives of its wrench are known: those of the physical base and of the weights on it are, those of effects
+    /// are not.
+    pub fn has_jacobian(&self) -> bool {
+        self.model.base().is_some() && self.effects.is_none()
+    }
+
     /// Forces and moments in a state. Allocates nothing. Effects with a memory live in `session`; without one they are left
     /// out, and their loads say so.
     pub fn evaluate(
@@ -87,7 +97,7 @@ impl ServedVehicle {
         session: Option<&mut Session>,
         loads: &mut Loads,
     ) {
-        let Loads { forces, effects: added, edge, workspace } = loads;
+        let Loads { forces, effects: added, jacobian, edge, workspace, slopes } = loads;
         let condition = &condition.resolved(self.model.vehicle().z0);
         let (memory, session) = match session {
             Some(session) => {
@@ -103,7 +113,13 @@ impl ServedVehicle {
             implicit_added_mass: circumstances.implicit_added_mass,
             physics: circumstances.physics.unwrap_or(self.physics),
         };
-        self.model.evaluate_moving(condition, (&motion, memory), workspace, forces);
+        *jacobian = None;
+        if circumstances.jacobian && self.has_jacobian() {
+            let room = (&mut *workspace, slopes);
+            *jacobian = self.model.evaluate_with_jacobian(condition, (&motion, memory), room, forces);
+        } else {
+            self.model.evaluate_moving(condition, (&motion, memory), workspace, forces);
+        }
         match &self.effects {
             Some(effects) => {
                 // the wet parts of an anchored model are not those of the samples, with which effects are fitted

@@ -6,6 +6,7 @@ use wade_core::domain::{Domain, Outside, Quantity};
 use wade_core::effects::{self, BoxQuantity, EffectLoads, EffectsFile, OutsideBox};
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
+use wade_core::model::{COLUMNS, Jacobian};
 use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
 use wade_core::vehicle::{MAX_WHEELS, PerWheel, Surface, SurfaceKind};
@@ -14,6 +15,9 @@ use super::evaluator::Evaluated;
 use super::proto::{self, state::Attitude};
 use super::refusal::Refusal;
 use super::state::{Field, InvalidState, Problem, State, UNIT_TOLERANCE, scalar};
+
+/// Numbers of a Jacobian.
+pub const DERIVATIVES: usize = 6 * COLUMNS;
 
 /// The state of a single request to a vehicle.
 pub fn state(message: &proto::State, vehicle: &ServedVehicle) -> Result<State, InvalidState> {
@@ -44,6 +48,7 @@ pub fn state(message: &proto::State, vehicle: &ServedVehicle) -> Result<State, I
         time_step: message.time_step_s,
         implicit_added_mass: message.implicit_added_mass,
         physics: physics(message.physics)?,
+        jacobian: message.jacobian,
     })
 }
 
@@ -149,6 +154,7 @@ pub fn batch(
         time_step: 0.0,
         implicit_added_mass: message.implicit_added_mass,
         physics,
+        jacobian: message.jacobian,
     };
     Ok((0..len).map(state).collect())
 }
@@ -216,7 +222,7 @@ fn vector3(vector: &Vec3) -> proto::Vector3 {
 
 /// The answer to a single request.
 pub fn response(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> proto::EvaluateResponse {
-    let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
+    let (model, Evaluated { forces, effects, jacobian, compute_ns }) = (vehicle.model(), evaluated);
     let mut response = proto::EvaluateResponse {
         wrench: Some(proto::Wrench {
             force_n: Some(vector3(&forces.wrench.force)),
@@ -235,6 +241,7 @@ pub fn response(vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) -> proto::Ev
         effect_surface_force_n: effects.surface_forces.iter().flat_map(single).collect(),
         effects_outside: outside_box(&effects.outside, 0).collect(),
         added_mass: added_mass(effects).into_iter().flatten().collect(),
+        jacobian: jacobian.iter().flat_map(|jacobian| derivatives(jacobian)).collect(),
         ..Default::default()
     };
     reserve_surfaces(&mut response, model.vehicle().surfaces.len());
@@ -257,6 +264,11 @@ fn base(base: &wade_core::forces::Base) -> proto::BaseAnswer {
 /// A matrix by rows, in the wire's precision.
 pub fn by_rows(matrix: &Matrix6<f64>) -> [f32; 36] {
     std::array::from_fn(|i| matrix[(i / 6, i % 6)] as f32)
+}
+
+/// Derivatives by rows, in the wire's precision.
+pub fn derivatives(jacobian: &Jacobian) -> [f32; DERIVATIVES] {
+    std::array::from_fn(|i| jacobian[(i / COLUMNS, i % COLUMNS)] as f32)
 }
 
 fn effect_load(load: &effects::EffectLoad) -> proto::EffectLoad {
@@ -343,7 +355,7 @@ pub fn push(
     index: u32,
     with_surfaces: bool,
 ) {
-    let Evaluated { forces, effects, compute_ns } = evaluated;
+    let Evaluated { forces, effects, jacobian, compute_ns } = evaluated;
     response.compute_ns += compute_ns;
     response.force_n.extend(single(&forces.wrench.force));
     response.moment_nm.extend(single(&forces.wrench.moment));
@@ -358,6 +370,7 @@ pub fn push(
     }
     response.effects_outside.extend(outside_box(&effects.outside, index));
     response.added_mass.extend(added_mass(effects).into_iter().flatten());
+    response.jacobian.extend(jacobian.iter().flat_map(|jacobian| derivatives(jacobian)));
     if with_surfaces {
         let (force, point) = (&mut response.surface_force_n, &mut response.surface_point_m);
         push_surfaces(forces, force, point, &mut response.wetted_fraction);

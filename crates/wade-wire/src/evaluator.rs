@@ -5,6 +5,7 @@ use std::time::Instant;
 use super::state::CheckedState;
 use wade_core::effects::EffectLoads;
 use wade_core::forces::Forces;
+use wade_core::model::Jacobian;
 use wade_core::served::{Loads, ServedVehicle, Session};
 
 /// What every transport does between its checks and its answer. Owned by one thread.
@@ -20,6 +21,8 @@ pub struct Evaluated<'e> {
     pub forces: &'e Forces,
     /// The share of the effects.
     pub effects: &'e EffectLoads,
+    /// Derivatives of the net wrench, where they were asked for.
+    pub jacobian: Option<&'e Jacobian>,
     /// Time from the checked state to the forces [ns].
     pub compute_ns: u64,
 }
@@ -34,8 +37,8 @@ impl Evaluator {
     ) -> Evaluated<'_> {
         let start = Instant::now();
         vehicle.evaluate(state.condition(), state.circumstances(), session, &mut self.loads);
-        let Loads { forces, effects, .. } = &self.loads;
-        Evaluated { forces, effects, compute_ns: nanoseconds_since(start) }
+        let Loads { forces, effects, jacobian, .. } = &self.loads;
+        Evaluated { forces, effects, jacobian: jacobian.as_ref(), compute_ns: nanoseconds_since(start) }
     }
 }
 

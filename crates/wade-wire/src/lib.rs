@@ -11,7 +11,8 @@ mod state;
 mod tensor_fault;
 
 pub use convert::{
-    added_mass, batch, batch_response, by_rows, push, response, single, state, summary, vehicle,
+    DERIVATIVES, added_mass, batch, batch_response, by_rows, derivatives, push, response, single, state,
+    summary, vehicle,
 };
 pub use evaluator::{Evaluated, Evaluator, nanoseconds_since};
 pub use refusal::{Overloaded, Refusal, UnknownVehicle};

@@ -48,6 +48,8 @@ pub struct State {
     pub implicit_added_mass: bool,
     /// How much of the physical base answers; by default as the server is set.
     pub physics: Option<Physics>,
+    /// The derivatives of the wrench are asked for.
+    pub jacobian: bool,
 }
 
 impl Default for State {
@@ -71,6 +73,7 @@ impl Default for State {
             time_step: 0.0,
             implicit_added_mass: false,
             physics: None,
+            jacobian: false,
         }
     }
 }
@@ -122,6 +125,8 @@ wade_core::named_enum! {
         Flags = 20 => "flags",
         /// `physics`
         Physics = 21 => "physics",
+        /// `jacobian`
+        Jacobian = 22 => "jacobian",
     }
 }
 
@@ -212,6 +217,17 @@ impl InvalidState {
         Self::wheels(given, wheels.len(), &names.join(", "))
     }
 
+    /// Derivatives of a vehicle that has none.
+    fn no_jacobian(vehicle: &ServedVehicle) -> Self {
+        let name = &vehicle.model().vehicle().name;
+        let lacks = match vehicle.model().base() {
+            None => "its bundle is from before the physical base, which they are of",
+            Some(_) => "its bundle carries effects, whose derivatives are not known; leave jacobian out",
+        };
+        let words = format!("jacobian is set, and {name} has no derivatives: {lacks}");
+        Self { words: Some(words.into()), ..Self::new(Field::Jacobian, Problem::Unsupported) }
+    }
+
     /// The same where the names of the wheels are not known; empty names are none.
     pub(crate) fn wheels(given: usize, wheels: usize, names: &str) -> Self {
         let field = Field::WheelSpeed;
@@ -283,7 +299,7 @@ pub fn limit(field: Field) -> f64 {
         Field::DepthRate | Field::WheelSpeed | Field::TimeStep => 1e3,
         Field::WaterLevel | Field::BedClearance | Field::Bed => 1e3,
         // these are refused whatever their value
-        Field::WheelWaterLevel | Field::Flags | Field::Physics => 1e3,
+        Field::WheelWaterLevel | Field::Flags | Field::Physics | Field::Jacobian => 1e3,
     }
 }
 
@@ -314,6 +330,9 @@ impl State {
 
     /// The state with every field checked for a vehicle, or the first field that is wrong.
     pub fn check_for(&self, vehicle: &ServedVehicle) -> Result<CheckedState, InvalidState> {
+        if self.jacobian && !vehicle.has_jacobian() {
+            return Err(InvalidState::no_jacobian(vehicle));
+        }
         match &self.wheel_speeds {
             Some(speeds)
                 if speeds.len() != vehicle.model().wheels().len()
@@ -346,6 +365,7 @@ impl State {
             time_step,
             implicit_added_mass: self.implicit_added_mass,
             physics: self.physics,
+            jacobian: self.jacobian,
         })
     }
 

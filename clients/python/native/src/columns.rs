@@ -3,9 +3,10 @@
 use wade_core::domain::Quantity;
 use wade_core::effects::{ActiveEffect, BoxQuantity, Effect};
 use wade_core::frame::Vec3;
+use wade_core::model::COLUMNS;
 use wade_core::served::ServedVehicle;
 use wade_core::wrench::Wrench;
-use wade_wire::{Evaluated, added_mass, by_rows, single};
+use wade_wire::{Evaluated, added_mass, by_rows, derivatives, single};
 
 /// One column of a row.
 pub struct Column {
@@ -27,7 +28,7 @@ pub fn effects(vehicle: &ServedVehicle) -> &[ActiveEffect] {
 }
 
 /// The columns of a row, in the order of [`push`].
-pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool) -> Vec<Column> {
+pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool, with_jacobian: bool) -> Vec<Column> {
     let surfaces = if with_surfaces { vehicle.model().vehicle().surfaces.len() } else { 0 };
     let effects = effects(vehicle);
     let (count, effect_surfaces) = (effects.len(), if effects.is_empty() { 0 } else { surfaces });
@@ -62,12 +63,15 @@ pub fn columns(vehicle: &ServedVehicle, with_surfaces: bool) -> Vec<Column> {
             ["water_level_m", "bed_clearance_m", "bed", "shaft_power_w"].map(|name| column(name, FLOAT, &[])),
         );
     }
+    if with_jacobian {
+        columns.push(column("jacobian", FLOAT, &[6, COLUMNS]));
+    }
     columns
 }
 
 /// Adds a row to others.
 pub fn push(rows: &mut Vec<u8>, evaluated: &Evaluated<'_>, begins: bool, with_surfaces: bool) {
-    let Evaluated { forces, effects, compute_ns } = evaluated;
+    let Evaluated { forces, effects, jacobian, compute_ns } = evaluated;
     let surfaces = if with_surfaces { &forces.surfaces[..] } else { &[] };
     rows.extend(compute_ns.to_le_bytes());
     rows.extend(u32::from(begins).to_le_bytes());
@@ -111,6 +115,7 @@ pub fn push(rows: &mut Vec<u8>, evaluated: &Evaluated<'_>, begins: bool, with_su
             [base.water_level, base.bed_clearance, base.bed, base.shaft_power].map(|x| x as f32),
         );
     }
+    push_floats(rows, jacobian.iter().flat_map(|jacobian| derivatives(jacobian)));
 }
 
 fn push_vector(rows: &mut Vec<u8>, vector: &Vec3) {

@@ -98,8 +98,13 @@ impl Vehicle {
         columns::effects(&self.served).iter().map(|effect| effect.effect().code()).collect()
     }
 
-    fn columns<'py>(&self, py: Python<'py>, surfaces: bool) -> PyResult<Vec<Bound<'py, PyTuple>>> {
-        let columns = columns::columns(&self.served, surfaces);
+    fn columns<'py>(
+        &self,
+        py: Python<'py>,
+        surfaces: bool,
+        jacobian: bool,
+    ) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+        let columns = columns::columns(&self.served, surfaces, jacobian);
         columns
             .into_iter()
             .map(|column| (column.name, column.kind, PyTuple::new(py, column.shape)?).into_pyobject(py))

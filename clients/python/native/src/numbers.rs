@@ -5,7 +5,7 @@ use wade_core::vehicle::{MAX_WHEELS, PerWheel};
 use wade_wire::State;
 use wade_wire::shm::layout::{
     DRY_CONTACT, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL,
-    HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, QUASI_STEADY,
+    HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, JACOBIAN, QUASI_STEADY,
 };
 
 /// Numbers of a state.
@@ -52,6 +52,7 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
             FULL => Some(Physics::Full),
             _ => None,
         },
+        jacobian: has(JACOBIAN),
     }
 }
 

@@ -125,6 +125,12 @@ class Forces:
     #: with the rates of the body components of the velocity of the center of mass and of the angular velocity. None
     #: of a bundle without the physical base or such an effect.
     added_mass: Array | None
+    #: Derivatives of the wrench about `about_m`, force first, `[6, 11]`: by the velocity over ground [m/s] in columns 0
+    #: to 2, the angular velocity [rad/s] in 3 to 5, the water level [m] in 6, the attitude [rad] in 7 to 9 and the
+    #: density [kg/m3] in 10, each with the others held. The attitude is a small turn of the body about its axes, which
+    #: leaves the body components of the motion and the water level as they are. None where `State.jacobian` did not ask
+    #: for them.
+    jacobian: Array | None
     #: Linear damping by waves about `about_m` [kg/s, kg m/s, kg m2/s], `[6, 6]`: the wrench is `-B nu`. Zero in a run
     #: of states, whose memory has it. None of a bundle without the physical base, as what follows.
     damping: Array | None

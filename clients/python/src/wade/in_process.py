@@ -58,7 +58,7 @@ class InProcess:
             answer = known.native.evaluate(numbers, flags(state), session)
         except self._native.InvalidState as invalid:
             raise InvalidState([Violation(*invalid.args)]) from None
-        return known.forces(np.frombuffer(answer, known.row)[0], _as_it_is)
+        return known.forces(np.frombuffer(answer, known.row(True, state.jacobian))[0], _as_it_is)
 
     def evaluate_batch(
         self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
@@ -83,7 +83,7 @@ class InProcess:
             answer = known.native.evaluate_batch(numbers.tobytes(), flags(states), sessions, surfaces)
         except self._native.InvalidState as invalid:
             raise InvalidState([Violation(*invalid.args)]) from None
-        return known.forces(np.frombuffer(answer, known.row if surfaces else known.net_row), np.ascontiguousarray)
+        return known.forces(np.frombuffer(answer, known.row(surfaces, states.jacobian)), np.ascontiguousarray)
 
     def stream(self, vehicle: str) -> SessionStream:
         """A stream of states of one vehicle: a run of its own, whose states need no session. As fast as a call."""
@@ -126,9 +126,8 @@ class _Vehicle:
     """A vehicle, and what all of its answers have in common."""
 
     native: wade_native.Vehicle
-    #: A state's answer, with and without the arrays per surface.
-    row: np.dtype[Any]
-    net_row: np.dtype[Any]
+    #: A state's answer: with the arrays per surface or without, and with derivatives or without.
+    rows: dict[tuple[bool, bool], np.dtype[Any]]
     has_added_mass: bool
     has_base: bool
     effects: tuple[Effect | int, ...]
@@ -138,20 +137,24 @@ class _Vehicle:
 
     @classmethod
     def of(cls, native: wade_native.Vehicle) -> _Vehicle:
-        row = np.dtype(native.columns(True))
+        kinds = [(surfaces, jacobian) for surfaces in (True, False) for jacobian in (True, False)]
+        rows = {kind: np.dtype(native.columns(*kind)) for kind in kinds}
+        names = rows[True, False].names or ()
         about = np.array(native.about_m, np.float32)
         about.flags.writeable = False
         return cls(
             native=native,
-            row=row,
-            net_row=np.dtype(native.columns(False)),
-            has_added_mass="added_mass" in (row.names or ()),
-            has_base="damping" in (row.names or ()),
+            rows=rows,
+            has_added_mass="added_mass" in names,
+            has_base="damping" in names,
             effects=tuple(named_effect(code) for code in native.effects),
             about_m=about,
             version=native.version,
             provenance=native.provenance,
         )
+
+    def row(self, surfaces: bool, jacobian: bool) -> np.dtype[Any]:
+        return self.rows[surfaces, jacobian]
 
     def forces(self, answer: Any, array: Callable[[Any], Any]) -> Forces:
         """A row, or N of them."""
@@ -177,6 +180,7 @@ class _Vehicle:
             effect_surface_force_n=array(answer["effect_surface_force_n"]),
             effects_outside=array(answer["effects_outside"]),
             added_mass=array(answer["added_mass"]) if self.has_added_mass else None,
+            jacobian=array(answer["jacobian"]) if "jacobian" in answer.dtype.names else None,
             damping=of_base("damping"),
             water_level_m=of_base("water_level_m"),
             bed_clearance_m=of_base("bed_clearance_m"),

@@ -21,6 +21,8 @@ def flags(state: State) -> int:
     flags = layout.DRY_CONTACT if state.ground_contact == GroundContact.DRY else 0
     if state.implicit_added_mass:
         flags |= layout.IMPLICIT_ADDED_MASS
+    if state.jacobian:
+        flags |= layout.JACOBIAN
     if state.heading_rad is not None:
         flags |= layout.HAS_HEADING
     if state.depth_rate_mps is not None:

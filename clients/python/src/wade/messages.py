@@ -115,6 +115,8 @@ def evaluate_request(vehicle: str, state: State) -> Message:
         message.time_step_s = values[TIME_STEP_AT]
     if state.implicit_added_mass:
         message.implicit_added_mass = True
+    if state.jacobian:
+        message.jacobian = True
     return request
 
 
@@ -134,6 +136,7 @@ def evaluate_batch_request(vehicle: str, states: State, surfaces: bool) -> tuple
         omit_surfaces=not surfaces,
         implicit_added_mass=states.implicit_added_mass,
         physics=states.physics or 0,
+        jacobian=states.jacobian,
         **arrays,
     )
     return request, states.length(rows)
@@ -191,6 +194,7 @@ def forces(response: Any, session_begins: bool = False) -> Forces:
         effect_surface_force_n=_floats(response.effect_surface_force_n, -1, 3),
         effects_outside=_outside(response.effects_outside, 1, len(BoxQuantity))[0],
         added_mass=_floats(response.added_mass, 6, 6) if response.added_mass else None,
+        jacobian=_floats(response.jacobian, 6, 11) if response.jacobian else None,
         damping=_floats(base.damping, 6, 6) if base else None,
         water_level_m=np.array(base.water_level_m, np.float32) if base else None,
         bed_clearance_m=np.array(base.bed_clearance_m, np.float32) if base else None,
@@ -233,6 +237,7 @@ def batch_forces(response: Any, length: int) -> Forces:
         effect_surface_force_n=moved,
         effects_outside=_outside(response.effects_outside, length, len(BoxQuantity)),
         added_mass=_floats(response.added_mass, length, 6, 6) if response.added_mass else None,
+        jacobian=_floats(response.jacobian, length, 6, 11) if response.jacobian else None,
         damping=_floats(b"".join(one.damping for one in base), length, 6, 6) if base else None,
         water_level_m=of_base("water_level_m"),
         bed_clearance_m=of_base("bed_clearance_m"),

@@ -42,6 +42,8 @@ HAS_WHEEL_LEVELS = 256
 HYDROSTATIC = 512
 QUASI_STEADY = 1024
 FULL = 2048
+#: Flag of a query: the derivatives are asked for, for which the pages of these services have no room.
+JACOBIAN = 4096
 #: Flag of an answer: the server polls, so that waking it is of no use.
 SERVER_POLLS = 1
 #: Flag of an answer: the session begins with this query.

@@ -34,6 +34,8 @@ pub struct Circumstances {
     pub implicit_added_mass: bool,
     /// How much of the physical base answers; by default as the vehicle is served.
     pub physics: Option<Physics>,
+    /// The derivatives of the wrench are asked for.
+    pub jacobian: bool,
 }
 
 /// What effects remember from state to state: waves and flooding. Starts at rest and dry.

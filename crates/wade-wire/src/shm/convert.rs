@@ -3,8 +3,8 @@
 use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, FULL, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE,
     HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_SHAFT_POWER, HAS_WATER_LEVEL, HAS_WHEEL_COUNT,
-    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS,
-    PROVENANCE_LEN, QUASI_STEADY, Query, Status, SurfaceAnswer,
+    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, JACOBIAN, MAX_BATCH, MAX_EFFECTS,
+    MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, Status, SurfaceAnswer,
 };
 use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, by_rows, single};
 use wade_core::domain::{Outside, Quantity};
@@ -25,7 +25,8 @@ const QUERY_FLAGS: u64 = DRY_CONTACT
     | HAS_WHEEL_LEVELS
     | HYDROSTATIC
     | QUASI_STEADY
-    | FULL;
+    | FULL
+    | JACOBIAN;
 
 impl Query {
     /// The state, or what it sets that cannot be used. Its values are not checked yet.
@@ -35,6 +36,9 @@ impl Query {
         }
         if self.has(HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m)? {
             return Err(InvalidState::new(Field::WheelWaterLevel, Problem::Unsupported));
+        }
+        if self.flags & JACOBIAN != 0 {
+            return Err(InvalidState::new(Field::Jacobian, Problem::Unsupported));
         }
         let optional = |flag: u64, field: Field, value: f32| {
             Ok::<_, InvalidState>(self.has(flag, field, &[value])?.then_some(value))
@@ -70,6 +74,7 @@ impl Query {
                 FULL => Some(Physics::Full),
                 _ => return Err(InvalidState::new(Field::Physics, Problem::Unknown)),
             },
+            jacobian: false,
         })
     }
 
@@ -100,6 +105,7 @@ impl From<&State> for Query {
         Self {
             flags: flag(state.dry_contact, DRY_CONTACT)
                 | flag(state.implicit_added_mass, IMPLICIT_ADDED_MASS)
+                | flag(state.jacobian, JACOBIAN)
                 | flag(state.heading.is_some(), HAS_HEADING)
                 | flag(state.depth_rate.is_some(), HAS_DEPTH_RATE)
                 | flag(state.wheel_speeds.is_some(), HAS_WHEEL_SPEEDS)
@@ -134,7 +140,7 @@ impl From<&State> for Query {
 impl Answer {
     /// Becomes the forces of a vehicle, in place: an answer is too large to be handed around.
     pub fn fill(&mut self, vehicle: &ServedVehicle, evaluated: &Evaluated<'_>) {
-        let (model, Evaluated { forces, effects, compute_ns }) = (vehicle.model(), evaluated);
+        let (model, Evaluated { forces, effects, compute_ns, .. }) = (vehicle.model(), evaluated);
         *self = Self::UNSET;
         self.count_wheels(vehicle);
         self.compute_ns = *compute_ns;

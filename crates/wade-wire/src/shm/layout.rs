@@ -115,6 +115,8 @@ pub const HYDROSTATIC: u64 = 512;
 pub const QUASI_STEADY: u64 = 1024;
 /// Flag of [`Query::flags`]: the whole physical base, however the server is set.
 pub const FULL: u64 = 2048;
+/// Flag of [`Query::flags`]: the derivatives of the wrench are asked for, for which the pages of these services have no room.
+pub const JACOBIAN: u64 = 4096;
 /// Flag of [`Answer::flags`]: the server polls, so that waking it is of no use.
 pub const SERVER_POLLS: u64 = 1;
 /// Flag of [`Answer::flags`]: the session begins with this query, at rest and dry. In the middle of a run it says that the

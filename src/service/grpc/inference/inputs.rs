@@ -179,7 +179,7 @@ fn array(batch: &mut proto::EvaluateBatchRequest, field: Field) -> Option<&mut V
         Field::WaterLevel => &mut batch.water_level_m,
         Field::BedClearance => &mut batch.bed_clearance_m,
         Field::Bed => &mut batch.bed,
-        Field::WheelWaterLevel | Field::Flags | Field::Physics => return None,
+        Field::WheelWaterLevel | Field::Flags | Field::Physics | Field::Jacobian => return None,
     })
 }
 

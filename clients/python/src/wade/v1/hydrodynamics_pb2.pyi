@@ -144,7 +144,7 @@ class RollPitch(_message.Message):
     def __init__(self, roll_rad: _Optional[float] = ..., pitch_rad: _Optional[float] = ...) -> None: ...
 
 class State(_message.Message):
-    __slots__ = ("velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "world_from_body", "roll_pitch", "ground_contact", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "time_step_s", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics")
+    __slots__ = ("velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "world_from_body", "roll_pitch", "ground_contact", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "time_step_s", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics", "jacobian")
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
     CURRENT_MPS_FIELD_NUMBER: _ClassVar[int]
     ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
@@ -165,6 +165,7 @@ class State(_message.Message):
     BED_CLEARANCE_M_FIELD_NUMBER: _ClassVar[int]
     BED_FIELD_NUMBER: _ClassVar[int]
     PHYSICS_FIELD_NUMBER: _ClassVar[int]
+    JACOBIAN_FIELD_NUMBER: _ClassVar[int]
     velocity_mps: Vector3
     current_mps: Vector3
     angular_velocity_radps: Vector3
@@ -185,7 +186,8 @@ class State(_message.Message):
     bed_clearance_m: float
     bed: float
     physics: Physics
-    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., heading_rad: _Optional[float] = ..., depth_rate_mps: _Optional[float] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., time_step_s: _Optional[float] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[float] = ..., bed_clearance_m: _Optional[float] = ..., bed: _Optional[float] = ..., physics: _Optional[_Union[Physics, str]] = ...) -> None: ...
+    jacobian: bool
+    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., heading_rad: _Optional[float] = ..., depth_rate_mps: _Optional[float] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., time_step_s: _Optional[float] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[float] = ..., bed_clearance_m: _Optional[float] = ..., bed: _Optional[float] = ..., physics: _Optional[_Union[Physics, str]] = ..., jacobian: bool = ...) -> None: ...
 
 class BaseAnswer(_message.Message):
     __slots__ = ("water_level_m", "bed_clearance_m", "bed", "shaft_power_w", "damping")
@@ -210,7 +212,7 @@ class EvaluateRequest(_message.Message):
     def __init__(self, vehicle: _Optional[str] = ..., state: _Optional[_Union[State, _Mapping]] = ...) -> None: ...
 
 class EvaluateResponse(_message.Message):
-    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "wrench", "uncertainty_n", "in_domain", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_surface_force_n", "effects_outside", "added_mass", "surface_couple_nm", "moment_uncertainty_nm", "base")
+    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "wrench", "uncertainty_n", "in_domain", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_surface_force_n", "effects_outside", "added_mass", "surface_couple_nm", "moment_uncertainty_nm", "base", "jacobian")
     SURFACE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     SURFACE_POINT_M_FIELD_NUMBER: _ClassVar[int]
     WETTED_FRACTION_FIELD_NUMBER: _ClassVar[int]
@@ -228,6 +230,7 @@ class EvaluateResponse(_message.Message):
     SURFACE_COUPLE_NM_FIELD_NUMBER: _ClassVar[int]
     MOMENT_UNCERTAINTY_NM_FIELD_NUMBER: _ClassVar[int]
     BASE_FIELD_NUMBER: _ClassVar[int]
+    JACOBIAN_FIELD_NUMBER: _ClassVar[int]
     surface_force_n: _containers.RepeatedScalarFieldContainer[float]
     surface_point_m: _containers.RepeatedScalarFieldContainer[float]
     wetted_fraction: _containers.RepeatedScalarFieldContainer[float]
@@ -245,7 +248,8 @@ class EvaluateResponse(_message.Message):
     surface_couple_nm: _containers.RepeatedScalarFieldContainer[float]
     moment_uncertainty_nm: Vector3
     base: BaseAnswer
-    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., wrench: _Optional[_Union[Wrench, _Mapping]] = ..., uncertainty_n: _Optional[_Union[Vector3, _Mapping]] = ..., in_domain: bool = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[EffectLoad, _Mapping]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ..., surface_couple_nm: _Optional[_Iterable[float]] = ..., moment_uncertainty_nm: _Optional[_Union[Vector3, _Mapping]] = ..., base: _Optional[_Union[BaseAnswer, _Mapping]] = ...) -> None: ...
+    jacobian: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., wrench: _Optional[_Union[Wrench, _Mapping]] = ..., uncertainty_n: _Optional[_Union[Vector3, _Mapping]] = ..., in_domain: bool = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[EffectLoad, _Mapping]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ..., surface_couple_nm: _Optional[_Iterable[float]] = ..., moment_uncertainty_nm: _Optional[_Union[Vector3, _Mapping]] = ..., base: _Optional[_Union[BaseAnswer, _Mapping]] = ..., jacobian: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class EffectLoad(_message.Message):
     __slots__ = ("effect", "force_n", "moment_nm", "left_out")
@@ -290,7 +294,7 @@ class Outside(_message.Message):
     def __init__(self, quantity: _Optional[_Union[Quantity, str]] = ..., excess: _Optional[float] = ..., index: _Optional[int] = ...) -> None: ...
 
 class EvaluateBatchRequest(_message.Message):
-    __slots__ = ("vehicle", "velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "ground_contact", "omit_surfaces", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics")
+    __slots__ = ("vehicle", "velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "ground_contact", "omit_surfaces", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics", "jacobian")
     VEHICLE_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
     CURRENT_MPS_FIELD_NUMBER: _ClassVar[int]
@@ -310,6 +314,7 @@ class EvaluateBatchRequest(_message.Message):
     BED_CLEARANCE_M_FIELD_NUMBER: _ClassVar[int]
     BED_FIELD_NUMBER: _ClassVar[int]
     PHYSICS_FIELD_NUMBER: _ClassVar[int]
+    JACOBIAN_FIELD_NUMBER: _ClassVar[int]
     vehicle: str
     velocity_mps: _containers.RepeatedScalarFieldContainer[float]
     current_mps: _containers.RepeatedScalarFieldContainer[float]
@@ -329,10 +334,11 @@ class EvaluateBatchRequest(_message.Message):
     bed_clearance_m: _containers.RepeatedScalarFieldContainer[float]
     bed: _containers.RepeatedScalarFieldContainer[float]
     physics: Physics
-    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: bool = ..., heading_rad: _Optional[_Iterable[float]] = ..., depth_rate_mps: _Optional[_Iterable[float]] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[_Iterable[float]] = ..., bed_clearance_m: _Optional[_Iterable[float]] = ..., bed: _Optional[_Iterable[float]] = ..., physics: _Optional[_Union[Physics, str]] = ...) -> None: ...
+    jacobian: bool
+    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: bool = ..., heading_rad: _Optional[_Iterable[float]] = ..., depth_rate_mps: _Optional[_Iterable[float]] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[_Iterable[float]] = ..., bed_clearance_m: _Optional[_Iterable[float]] = ..., bed: _Optional[_Iterable[float]] = ..., physics: _Optional[_Union[Physics, str]] = ..., jacobian: bool = ...) -> None: ...
 
 class EvaluateBatchResponse(_message.Message):
-    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "force_n", "moment_nm", "about_m", "uncertainty_n", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_force_n", "effect_moment_nm", "effect_left_out", "effect_surface_force_n", "effects_outside", "added_mass", "surface_couple_nm", "moment_uncertainty_nm", "base")
+    __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "force_n", "moment_nm", "about_m", "uncertainty_n", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_force_n", "effect_moment_nm", "effect_left_out", "effect_surface_force_n", "effects_outside", "added_mass", "surface_couple_nm", "moment_uncertainty_nm", "base", "jacobian")
     SURFACE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     SURFACE_POINT_M_FIELD_NUMBER: _ClassVar[int]
     WETTED_FRACTION_FIELD_NUMBER: _ClassVar[int]
@@ -354,6 +360,7 @@ class EvaluateBatchResponse(_message.Message):
     SURFACE_COUPLE_NM_FIELD_NUMBER: _ClassVar[int]
     MOMENT_UNCERTAINTY_NM_FIELD_NUMBER: _ClassVar[int]
     BASE_FIELD_NUMBER: _ClassVar[int]
+    JACOBIAN_FIELD_NUMBER: _ClassVar[int]
     surface_force_n: _containers.RepeatedScalarFieldContainer[float]
     surface_point_m: _containers.RepeatedScalarFieldContainer[float]
     wetted_fraction: _containers.RepeatedScalarFieldContainer[float]
@@ -375,7 +382,8 @@ class EvaluateBatchResponse(_message.Message):
     surface_couple_nm: _containers.RepeatedScalarFieldContainer[float]
     moment_uncertainty_nm: _containers.RepeatedScalarFieldContainer[float]
     base: _containers.RepeatedCompositeFieldContainer[BaseAnswer]
-    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., force_n: _Optional[_Iterable[float]] = ..., moment_nm: _Optional[_Iterable[float]] = ..., about_m: _Optional[_Union[Vector3, _Mapping]] = ..., uncertainty_n: _Optional[_Iterable[float]] = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[Effect, str]]] = ..., effect_force_n: _Optional[_Iterable[float]] = ..., effect_moment_nm: _Optional[_Iterable[float]] = ..., effect_left_out: _Optional[_Iterable[_Union[LeftOut, str]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ..., surface_couple_nm: _Optional[_Iterable[float]] = ..., moment_uncertainty_nm: _Optional[_Iterable[float]] = ..., base: _Optional[_Iterable[_Union[BaseAnswer, _Mapping]]] = ...) -> None: ...
+    jacobian: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, surface_force_n: _Optional[_Iterable[float]] = ..., surface_point_m: _Optional[_Iterable[float]] = ..., wetted_fraction: _Optional[_Iterable[float]] = ..., force_n: _Optional[_Iterable[float]] = ..., moment_nm: _Optional[_Iterable[float]] = ..., about_m: _Optional[_Union[Vector3, _Mapping]] = ..., uncertainty_n: _Optional[_Iterable[float]] = ..., outside: _Optional[_Iterable[_Union[Outside, _Mapping]]] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ..., effects: _Optional[_Iterable[_Union[Effect, str]]] = ..., effect_force_n: _Optional[_Iterable[float]] = ..., effect_moment_nm: _Optional[_Iterable[float]] = ..., effect_left_out: _Optional[_Iterable[_Union[LeftOut, str]]] = ..., effect_surface_force_n: _Optional[_Iterable[float]] = ..., effects_outside: _Optional[_Iterable[_Union[EffectOutside, _Mapping]]] = ..., added_mass: _Optional[_Iterable[float]] = ..., surface_couple_nm: _Optional[_Iterable[float]] = ..., moment_uncertainty_nm: _Optional[_Iterable[float]] = ..., base: _Optional[_Iterable[_Union[BaseAnswer, _Mapping]]] = ..., jacobian: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class ListVehiclesRequest(_message.Message):
     __slots__ = ()
