@@ -25,7 +25,7 @@ use wade_core::frame::{Vec3, WaterPlane, up_from_roll_pitch};
 use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::model::kernel::Isa;
 use wade_core::model::network::WIDTH;
-use wade_core::model::{Model, Workspace};
+use wade_core::model::{JacobianWorkspace, Model, Workspace};
 use wade_core::physics::base::{BaseLoads, Motion};
 use wade_core::physics::{Physics, STATED_NONE};
 
@@ -132,6 +132,24 @@ fn query(name: String, model: Model, condition: Condition, times: u64) -> Subjec
     (row, Box::new(work))
 }
 
+/// The query of a model in a state, with its derivatives.
+fn with_derivatives(name: String, model: Model, condition: Condition) -> Subject {
+    let row = Row::new(name, layer2(&model));
+    let mut room = (Workspace::new(), JacobianWorkspace::new(), Forces::default());
+    let motion = Motion {
+        wheel_speeds: &STATED_NONE,
+        time_step: 0.0,
+        implicit_added_mass: false,
+        physics: Physics::Full,
+    };
+    let work = move || {
+        let (values, slopes, forces) = &mut room;
+        let asked = (&motion, None);
+        black_box(model.evaluate_with_jacobian(black_box(&condition), asked, (values, slopes), forces));
+    };
+    (row, Box::new(work))
+}
+
 fn queries(vehicle: &str) -> Vec<Subject> {
     let best = Isa::available()[0];
     let of = |isa: Isa| model(vehicle, isa);
@@ -147,6 +165,9 @@ fn queries(vehicle: &str) -> Vec<Subject> {
     subjects.push(query(name("half wet tilted query", best), of(best), half, 1));
     let of_paper = name("half wet tilted query of the paper's network", best);
     subjects.push(query(of_paper, paper(vehicle, best), half, 1));
+    for (what, state) in [("query", wet), ("tilted query", tilted), ("half wet tilted query", half)] {
+        subjects.push(with_derivatives(name(&format!("{what} with derivatives"), best), of(best), state));
+    }
     subjects.push(query(name("256 queries", best), of(best), wet, 256));
     let plain = of(best);
     let row = Row::new(format!("{vehicle} reference, plain loops"), layer2(&plain));

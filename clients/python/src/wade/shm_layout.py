@@ -175,6 +175,7 @@ FIELDS = {
     19: "wheel_water_level_m",
     20: "flags",
     21: "physics",
+    22: "jacobian",
 }
 
 #: The code of a number of values that does not fit the vehicle.
