@@ -26,6 +26,7 @@ fn table(name: &str) -> String {
         "summary" => latency::summary(),
         "soak" => latency::soak(),
         "query" => latency::query(),
+        "derivatives" => latency::derivatives(),
         "round trips" => latency::round_trips(),
         "storms" => latency::storms(),
         "elements" => latency::elements(),

@@ -131,6 +131,23 @@ pub fn query() -> String {
     bench("query.csv", ["subject", "p50_us", "p99_us", "p99_9_us", "max_us"])
 }
 
+/// Queries with derivatives, each beside the same query without.
+pub fn derivatives() -> String {
+    let (comments, rows) = csv(newest("derivatives.csv"));
+    let plain =
+        |subject: &str| rows.iter().find(|row| row["subject"] == subject).expect("measured in the same run");
+    let with = rows.iter().filter(|row| row["subject"].contains(" with derivatives")).map(|row| {
+        let plain = plain(&row["subject"].replace(" with derivatives", ""));
+        let median = |row: &HashMap<String, String>| row["p50_us"].parse::<f64>().expect("a number");
+        let cells = ["p50_us", "p99_us"].into_iter().flat_map(|name| [cell(plain, name), cell(row, name)]);
+        let cells: Vec<String> = cells.collect();
+        [vec![plain["subject"].clone()], cells, vec![format!("{:.1}", median(row) / median(plain))]].concat()
+    });
+    let header =
+        ["query", "p50 [us]", "with derivatives", "p99 [us]", "with derivatives", "ratio of the p50"];
+    format!("Condition: {}.\n\n{}", condition(&comments), markdown(&header, with.collect()))
+}
+
 /// Error of the base's drag against the time of an evaluation, by the number of elements.
 pub fn elements() -> String {
     let (comments, rows) = csv(newest("elements.csv"));

@@ -204,3 +204,32 @@ fn derivatives_with_weights_are_those_of_the_wrench() {
         assert!(median < 2e-3 && most < 5e-2, "{}: {median:e} {most:e}", subject.vehicle.name);
     }
 }
+
+#[test]
+fn derivatives_are_finite_at_rest_dry_and_where_water_just_reaches_the_hull() {
+    let mut workspace = JacobianWorkspace::new();
+    for subject in subjects() {
+        let base = Model::of_physics(subject.vehicle.clone(), 1, subject.base.clone());
+        let corners = &subject.vehicle.hull.mesh.vertices;
+        for model in subject.model.iter().chain([&base]) {
+            let mut asked = Asked::of(model, ALONE);
+            for up in [Vec3::z(), -Vec3::z(), Vec3::x(), Vec3::new(0.0, 0.02, 1.0)] {
+                let up = UnitVector3::new_normalize(up);
+                let heights = corners.iter().map(|corner| up.dot(corner));
+                let (low, high) =
+                    heights.fold((f64::MAX, f64::MIN), |(low, high), h| (low.min(h), high.max(h)));
+                for level in [low, high, corners[0].dot(&up), 0.5 * (low + high)] {
+                    for past in [-1e-3, -1e-9, -1e-15, 0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3] {
+                        for velocity in [Vec3::zeros(), Vec3::x(), Vec3::new(0.0, 1e-12, 0.0)] {
+                            let water_level = Some(level + past);
+                            let state = Condition { up, water_level, ..Condition::level(velocity, 0.0) };
+                            let found = asked.jacobian(&state, &mut workspace);
+                            let all = found.iter().all(|slope| slope.is_finite());
+                            assert!(all, "{}: {state:?} {found}", subject.vehicle.name);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
