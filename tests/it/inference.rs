@@ -161,6 +161,29 @@ fn the_tensors_have_the_bits_of_single_queries_in_both_forms_with_every_effect()
 }
 
 #[test]
+fn derivatives_are_a_tensor_where_a_parameter_asks_for_them() {
+    let served = Served::start();
+    let mut numbers = Numbers::new(67);
+    let state = |_| State { jacobian: true, dry_contact: false, ..numbers.state() };
+    let states: Vec<State> = (0..20).map(state).collect();
+    let mut client = Client::Grpc(Box::new(served.tcp("husky", Method::Unary)));
+    let replies: Vec<Reply> = states.iter().map(|state| client.evaluate(state).expect("answered")).collect();
+    let asks = InferParameter { parameter_choice: Some(ParameterChoice::BoolParam(true)) };
+    let parameters = HashMap::from([("jacobian".into(), asks)]);
+    let request = ModelInferRequest { parameters, ..request("husky", &states) };
+    let response = runtime().block_on(async {
+        connect(&served).await.model_infer(request).await.expect("answered").into_inner()
+    });
+    let found = outputs(&response);
+    assert_eq!(found["jacobian"], bits(&replies, |reply| reply.jacobian.expect("asked for").to_vec()));
+    // the base has it, without an effect
+    assert_eq!(found["added_mass"], bits(&replies, |reply| reply.added_mass.expect("a base").to_vec()));
+    let shape =
+        response.outputs.iter().find(|tensor| tensor.name == "jacobian").map(|tensor| &tensor.shape[..]);
+    assert_eq!(shape, Some(&[20, 6, 11][..]));
+}
+
+#[test]
 fn the_physics_of_the_server_answers_tensors() {
     let served = Served::with(|config| config.physics = Physics::Hydrostatic);
     let state = State { acceleration: [1.0, 0.0, 0.0], heading: Some(0.0), ..State::still(0.2) };
@@ -324,7 +347,9 @@ fn a_wrong_tensor_is_named_and_the_next_request_is_answered() {
         ),
         (asked("forces", 1), invalid, "forces"),
         (asked("force_n", 2), invalid, "force_n"),
-        (asked("added_mass", 1), invalid, "added_mass"),
+        (asked("effect_force_n", 1), invalid, "effect_force_n"),
+        // not asked for by its parameter
+        (asked("jacobian", 1), invalid, "jacobian"),
         (change(&|r| r.model_name = "tank".into()), Code::NotFound, ""),
         (change(&|r| r.model_version = u32::MAX.to_string()), Code::NotFound, ""),
     ];

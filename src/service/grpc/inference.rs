@@ -232,7 +232,7 @@ impl InferenceHandlers {
         let mut batch = inputs::batch(&request, &vehicle, self.handlers.max_batch)?;
         // a state has one of the two
         let rows = batch.depth_m.len().max(batch.water_level_m.len());
-        let outputs = outputs::requested(&vehicle, &request.outputs, rows as i64)?;
+        let outputs = outputs::requested(&vehicle, &request.outputs, (rows as i64, batch.jacobian))?;
         batch.omit_surfaces = !outputs::need_surfaces(&outputs);
         let (mut answer, answered) = self.handlers.batch_of(call, vehicle, &batch).await?;
         let parameters = [
@@ -281,7 +281,7 @@ fn metadata(vehicle: &ServedVehicle) -> ModelMetadataResponse {
         datatype: datatype.into(),
         shape,
     };
-    let outputs = outputs::of(vehicle, -1);
+    let outputs = outputs::of(vehicle, -1, false);
     ModelMetadataResponse {
         name: vehicle.model().vehicle().name.clone(),
         versions: vec![vehicle.model().version().to_string()],

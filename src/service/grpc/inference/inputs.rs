@@ -37,8 +37,7 @@ pub fn of_vehicle(vehicle: &ServedVehicle) -> impl Iterator<Item = (Field, Optio
 }
 
 /// The parameters of a request, which hold for all its states.
-const PARAMETERS: &str =
-    "ground_contact (string), implicit_added_mass (bool), timeout (int64 [us]), priority (uint64)";
+const PARAMETERS: &str = "ground_contact (string), implicit_added_mass (bool), jacobian (bool), timeout (int64 [us]), priority (uint64)";
 
 /// Longest name that an error repeats.
 const MAX_NAME: usize = 64;
@@ -197,6 +196,7 @@ fn parameters(
             ("implicit_added_mass", Some(ParameterChoice::BoolParam(value))) => {
                 batch.implicit_added_mass = *value;
             }
+            ("jacobian", Some(ParameterChoice::BoolParam(value))) => batch.jacobian = *value,
             // a deadline is the caller's affair, and nothing waits here that a priority could put first
             (
                 "timeout" | "priority",

@@ -5,6 +5,7 @@ use std::mem::take;
 use super::inputs::short;
 use wade_core::domain::Quantity;
 use wade_core::effects::{BoxQuantity, Effect};
+use wade_core::model::COLUMNS;
 use wade_core::served::ServedVehicle;
 use wade_wire::TensorFault;
 use wade_wire::proto;
@@ -29,9 +30,10 @@ pub enum Output {
     EffectSurfaceForce,
     EffectsOutside,
     AddedMass,
+    Jacobian,
 }
 
-const ALL: [Output; 14] = [
+const ALL: [Output; 15] = [
     Output::Force,
     Output::Moment,
     Output::Uncertainty,
@@ -46,6 +48,7 @@ const ALL: [Output; 14] = [
     Output::EffectSurfaceForce,
     Output::EffectsOutside,
     Output::AddedMass,
+    Output::Jacobian,
 ];
 
 impl Output {
@@ -65,6 +68,7 @@ impl Output {
             Self::EffectSurfaceForce => "effect_surface_force_n",
             Self::EffectsOutside => "effects_outside",
             Self::AddedMass => "added_mass",
+            Self::Jacobian => "jacobian",
         }
     }
 
@@ -96,16 +100,18 @@ impl Output {
             Self::EffectLeftOut => vec![effects],
             Self::EffectsOutside => vec![BoxQuantity::ALL.len() as i64],
             Self::AddedMass => vec![6, 6],
+            Self::Jacobian => vec![6, COLUMNS as i64],
         }
     }
 }
 
-/// The outputs of a vehicle, with the shape of each for so many states.
-pub fn of(vehicle: &ServedVehicle, rows: i64) -> impl Iterator<Item = (Output, Vec<i64>)> {
+/// The outputs of a vehicle, with the shape of each for so many states; the derivatives where they are asked for.
+pub fn of(vehicle: &ServedVehicle, rows: i64, jacobian: bool) -> impl Iterator<Item = (Output, Vec<i64>)> {
     let surfaces = vehicle.model().vehicle().surfaces.len() as i64;
     let effects = vehicle.effects().map_or(&[][..], |file| &file.effects);
     let count = effects.len() as i64;
-    let has_added_mass = effects.iter().any(|effect| effect.effect() == Effect::AddedMass);
+    let has_base = vehicle.model().base().is_some();
+    let has_added_mass = has_base || effects.iter().any(|effect| effect.effect() == Effect::AddedMass);
     let there = move |output: &Output| match output {
         Output::EffectForce
         | Output::EffectMoment
@@ -113,6 +119,7 @@ pub fn of(vehicle: &ServedVehicle, rows: i64) -> impl Iterator<Item = (Output, V
         | Output::EffectSurfaceForce
         | Output::EffectsOutside => count > 0,
         Output::AddedMass => has_added_mass,
+        Output::Jacobian => jacobian,
         _ => true,
     };
     let shape = move |output: Output| {
@@ -126,9 +133,9 @@ pub fn of(vehicle: &ServedVehicle, rows: i64) -> impl Iterator<Item = (Output, V
 pub fn requested(
     vehicle: &ServedVehicle,
     requested: &[InferRequestedOutputTensor],
-    rows: i64,
+    (rows, jacobian): (i64, bool),
 ) -> Result<Vec<(Output, Vec<i64>)>, TensorFault> {
-    let all: Vec<_> = of(vehicle, rows).collect();
+    let all: Vec<_> = of(vehicle, rows, jacobian).collect();
     if requested.is_empty() {
         return Ok(all);
     }
@@ -219,6 +226,7 @@ fn values(output: Output, answer: &mut proto::EvaluateBatchResponse, rows: usize
         Output::EffectMoment => take(&mut answer.effect_moment_nm),
         Output::EffectSurfaceForce => take(&mut answer.effect_surface_force_n),
         Output::AddedMass => take(&mut answer.added_mass),
+        Output::Jacobian => take(&mut answer.jacobian),
         Output::EffectLeftOut => return Values::Int32(take(&mut answer.effect_left_out)),
         Output::InDomain => {
             let mut inside = vec![true; rows];
