@@ -58,7 +58,7 @@ class InProcess:
             answer = known.native.evaluate(numbers, flags(state), session)
         except self._native.InvalidState as invalid:
             raise InvalidState([Violation(*invalid.args)]) from None
-        return known.forces(np.frombuffer(answer, known.row(True, state.jacobian))[0], _as_it_is)
+        return known.forces(np.frombuffer(answer, known.rows[True, state.jacobian])[0], _as_it_is)
 
     def evaluate_batch(
         self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
@@ -83,7 +83,7 @@ class InProcess:
             answer = known.native.evaluate_batch(numbers.tobytes(), flags(states), sessions, surfaces)
         except self._native.InvalidState as invalid:
             raise InvalidState([Violation(*invalid.args)]) from None
-        return known.forces(np.frombuffer(answer, known.row(surfaces, states.jacobian)), np.ascontiguousarray)
+        return known.forces(np.frombuffer(answer, known.rows[surfaces, states.jacobian]), np.ascontiguousarray)
 
     def stream(self, vehicle: str) -> SessionStream:
         """A stream of states of one vehicle: a run of its own, whose states need no session. As fast as a call."""
@@ -152,9 +152,6 @@ class _Vehicle:
             version=native.version,
             provenance=native.provenance,
         )
-
-    def row(self, surfaces: bool, jacobian: bool) -> np.dtype[Any]:
-        return self.rows[surfaces, jacobian]
 
     def forces(self, answer: Any, array: Callable[[Any], Any]) -> Forces:
         """A row, or N of them."""
