@@ -79,8 +79,10 @@ impl Condition {
 impl<T: Real> Condition<T> {
     /// The water surface in the body frame of a vehicle whose ground-contact plane is at `z0`.
     pub fn water_plane(&self, z0: f64) -> WaterPlane<T> {
-        let offset = self.water_level.unwrap_or_else(|| (self.depth + z0) * self.up.z);
-        WaterPlane { normal: self.up, offset }
+        match self.water_level {
+            Some(offset) => WaterPlane { normal: self.up, offset },
+            None => WaterPlane::new(z0, self.depth, self.up),
+        }
     }
 
     /// The same state with the depth that belongs to its water level. Near its side a vehicle has no depth: there it is that of

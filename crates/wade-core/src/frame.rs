@@ -39,11 +39,6 @@ pub struct WaterPlane<T: Real = f64> {
 }
 
 impl WaterPlane {
-    /// The plane through the body point `(0, 0, z0 + depth)`, horizontal in the world.
-    pub fn new(z0: f64, depth: f64, up: UnitVector3<f64>) -> Self {
-        Self { normal: up, offset: (z0 + depth) * up.z }
-    }
-
     /// The plane of a level vehicle: `z = z0 + depth`.
     pub fn level(z0: f64, depth: f64) -> Self {
         Self::new(z0, depth, Vec3::z_axis())
@@ -56,6 +51,11 @@ impl WaterPlane {
 }
 
 impl<T: Real> WaterPlane<T> {
+    /// The plane through the body point `(0, 0, z0 + depth)`, horizontal in the world.
+    pub fn new(z0: f64, depth: T, up: UnitVector3<T>) -> Self {
+        Self { normal: up, offset: (depth + z0) * up.z }
+    }
+
     /// Depth of a point below the surface [m]; negative in air.
     #[inline]
     pub fn depth_below(&self, point: &Vector3<T>) -> T {

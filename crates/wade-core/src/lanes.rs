@@ -19,6 +19,13 @@ impl Instructions {
     }
 }
 
+/// Sum of eight lanes, in one order whatever the instruction set.
+#[inline(always)]
+pub(crate) fn sum(lane: &[f64; 8]) -> f64 {
+    let [a, b, c, d, e, f, g, h] = *lane;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
 /// `run_for!(instructions, Owner::method(owner, name: Type, ...))` calls a method that is `inline(always)`, compiled for these
 /// [`Instructions`]. A function, for a closure is not inlined for sure.
 macro_rules! run_for {

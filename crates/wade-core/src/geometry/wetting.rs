@@ -15,7 +15,7 @@ use super::flats::merged;
 use super::mesh::Bounds;
 use super::surfaces::Hull;
 use crate::frame::{Vec3, WaterPlane};
-use crate::lanes::{Instructions, run_for};
+use crate::lanes::{Instructions, run_for, sum};
 use crate::real::{Dual, Real};
 use crate::wrench::Wrench;
 
@@ -287,11 +287,8 @@ impl SurfaceTable {
 /// Moments of what is wet, which are the derivatives of a [`Wetting`] with respect to the plane `up . x = c`.
 #[derive(Default)]
 struct Moments {
-    /// `int dA`, `int dA x^T` with the area vectors, and their moments `int x cross dA`, `int (x cross dA) x^T`.
-    area_vector: Vec3,
-    first: Matrix3<f64>,
-    moment: Vec3,
-    second: Matrix3<f64>,
+    /// Those of the pressure load, of what is soaked and of wet parts of faces.
+    terms: Terms,
     /// Over [`FILM`], of what is wet and not soaked: `int |dA|`, `int |dA| x`, `int |dA| x x^T`.
     film_area: f64,
     film_first: Vec3,
@@ -307,7 +304,7 @@ impl SurfaceTable {
         while let Some(node) = self.boxes.get(index) {
             let (depth, reach) = (plane.depth_below(&node.center), across.dot(&node.half));
             if depth - reach >= FILM {
-                moments.add_soaked(&self.terms[index]);
+                moments.terms += self.terms[index];
             } else if depth + reach > 0.0 {
                 let [from, to] = node.faces;
                 if from == to {
@@ -328,18 +325,15 @@ impl SurfaceTable {
 }
 
 impl Moments {
-    fn add_soaked(&mut self, terms: &Terms) {
-        self.area_vector += terms.area_vector;
-        self.first += terms.first;
-        self.moment += terms.moment;
-        self.second += terms.second;
-    }
-
     fn add_wet(&mut self, face: &Face, (area, first, second): &(f64, Vec3, Matrix3<f64>)) {
-        self.area_vector += face.normal * *area;
-        self.first += face.normal * first.transpose();
-        self.moment += first.cross(&face.normal);
-        self.second -= face.normal.cross_matrix() * second;
+        self.terms += Terms {
+            area_vector: face.normal * *area,
+            first: face.normal * first.transpose(),
+            moment: first.cross(&face.normal),
+            second: -(face.normal.cross_matrix() * second),
+            area: *area,
+            area_moment: *first,
+        };
     }
 
     fn add_film(&mut self, (area, first, second): &(f64, Vec3, Matrix3<f64>), sign: f64) {
@@ -366,8 +360,8 @@ impl Moments {
         };
         Wetting {
             pressure: Wrench {
-                force: vector(&value.pressure.force, &-self.area_vector, &self.first),
-                moment: vector(&value.pressure.moment, &-self.moment, &self.second),
+                force: vector(&value.pressure.force, &-self.terms.area_vector, &self.terms.first),
+                moment: vector(&value.pressure.moment, &-self.terms.moment, &self.terms.second),
             },
             area: value.area.into(),
             soaked_area: dual(value.soaked_area, self.film_area, (-self.film_first).into()),
@@ -584,13 +578,6 @@ impl Clipping {
 #[inline(always)]
 fn three<T>(of: impl Fn(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]
-}
-
-/// In one order whatever the instruction set.
-#[inline(always)]
-fn sum(lane: &Lane) -> f64 {
-    let [a, b, c, d, e, f, g, h] = *lane;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 impl Faces {

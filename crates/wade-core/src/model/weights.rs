@@ -70,20 +70,14 @@ impl Anchored {
     /// Distance to the nearest training case, over what is usual among these.
     pub fn distance(&self, coordinates: &[f64; COORDINATES]) -> f64 {
         let here = self.place(coordinates);
-        let squared = |case: &[f32; COORDINATES]| {
-            here.iter().zip(case).fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
-        };
-        let nearest = self.cases.iter().map(squared).fold(f32::INFINITY, f32::min);
+        let nearest = self.cases.iter().map(|case| squared(&here, case)).fold(f32::INFINITY, f32::min);
         f64::from(nearest.sqrt() / self.near)
     }
 
     /// The same with derivatives: those of the distance to the case that is nearest.
     pub fn distance_dual<const N: usize>(&self, coordinates: &[Dual<N>; COORDINATES]) -> Dual<N> {
         let here = self.place(&coordinates.map(Real::value));
-        let squared = |case: &[f32; COORDINATES]| {
-            here.iter().zip(case).fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
-        };
-        let distances = self.cases.iter().map(|case| (squared(case), case));
+        let distances = self.cases.iter().map(|case| (squared(&here, case), case));
         let nearest = distances.reduce(|best, next| if next.0 < best.0 { next } else { best });
         let Some((_, nearest)) = nearest else { return f64::INFINITY.into() };
         let sum = (0..COORDINATES).fold(Dual::default(), |sum, axis| {
@@ -129,6 +123,11 @@ impl Anchored {
         let x = f64::from(output);
         x.max(0.0) + (-x.abs()).exp().ln_1p()
     }
+}
+
+/// Square of the distance between two places.
+fn squared(here: &[f32; COORDINATES], case: &[f32; COORDINATES]) -> f32 {
+    here.iter().zip(case).fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
 }
 
 impl Form {

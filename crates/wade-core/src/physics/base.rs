@@ -313,9 +313,7 @@ impl Base {
         out.resize(self.areas.len(), SurfaceDrag::default());
         let plane = condition.water_plane(self.z0);
         self.drag.evaluate_dual(&plane, condition, &STATED_NONE[..self.areas.len()], out);
-        for ((drag, wetting), area) in out.iter_mut().zip(wetting).zip(&self.areas) {
-            drag.load = drag.load * reached(wetting, *area);
-        }
+        self.reach_into(wetting, out);
     }
 
     /// Drag and friction on each surface of the same hull in the same water, moving in another way, about the body origin; `of`
@@ -324,7 +322,12 @@ impl Base {
         out.resize(self.areas.len(), SurfaceDrag::default());
         let plane = condition.water_plane(self.z0);
         self.drag.evaluate(&plane, condition, &STATED_NONE[..self.areas.len()], out);
-        for ((drag, wetting), area) in out.iter_mut().zip(&of.wetting).zip(&self.areas) {
+        self.reach_into(&of.wetting, out);
+    }
+
+    /// Leaves of each drag what a surface bears that the water reaches so far.
+    fn reach_into<T: Real>(&self, wetting: &[Wetting<T>], out: &mut [SurfaceDrag<T>]) {
+        for ((drag, wetting), area) in out.iter_mut().zip(wetting).zip(&self.areas) {
             drag.load = drag.load * reached(wetting, *area);
         }
     }

@@ -26,7 +26,7 @@ use nalgebra::Vector3;
 use super::elements::{Element, LANES};
 use crate::condition::Condition;
 use crate::frame::{VISCOSITY, Vec3, WaterPlane};
-use crate::lanes::{Instructions, run_for};
+use crate::lanes::{self, Instructions, run_for};
 use crate::real::{Dual, Real, norm};
 use crate::vehicle::{SurfaceKind, Vehicle};
 use crate::wrench::Wrench;
@@ -288,15 +288,15 @@ impl Drag {
 
     #[inline(always)]
     fn sum(&self, flow: &Flow, condition: &Condition, wheel_speeds: &[f64], out: &mut [SurfaceDrag]) {
+        let mut unused = Slopes::NONE;
         for (surface, out) in out.iter_mut().enumerate() {
             let (skin, is_track) = self.skin(condition, surface, wheel_speeds[surface]);
-            // which stay unused
-            let (mut sums, mut slopes) = (Sums::default(), Slopes::NONE);
+            let mut sums = Sums::default();
             let [from, to] = self.ranges[surface];
             for block in &self.blocks[from..to] {
                 match is_track {
-                    true => block.add::<true, false>(flow, skin, &mut sums, &mut slopes),
-                    false => block.add::<false, false>(flow, skin, &mut sums, &mut slopes),
+                    true => block.add::<true, false>(flow, skin, &mut sums, &mut unused),
+                    false => block.add::<false, false>(flow, skin, &mut sums, &mut unused),
                 }
             }
             *out = sums.finish();
@@ -377,8 +377,7 @@ impl Work {
         let mut duals = values.map(|value| density * (value / density.value));
         for (column, input) in self.columns.iter().zip(inputs) {
             for (dual, lane) in duals.iter_mut().zip(column) {
-                let [a, b, c, d, e, f, g, h] = *lane;
-                let slope = ((a + e) + (c + g)) + ((b + f) + (d + h));
+                let slope = lanes::sum(lane);
                 for (own, of_input) in dual.slope.iter_mut().zip(input.slope) {
                     *own += slope * of_input;
                 }
