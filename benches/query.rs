@@ -239,7 +239,8 @@ fn effects(vehicle: &str) -> Vec<Subject> {
         let work = move || {
             let answer = Answer {
                 condition: black_box(&condition),
-                forces: &forces,
+                surfaces: &forces.surfaces,
+                wrench: forces.wrench,
                 wet_parts_known: true,
                 at_edge: None,
             };

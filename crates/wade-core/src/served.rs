@@ -3,8 +3,13 @@
 use crate::condition::Condition;
 use crate::effects::{ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, EffectsSession};
 use crate::forces::Forces;
-use crate::model::{Form, Jacobian, JacobianWorkspace, Model, Workspace};
+use crate::model::{COLUMNS, Form, Jacobian, JacobianWorkspace, Model, Workspace, stepped};
 use crate::physics::{Memory, Motion, Physics};
+use crate::wrench::Wrench;
+
+/// Step of the differences of effects in the unit of each column: in double precision their rounding is below 1e-9 of a load, and
+/// their curvature below 1e-8.
+const STEP: f64 = 1e-5;
 
 /// What a served vehicle answers. Reused from query to query.
 #[derive(Debug, Clone, Default)]
@@ -21,6 +26,8 @@ pub struct Loads {
     workspace: Workspace,
     /// Buffers of its derivatives.
     slopes: JacobianWorkspace,
+    /// The effects in a state a step away.
+    stepped: EffectLoads,
 }
 
 /// What lasts from state to state: waves of the base, and the memory of effects. Starts at rest and dry.
@@ -82,14 +89,16 @@ impl ServedVehicle {
         self.effects.as_ref().map(ActiveEffects::file)
     }
 
-    /// Whether the derivatives of its wrench are known: those of the physical base and of the weights on it are, those of effects
-    /// are not.
+    /// Whether the derivatives of its wrench are known, which are of the physical base and of what stands on it.
     pub fn has_jacobian(&self) -> bool {
-        self.model.base().is_some() && self.effects.is_none()
+        self.model.base().is_some()
     }
 
     /// Forces and moments in a state. Allocates nothing. Effects with a memory live in `session`; without one they are left
     /// out, and their loads say so.
+    ///
+    /// Derivatives of the model are in closed form ([`Model::evaluate_with_jacobian`]); those of effects, whose hull is a table, are
+    /// central differences in double precision, in which the model's own drag changes as its derivatives say.
     pub fn evaluate(
         &self,
         condition: &Condition,
@@ -97,7 +106,7 @@ impl ServedVehicle {
         session: Option<&mut Session>,
         loads: &mut Loads,
     ) {
-        let Loads { forces, effects: added, jacobian, edge, workspace, slopes } = loads;
+        let Loads { forces, effects: added, jacobian, edge, workspace, slopes, stepped: steps } = loads;
         let condition = &condition.resolved(self.model.vehicle().z0);
         let (memory, session) = match session {
             Some(session) => {
@@ -125,11 +134,35 @@ impl ServedVehicle {
                 // the wet parts of an anchored model are not those of the samples, with which effects are fitted
                 let known =
                     self.model.weights().is_some_and(|weights| matches!(weights.form, Form::Paper(_)));
-                let at_edge = effects.edge(condition).map(|state| {
+                let Forces { surfaces, wrench, .. } = &*forces;
+                let mut at_edge = |condition: &Condition| {
+                    let state = effects.edge(condition)?;
                     self.model.evaluate_moving(&state, (&motion, None), workspace, edge);
-                    edge.wrench
-                });
-                let answer = Answer { condition, forces, wet_parts_known: known, at_edge };
+                    Some(edge.wrench)
+                };
+                let answer = Answer {
+                    condition,
+                    surfaces,
+                    wrench: *wrench,
+                    wet_parts_known: known,
+                    at_edge: at_edge(condition),
+                };
+                if let Some(jacobian) = jacobian {
+                    steps.clear();
+                    let before = session.as_deref().copied();
+                    for column in 0..COLUMNS {
+                        let slope = jacobian.column(column).into_owned();
+                        let [ahead, behind] = [STEP, -STEP].map(|step| {
+                            let condition = &stepped(condition, self.model.vehicle().z0, column, step);
+                            let wrench = *wrench + Wrench::from_column(&slope) * step;
+                            let answer = Answer { condition, wrench, at_edge: at_edge(condition), ..answer };
+                            let mut session = before;
+                            effects.evaluate_again(circumstances, &answer, session.as_mut(), steps);
+                            steps.sum().column()
+                        });
+                        jacobian.set_column(column, &(slope + (ahead - behind) * (0.5 / STEP)));
+                    }
+                }
                 effects.evaluate(circumstances, &answer, session, added);
                 forces.wrench += added.sum();
             }

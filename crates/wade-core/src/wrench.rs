@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Mul};
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use crate::real::Real;
 
@@ -24,6 +24,19 @@ impl<T: Real> Wrench<T> {
     /// The same load taken about a point that lies at `new` where this wrench was taken about `old`.
     pub fn moved(self, old: &Vector3<T>, new: &Vector3<T>) -> Self {
         Self { force: self.force, moment: self.moment + (old - new).cross(&self.force) }
+    }
+}
+
+impl Wrench {
+    /// Of a column, force first.
+    pub fn from_column(column: &Vector6<f64>) -> Self {
+        Self { force: column.fixed_rows::<3>(0).into_owned(), moment: column.fixed_rows::<3>(3).into_owned() }
+    }
+
+    /// As a column, force first.
+    pub fn column(&self) -> Vector6<f64> {
+        let Self { force, moment } = self;
+        Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
     }
 }
 

@@ -220,11 +220,10 @@ impl InvalidState {
     /// Derivatives of a vehicle that has none.
     fn no_jacobian(vehicle: &ServedVehicle) -> Self {
         let name = &vehicle.model().vehicle().name;
-        let lacks = match vehicle.model().base() {
-            None => "its bundle is from before the physical base, which they are of",
-            Some(_) => "its bundle carries effects, whose derivatives are not known; leave jacobian out",
-        };
-        let words = format!("jacobian is set, and {name} has no derivatives: {lacks}");
+        let words = format!(
+            "jacobian is set, and {name} has no derivatives: its bundle is from before the physical base, which they are of; \
+             leave jacobian out"
+        );
         Self { words: Some(words.into()), ..Self::new(Field::Jacobian, Problem::Unsupported) }
     }
 

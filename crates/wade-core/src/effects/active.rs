@@ -13,8 +13,8 @@ use super::library::{Effect, MAX_COEFFICIENTS, MEMORIES, PHYSICS, Shape};
 use super::spec::Quantity;
 use super::validity::OutsideBox;
 use crate::condition::Condition;
-use crate::forces::Forces;
-use crate::frame::Vec3;
+use crate::forces::SurfaceForce;
+use crate::frame::{Vec3, WaterPlane};
 use crate::physics::Physics;
 use crate::vehicle::{MAX_SURFACES, PerWheel, Vehicle};
 use crate::wrench::Wrench;
@@ -105,6 +105,8 @@ pub struct EffectLoads {
     /// Added mass and inertia about the center of mass, forces first [kg, kg m, kg m2], of base and effects together.
     pub added_mass: Option<Matrix6<f64>>,
     immersion: Immersion,
+    /// The water surface that the immersion is of.
+    plane: Option<WaterPlane>,
 }
 
 impl Default for EffectLoads {
@@ -116,6 +118,7 @@ impl Default for EffectLoads {
             outside: OutsideBox::default(),
             added_mass: None,
             immersion: Immersion { panels, ..Immersion::default() },
+            plane: None,
         }
     }
 }
@@ -123,6 +126,12 @@ impl Default for EffectLoads {
 impl EffectLoads {
     /// Forgets the answer before.
     pub fn clear(&mut self) {
+        self.empty();
+        self.plane = None;
+    }
+
+    /// Forgets the loads, and knows where the water reached.
+    fn empty(&mut self) {
         self.loads.clear();
         self.surface_forces.clear();
         self.outside = OutsideBox::default();
@@ -154,8 +163,10 @@ struct Entry {
 pub struct Answer<'a> {
     /// The state.
     pub condition: &'a Condition,
-    /// Its forces.
-    pub forces: &'a Forces,
+    /// Its forces on the surfaces.
+    pub surfaces: &'a [SurfaceForce],
+    /// Its net wrench about the center of mass.
+    pub wrench: Wrench,
     /// True where wetted fractions and points are those of the hull's samples.
     pub wet_parts_known: bool,
     /// Its wrench at the edge of the box, where [`ActiveEffects::edge`] asks for it.
@@ -207,18 +218,35 @@ impl ActiveEffects {
         &self,
         circumstances: &Circumstances,
         answer: &Answer,
+        session: Option<&mut EffectsSession>,
+        out: &mut EffectLoads,
+    ) {
+        out.plane = None;
+        self.evaluate_again(circumstances, answer, session, out);
+    }
+
+    /// [`Self::evaluate`] in a state close to the one before, of the same vehicle: where the water surface is the same, it reaches
+    /// the same parts.
+    pub(crate) fn evaluate_again(
+        &self,
+        circumstances: &Circumstances,
+        answer: &Answer,
         mut session: Option<&mut EffectsSession>,
         out: &mut EffectLoads,
     ) {
-        let Answer { condition, forces, wet_parts_known, at_edge } = *answer;
-        out.clear();
+        let Answer { condition, surfaces, wrench, wet_parts_known, at_edge } = *answer;
+        out.empty();
         out.outside = self.file.validity.outside(condition);
-        out.surface_forces.resize(forces.surfaces.len(), Vec3::zeros());
+        out.surface_forces.resize(surfaces.len(), Vec3::zeros());
         let state = self.file.validity.clamped(condition);
-        if wet_parts_known && state.depth == condition.depth {
-            self.body.immerse_as(&state, &forces.surfaces, &mut out.immersion);
-        } else {
-            self.body.immerse(&state, &mut out.immersion);
+        let plane = state.water_plane(self.body.z0);
+        if out.plane != Some(plane) {
+            out.plane = Some(plane);
+            if wet_parts_known && state.depth == condition.depth {
+                self.body.immerse_as(&state, surfaces, &mut out.immersion);
+            } else {
+                self.body.immerse(&state, &mut out.immersion);
+            }
         }
         let mut rate = circumstances.depth_rate;
         if let Some(session) = session.as_deref_mut() {
@@ -233,7 +261,7 @@ impl ActiveEffects {
             body: &self.body,
             condition: &state,
             immersion,
-            predicted: forces.wrench,
+            predicted: wrench,
             base_drag: BaseDrag::zeros(),
             yaw: circumstances.heading.unwrap_or(0.0),
             wetting_rate: rate.unwrap_or(0.0),
@@ -244,8 +272,8 @@ impl ActiveEffects {
             let implicit = entry.effect == Effect::AddedMass && circumstances.implicit_added_mass;
             input.condition = if implicit { &without_rate } else { &state };
             input.predicted = match at_edge {
-                Some(wrench) if entry.acts_on_own_drag => wrench,
-                _ => forces.wrench,
+                Some(at_edge) if entry.acts_on_own_drag => at_edge,
+                _ => wrench,
             };
             (input.base_drag, input.channel_width) = (entry.base_drag, entry.channel_width);
             let missing = |quantity: &Quantity| match quantity {

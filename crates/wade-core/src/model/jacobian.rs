@@ -157,6 +157,26 @@ fn moving(condition: &Condition, z0: f64) -> Condition<Full> {
     moving.resolved(z0)
 }
 
+/// A state a step along a column of a [`Jacobian`] further.
+pub(crate) fn stepped(condition: &Condition, z0: f64, column: usize, step: f64) -> Condition {
+    let level = condition.water_plane(z0).offset;
+    let mut next = Condition { water_level: Some(level), ..*condition };
+    match column {
+        0..3 => {
+            next.velocity[column] += step;
+            next.ground_velocity[column] += step;
+        }
+        3..LEVEL => next.angular_velocity[column - 3] += step,
+        LEVEL => next.water_level = Some(level + step),
+        ATTITUDE..DENSITY => {
+            let turned = condition.up.cross(&Vec3::ith(column - ATTITUDE, step));
+            next.up = UnitVector3::new_normalize(condition.up.into_inner() + turned);
+        }
+        _ => next.density += step,
+    }
+    next.resolved(z0)
+}
+
 impl Model {
     /// [`Self::evaluate_moving`], and how the net wrench changes with the state; what the session remembers from before stays as
     /// it is. `None` of a bundle without the physical base. Allocates nothing.

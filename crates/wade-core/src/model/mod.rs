@@ -11,6 +11,7 @@ pub mod network;
 mod reference;
 mod weights;
 
+pub(crate) use jacobian::stepped;
 pub use jacobian::{COLUMNS, Jacobian, JacobianWorkspace};
 pub use weights::{Anchored, Form, Paper, SPREAD, Weights};
 

@@ -2,12 +2,15 @@
 
 use nalgebra::{SVector, UnitQuaternion, UnitVector3};
 use wade_core::condition::{Condition, GroundContact};
+use wade_core::effects::Circumstances;
 use wade_core::forces::Forces;
-use wade_core::frame::Vec3;
+use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::model::{COLUMNS, Jacobian, JacobianWorkspace, Model, Workspace};
 use wade_core::physics::{BaseLoads, Memory, Motion, Physics, STATED_NONE};
+use wade_core::served::{Loads, ServedVehicle, Session};
 use wade_core::vehicle::MAX_SURFACES;
 
+use crate::common::{VEHICLES, every_effect};
 use crate::physics::{Subject, subjects};
 use crate::random::Random;
 
@@ -202,6 +205,71 @@ fn derivatives_with_weights_are_those_of_the_wrench() {
         let [median, most] = [0.5, 0.95].map(|share| errors[(errors.len() as f64 * share) as usize]);
         println!("{}: median {median:.1e}, 95 % below {most:.1e}", subject.vehicle.name);
         assert!(median < 2e-3 && most < 5e-2, "{}: {median:e} {most:e}", subject.vehicle.name);
+    }
+}
+
+/// Every effect on a base without weights, in states within the box in which it was seen and outside it, alone and in a session.
+#[test]
+fn derivatives_with_effects_are_those_of_the_wrench() {
+    for vehicle in VEHICLES {
+        let subject = subjects().iter().find(|subject| subject.vehicle.name == vehicle).expect("shipped");
+        let base = Model::of_physics(subject.vehicle.clone(), 1, subject.base.clone());
+        let served = ServedVehicle::new(base, Some(every_effect(vehicle)));
+        let z0 = subject.vehicle.z0;
+        let (mut random, mut loads) = (Random::new(29), Loads::default());
+        let circumstances = Circumstances {
+            heading: Some(0.4),
+            wheel_speeds: Some([3.0, 4.0, 5.0, 6.0].into()),
+            time_step: 0.01,
+            ..Circumstances::default()
+        };
+        let mut begun = Session::default();
+        served.evaluate(&subject.random(&mut random), &circumstances, Some(&mut begun), &mut loads);
+        let (mut worst, mut kinks, mut columns, mut outside) = (0.0_f64, 0, 0, 0);
+        for round in 0..STATES {
+            let state = Condition {
+                acceleration: random.direction() * 0.3,
+                velocity: random.direction() * (0.8 * random.unit()),
+                ..subject.random(&mut random)
+            };
+            let state = if round % 2 == 0 {
+                Condition {
+                    up: Vec3::z_axis(),
+                    ..Condition::level(state.velocity, 0.1 + 0.1 * random.unit())
+                }
+            } else {
+                state
+            };
+            let begun = (round % 3 == 0).then_some(begun);
+            let mut wrench = |state: &Condition, jacobian: bool| {
+                let mut session = begun;
+                let circumstances = Circumstances { jacobian, ..circumstances };
+                served.evaluate(state, &circumstances, session.as_mut(), &mut loads);
+                outside += usize::from(loads.effects.outside.iter().any(|excess| *excess > 0.0));
+                (loads.forces.wrench.column(), loads.jacobian)
+            };
+            let (here, jacobian) = wrench(&state, true);
+            let jacobian = jacobian.expect("a base");
+            for column in 0..COLUMNS {
+                let step = if column == 10 { 100.0 * STEP } else { STEP };
+                let [coarse, fine] = [step, 0.3 * step].map(|step| {
+                    let [ahead, behind] =
+                        [step, -step].map(|step| wrench(&stepped(&state, z0, column, step), false).0);
+                    (ahead - behind) / (2.0 * step)
+                });
+                let found = jacobian.column(column);
+                columns += 1;
+                if (coarse - fine).norm() > 1e-5 * fine.norm() + 1e-12 * here.norm() / step {
+                    kinks += 1;
+                    continue;
+                }
+                let error = (found - fine).norm() / (fine.norm() + 1e-6 * here.norm());
+                worst = worst.max(error);
+            }
+        }
+        let kinks = f64::from(kinks) / f64::from(columns);
+        println!("{vehicle}: worst {worst:.1e}, {:.1} % at kinks, {outside} outside", 100.0 * kinks);
+        assert!(worst < 1e-4 && kinks < 0.05 && outside > 100, "{vehicle}: {worst:e}, {kinks} at kinks");
     }
 }
 
