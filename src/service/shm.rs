@@ -24,12 +24,16 @@ use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
 use wade_core::served::ServedVehicle;
 use wade_wire::shm::layout::{
-    Answer, BatchAnswer, BatchQuery, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS, Status, wake_name,
+    Answer, BatchAnswer, BatchQuery, JacobianAnswer, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS,
+    Status, wake_name,
 };
 use wade_wire::shm::{
     Exchange, MAX_CLIENTS, NAMESPACE, ShmError, Wait, events, in_place, node, open, served as shm_served,
 };
-use wade_wire::{Evaluator, InvalidState, Refusal, Sessions, nanoseconds_since};
+use wade_wire::{
+    DERIVATIVES, Evaluator, Field, InvalidState, Problem, Refusal, Sessions, State, derivatives,
+    nanoseconds_since,
+};
 
 /// Settings of the shared-memory server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -129,13 +133,70 @@ struct Run {
     session: u64,
 }
 
-/// The ports of one vehicle, and what has come in through them in this round.
+/// One service of a vehicle, and what has come in through it in this round.
+struct Port<Q, A>
+where
+    Q: ZeroCopySend + std::fmt::Debug + 'static,
+    A: ZeroCopySend + std::fmt::Debug + 'static,
+{
+    server: Server<ipc::Service, Q, (), A, ()>,
+    waiting: Vec<(Instant, Request<Q, A>)>,
+}
+
+impl<Q, A> Port<Q, A>
+where
+    Q: ZeroCopySend + std::fmt::Debug + 'static,
+    A: ZeroCopySend + std::fmt::Debug + 'static,
+{
+    fn open(node: &Node<ipc::Service>, name: &str, max_clients: usize) -> Result<Self, ShmError> {
+        let service = exchange::<Q, A>(node, name, max_clients)?;
+        // an answer that a client does not take is dropped: no client can hold up the others
+        let builder = service.server_builder().backpressure_strategy(BackpressureStrategy::DiscardData);
+        let server =
+            builder.create().map_err(|error| ShmError::new(format!("a server of {name}"))(&error))?;
+        Ok(Self { server, waiting: Vec::new() })
+    }
+
+    /// Takes what is waiting; true where there is anything.
+    fn take(&mut self) -> bool {
+        while let Some(request) = taken(self.server.receive()) {
+            self.waiting.push((Instant::now(), request));
+        }
+        !self.waiting.is_empty()
+    }
+}
+
+/// A page that a single query is answered with.
+trait Page: Copy + ZeroCopySend + std::fmt::Debug + 'static {
+    /// One that says nothing yet.
+    const UNSET: Self;
+
+    /// Its answer, and its room for derivatives where it has that.
+    fn parts(&mut self) -> (&mut Answer, Option<&mut [f32; DERIVATIVES]>);
+}
+
+impl Page for Answer {
+    const UNSET: Self = Self::UNSET;
+
+    fn parts(&mut self) -> (&mut Answer, Option<&mut [f32; DERIVATIVES]>) {
+        (self, None)
+    }
+}
+
+impl Page for JacobianAnswer {
+    const UNSET: Self = Self::UNSET;
+
+    fn parts(&mut self) -> (&mut Answer, Option<&mut [f32; DERIVATIVES]>) {
+        (&mut self.answer, Some(&mut self.jacobian))
+    }
+}
+
+/// The ports of one vehicle.
 struct Ports {
     vehicle: String,
-    single: Server<ipc::Service, Query, (), Answer, ()>,
-    batch: Server<ipc::Service, BatchQuery, (), BatchAnswer, ()>,
-    singles: Vec<(Instant, Request<Query, Answer>)>,
-    batches: Vec<(Instant, Request<BatchQuery, BatchAnswer>)>,
+    single: Port<Query, Answer>,
+    jacobian: Port<Query, JacobianAnswer>,
+    batch: Port<BatchQuery, BatchAnswer>,
     single_recorder: Arc<Recorder>,
     batch_recorder: Arc<Recorder>,
 }
@@ -226,21 +287,18 @@ impl ShmServer {
         let clients = self.config.max_clients;
         // one more where the server's own client asks, which is at the first vehicle
         let own = usize::from(self.ports.is_empty());
-        let names = [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)];
-        let single = exchange::<Query, Answer>(&self.node, &names[0], clients + own)?;
-        let batch = exchange::<BatchQuery, BatchAnswer>(&self.node, &names[1], clients)?;
-        for name in &names {
-            self.files.add(name, MessagingPattern::RequestResponse);
+        let names = &self.names;
+        let single = Port::open(&self.node, &names.evaluate(&vehicle), clients + own)?;
+        let batch = Port::open(&self.node, &names.evaluate_batch(&vehicle), clients)?;
+        let jacobian = Port::open(&self.node, &names.evaluate_jacobian(&vehicle), clients)?;
+        for name in names.of_vehicle(&vehicle) {
+            self.files.add(&name, MessagingPattern::RequestResponse);
         }
-        // an answer that a client does not take is dropped: no client can hold up the others
-        let discard = BackpressureStrategy::DiscardData;
-        let port = |error: &dyn std::fmt::Display| ShmError::new(format!("a server for {vehicle}"))(error);
         let metrics = &self.desk.metrics;
         self.ports.push(Ports {
-            single: single.server_builder().backpressure_strategy(discard).create().map_err(|e| port(&e))?,
-            batch: batch.server_builder().backpressure_strategy(discard).create().map_err(|e| port(&e))?,
-            singles: Vec::new(),
-            batches: Vec::new(),
+            single,
+            jacobian,
+            batch,
             single_recorder: metrics.recorder(Transport::shm, &vehicle),
             batch_recorder: metrics.recorder(Transport::shm_batch, &vehicle),
             vehicle,
@@ -274,7 +332,7 @@ impl ShmServer {
     fn open_new_ports(&mut self) {
         for vehicle in self.without_ports() {
             let opened = self.open_ports(vehicle.clone()).or_else(|error| {
-                for name in [self.names.evaluate(&vehicle), self.names.evaluate_batch(&vehicle)] {
+                for name in self.names.of_vehicle(&vehicle) {
                     replacing(&name, &error);
                     shm_remains::remove(&name, MessagingPattern::RequestResponse);
                 }
@@ -327,26 +385,26 @@ impl ShmServer {
     fn answer_round(&mut self) -> bool {
         let mut any = false;
         for (number, ports) in self.ports.iter_mut().enumerate() {
-            while let Some(request) = taken(ports.single.receive()) {
-                ports.singles.push((Instant::now(), request));
-            }
-            while let Some(request) = taken(ports.batch.receive()) {
-                ports.batches.push((Instant::now(), request));
-            }
-            any |= !ports.singles.is_empty() || !ports.batches.is_empty();
+            any |= ports.single.take() | ports.jacobian.take() | ports.batch.take();
             if let Ok(vehicle) = self.desk.engine.vehicle(&ports.vehicle) {
                 let at = At { vehicle: &vehicle, ports: number };
-                for (arrived, request) in ports.singles.drain(..) {
+                for (arrived, request) in ports.single.waiting.drain(..) {
                     self.desk.answer(at, arrived, &request, &ports.single_recorder);
                 }
-                for (arrived, request) in ports.batches.drain(..) {
+                for (arrived, request) in ports.jacobian.waiting.drain(..) {
+                    self.desk.answer(at, arrived, &request, &ports.single_recorder);
+                }
+                for (arrived, request) in ports.batch.waiting.drain(..) {
                     self.desk.answer_batch(at, arrived, &request, &ports.batch_recorder);
                 }
             } else {
-                for (_, request) in ports.singles.drain(..) {
+                for (_, request) in ports.single.waiting.drain(..) {
                     self.desk.decline(&request);
                 }
-                for (_, request) in ports.batches.drain(..) {
+                for (_, request) in ports.jacobian.waiting.drain(..) {
+                    self.desk.decline(&request);
+                }
+                for (_, request) in ports.batch.waiting.drain(..) {
                     self.desk.decline_batch(&request);
                 }
             }
@@ -364,22 +422,34 @@ struct At<'s> {
 
 impl Desk {
     /// Writes the answer to a query, in its session where it has one.
-    fn evaluate(
+    fn evaluate<P: Page>(
         &mut self,
         at: At,
         client: UniqueClientId,
         query: &Query,
-        answer: &mut Answer,
+        page: &mut P,
     ) -> Result<(), InvalidState> {
         let run = Run { client, ports: at.ports, session: query.session };
-        let outcome = query.state().and_then(|state| state.check_for(at.vehicle)).map(|state| {
+        let (answer, mut room) = page.parts();
+        let asked = query.state().and_then(|state| match (&room, state.jacobian) {
+            (None, true) => Err(InvalidState::new(Field::Jacobian, Problem::Unsupported)),
+            _ => State { jacobian: room.is_some(), ..state }.check_for(at.vehicle),
+        });
+        let outcome = asked.map(|state| {
             // a query that was refused has begun no session
             let known = (query.session != 0).then(|| self.sessions.get(run));
             let (session, begins) = known.map_or((None, false), |(session, begins)| (Some(session), begins));
-            answer.fill(at.vehicle, &self.evaluator.evaluate(at.vehicle, &state, session));
+            let evaluated = self.evaluator.evaluate(at.vehicle, &state, session);
+            answer.fill(at.vehicle, &evaluated);
             answer.flags |= if begins { SESSION_BEGINS } else { 0 };
+            if let (Some(room), Some(jacobian)) = (&mut room, evaluated.jacobian) {
+                **room = derivatives(jacobian);
+            }
         });
         if let Err(invalid) = &outcome {
+            if let Some(room) = room {
+                *room = [f32::NAN; DERIVATIVES];
+            }
             answer.refuse(invalid, at.vehicle);
         }
         answer.sequence = query.sequence;
@@ -387,11 +457,18 @@ impl Desk {
         outcome
     }
 
-    fn answer(&mut self, at: At, arrived: Instant, request: &Request<Query, Answer>, recorder: &Recorder) {
+    fn answer<P: Page>(
+        &mut self,
+        at: At,
+        arrived: Instant,
+        request: &Request<Query, P>,
+        recorder: &Recorder,
+    ) {
         let query = copy(request.payload());
         let Some(mut slot) = loaned(request.loan_uninit()) else { return };
-        let answer = in_place(slot.payload_mut());
-        let outcome = self.evaluate(at, request.origin(), &query, answer);
+        let page = in_place(slot.payload_mut());
+        let outcome = self.evaluate(at, request.origin(), &query, page);
+        let (answer, _) = page.parts();
         let (is_outside, status) = (answer.is_outside(), answer.status);
         // SAFETY: it has been written.
         if sent(unsafe { slot.assume_init() }.send()) {
@@ -411,12 +488,14 @@ impl Desk {
     }
 
     /// Says that the vehicle is not served any more.
-    fn decline(&mut self, request: &Request<Query, Answer>) {
+    fn decline<P: Page>(&mut self, request: &Request<Query, P>) {
         let query = copy(request.payload());
         let Some(slot) = loaned(request.loan_uninit()) else { return };
-        let (sequence, status) = (query.sequence, Status::NotServed as u32);
-        let answer = Answer { sequence, status, flags: self.flags, ..Answer::UNSET };
-        if sent(slot.write_payload(answer).send()) {
+        let mut page = P::UNSET;
+        let (answer, _) = page.parts();
+        (answer.sequence, answer.status, answer.flags) =
+            (query.sequence, Status::NotServed as u32, self.flags);
+        if sent(slot.write_payload(page).send()) {
             wake(&self.done, &mut self.sleepers, query.wake_key);
         }
         self.metrics.refuse(Transport::shm, "not_found");

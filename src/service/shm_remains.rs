@@ -41,7 +41,7 @@ fn services<'n>(
     let events = [names.wake(), names.done(), names.served()];
     let mut services: Vec<_> = events.into_iter().map(|name| (name, MessagingPattern::Event)).collect();
     for vehicle in vehicles {
-        for name in [names.evaluate(vehicle), names.evaluate_batch(vehicle)] {
+        for name in names.of_vehicle(vehicle) {
             services.push((name, MessagingPattern::RequestResponse));
         }
     }

@@ -64,6 +64,12 @@ class Span {
 
 using Vector3 = float[3];
 
+// Derivatives of force and moment; see `wade_evaluate_jacobian`. Rows: force, then moment; columns: velocity (3), angular
+// velocity (3), water level, turn of the body (3), density.
+struct Jacobian {
+  float by_rows[6][WADE_JACOBIAN_COLUMNS];
+};
+
 // A vehicle at rest and level, in fresh water of this depth [m].
 [[nodiscard]] inline State state(float depth_m) noexcept {
   State state = wade_default_state();
@@ -184,6 +190,12 @@ class Client {
   // The forces in a state within a budget; without an answer the last ones, with their age. See `wade_evaluate`.
   [[nodiscard]] Status evaluate(const State &state, nanoseconds budget, Forces &forces) noexcept {
     return static_cast<Status>(wade_evaluate(client_, &state, limit(budget), &forces));
+  }
+
+  // The same with the derivatives of force and moment, which stay as they were without an answer.
+  [[nodiscard]] Status evaluate(const State &state, nanoseconds budget, Forces &forces, Jacobian &jacobian) noexcept {
+    return static_cast<Status>(
+        wade_evaluate_jacobian(client_, &state, limit(budget), &forces, &jacobian.by_rows[0][0]));
   }
 
   // The forces in each state of a batch within a budget, or none. See `wade_evaluate_batch`.

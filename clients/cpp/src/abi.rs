@@ -14,6 +14,8 @@ pub const WADE_MAX_WHEELS: usize = 8;
 pub const WADE_MAX_EFFECTS: usize = 14;
 /// Most states of one batch.
 pub const WADE_MAX_BATCH: u32 = 4096;
+/// Columns of the derivatives of force and moment; see `wade_evaluate_jacobian`.
+pub const WADE_JACOBIAN_COLUMNS: usize = 11;
 /// Room for a name and its end.
 pub const WADE_NAME_SIZE: usize = 64;
 /// The age of forces where there are none yet.

@@ -15,7 +15,7 @@ pub struct Budget {
 /// Tries between two looks at the clock; whoever holds a lock for a copy is done by then.
 const TRIES: u32 = 100;
 /// Longest sleep between tries: whoever holds a lock for a question keeps it for tens of microseconds at least.
-const PAUSE: Duration = Duration::from_micros(50);
+pub const PAUSE: Duration = Duration::from_micros(50);
 
 /// The lock, unless somebody holds it until the deadline. One that has passed means a few tries.
 ///

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use wade_client::Address;
-use wade_wire::InvalidState;
 use wade_wire::shm::Wait;
+use wade_wire::{DERIVATIVES, InvalidState};
 
 use crate::abi::{WADE_MAX_BATCH, WADE_NEVER, WadeBatch, WadeForces, WadeState, WadeStatus};
 use crate::bounded::Budget;
@@ -15,6 +15,9 @@ use crate::grpc::Grpc;
 use crate::known::Known;
 use crate::last::nanoseconds_since;
 use crate::shm::Shm;
+
+/// Derivatives of force and moment by rows.
+pub type Jacobian = [f32; DERIVATIVES];
 
 /// Longest budget that the clock is asked for.
 const DAY: Duration = Duration::from_secs(86_400);
@@ -58,8 +61,14 @@ impl WadeClient {
         &self.known.connection
     }
 
-    /// The forces in a state, or the last ones.
-    pub fn evaluate(&self, state: &WadeState, budget_ns: u64, forces: &mut WadeForces) -> WadeStatus {
+    /// The forces in a state, or the last ones, and their derivatives where there is room for them.
+    pub fn evaluate(
+        &self,
+        state: &WadeState,
+        budget_ns: u64,
+        forces: &mut WadeForces,
+        jacobian: Option<&mut Jacobian>,
+    ) -> WadeStatus {
         let budget = budget(budget_ns);
         let valid = match checked(state) {
             Ok(valid) => valid,
@@ -70,8 +79,8 @@ impl WadeClient {
             }
         };
         match &self.transport {
-            Transport::Shm(client) => client.evaluate(&valid, state.session, budget, forces),
-            Transport::Grpc(client) => client.evaluate(&valid, state.session, budget, forces),
+            Transport::Shm(client) => client.evaluate(&valid, state.session, budget, (forces, jacobian)),
+            Transport::Grpc(client) => client.evaluate(&valid, state.session, budget, (forces, jacobian)),
         }
     }
 

@@ -20,7 +20,7 @@ use wade_wire::shm::Wait;
 use crate::abi::{
     WADE_ABI_VERSION, WadeBatch, WadeForces, WadeOptions, WadeState, WadeStatus, WadeVehicle, WadeWait,
 };
-use crate::client::WadeClient;
+use crate::client::{Jacobian, WadeClient};
 use crate::connection::status_of;
 use crate::pool::InCall;
 use crate::vehicle;
@@ -152,7 +152,34 @@ pub unsafe extern "C" fn wade_evaluate(
         let given = unsafe { (client.as_ref(), state.as_ref(), forces.as_mut()) };
         let (Some(client), Some(state), Some(forces)) = given else { return WadeStatus::InvalidArgument };
         let _in_call = InCall::begin();
-        client.evaluate(state, budget_ns, forces)
+        client.evaluate(state, budget_ns, forces, None)
+    })
+}
+
+/// The forces in a state and their derivatives, within a budget [ns]; as `wade_evaluate`, which costs a third to a fifth of it.
+///
+/// On WADE_STATUS_OK `jacobian` gets the derivatives of `force_n` and `moment_nm` in this state: 6 rows of WADE_JACOBIAN_COLUMNS
+/// numbers, by the velocity (3), the angular velocity (3), the water level, a turn of the body about its axes (3), and the
+/// density, each with the others held. Otherwise `jacobian` is as it was. Over shared memory the first call opens a port
+/// within its budget, which takes milliseconds. A vehicle without the physical base has no derivatives: it is refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wade_evaluate_jacobian(
+    client: *mut WadeClient,
+    state: *const WadeState,
+    budget_ns: u64,
+    forces: *mut WadeForces,
+    jacobian: *mut f32,
+) -> WadeStatus {
+    guarded(|| {
+        // SAFETY: null or valid; what is written to are numbers, for which every bit pattern is a value.
+        let given = unsafe {
+            (client.as_ref(), state.as_ref(), forces.as_mut(), jacobian.cast::<Jacobian>().as_mut())
+        };
+        let (Some(client), Some(state), Some(forces), Some(jacobian)) = given else {
+            return WadeStatus::InvalidArgument;
+        };
+        let _in_call = InCall::begin();
+        client.evaluate(state, budget_ns, forces, Some(jacobian))
     })
 }
 

@@ -6,10 +6,11 @@ use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
 use wade_client::{ClientError, GrpcLink, Reply, replies};
-use wade_wire::{Field, InvalidState, Problem, State, proto};
+use wade_wire::{DERIVATIVES, Field, InvalidState, Problem, State, proto};
 
 use crate::abi::{WADE_SESSION_BEGINS, WadeBatch, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{Budget, lock, lock_until};
+use crate::client::Jacobian;
 use crate::connection::{RETRY, status_of};
 use crate::event::Event;
 use crate::known::Known;
@@ -37,6 +38,8 @@ struct Shared {
     done: Mutex<Done>,
     answered: Event,
     batch: Mutex<Batch>,
+    /// The derivatives of the last answer that had any.
+    jacobian: Mutex<Jacobian>,
     /// How many wheels the vehicle had when the connection was made.
     wheels: AtomicUsize,
 }
@@ -93,6 +96,7 @@ impl Grpc {
             done: Mutex::new(Done { number: 0, status: WadeStatus::Ok }),
             answered: Event::new()?,
             batch: Mutex::new(batch),
+            jacobian: Mutex::new([0.0; DERIVATIVES]),
             wheels: AtomicUsize::new(0),
         });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -120,9 +124,10 @@ impl Grpc {
         state: &State,
         session: u64,
         budget: Budget,
-        forces: &mut WadeForces,
+        (forces, jacobian): (&mut WadeForces, Option<&mut Jacobian>),
     ) -> WadeStatus {
         let shared = &*self.shared;
+        let state = &State { jacobian: jacobian.is_some(), ..*state };
         let mut turn = lock_until(&shared.turn, budget.deadline);
         let mut invalid = None;
         let status = match &mut turn {
@@ -137,6 +142,9 @@ impl Grpc {
         };
         // while it is still this thread's turn, so that no other's answer comes between
         shared.known.last.get(forces);
+        if let Some(jacobian) = jacobian.filter(|_| status == WadeStatus::Ok) {
+            *jacobian = *lock(&shared.jacobian);
+        }
         drop(turn);
         if let Some(invalid) = invalid {
             forces.blame(&invalid);
@@ -315,8 +323,13 @@ impl Shared {
             let answer = match question.what {
                 What::Batch => self.answer_batch(&mut link).await,
                 What::State { state, session: of } => {
-                    let forces = answer(&mut link, &state, of, &mut session).await;
-                    forces.map(|forces| self.known.last.put(forces, question.at))
+                    let answer = answer(&mut link, &state, of, &mut session).await;
+                    answer.map(|(forces, jacobian)| {
+                        if let Some(jacobian) = jacobian {
+                            *lock(&self.jacobian) = jacobian;
+                        }
+                        self.known.last.put(forces, question.at);
+                    })
                 }
             };
             let status = answer.as_ref().map_or_else(status_of, |()| WadeStatus::Ok);
@@ -347,22 +360,24 @@ impl Shared {
     }
 }
 
-/// The forces in a state: in the stream where it belongs to a session, which has a stream of its own.
+/// The forces in a state, and their derivatives where it asks for them: in the stream where it belongs to a session, which has a stream of its own.
 async fn answer(
     link: &mut GrpcLink,
     state: &State,
     session: u64,
     streamed: &mut u64,
-) -> Result<WadeForces, ClientError> {
+) -> Result<(WadeForces, Option<Jacobian>), ClientError> {
     if session == 0 {
-        return Ok(WadeForces::from(&Reply::from(link.evaluate(state).await?)));
+        let reply = Reply::from(link.evaluate(state).await?);
+        return Ok((WadeForces::from(&reply), reply.jacobian));
     }
     if session != *streamed {
         link.end_stream();
         *streamed = session;
     }
     let begins = if link.has_stream() { 0 } else { WADE_SESSION_BEGINS };
-    let mut forces = WadeForces::from(&Reply::from(link.evaluate_in_stream(state).await?));
+    let reply = Reply::from(link.evaluate_in_stream(state).await?);
+    let mut forces = WadeForces::from(&reply);
     forces.flags |= begins;
-    Ok(forces)
+    Ok((forces, reply.jacobian))
 }

@@ -1,18 +1,19 @@
 //! Over shared memory the calling thread asks and waits by itself: a hand-over to another thread would cost more than the
 //! answer. The ports are opened, and given up, by a thread of the client's own.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use wade_client::{Asked, ShmLink};
+use wade_client::{Asked, Lost, ShmLink};
 use wade_wire::shm::Wait;
-use wade_wire::shm::layout::{Answer, BatchAnswer, MAX_BATCH, Names, Query, Status};
+use wade_wire::shm::layout::{Answer, BatchAnswer, JacobianAnswer, MAX_BATCH, Names, Query, Status};
 use wade_wire::{InvalidState, State};
 
 use crate::abi::{WadeBatch, WadeForces, WadeState, WadeStatus};
-use crate::bounded::{Budget, lock, lock_until};
-use crate::connection::RETRY;
+use crate::bounded::{Budget, PAUSE, lock, lock_until};
+use crate::client::Jacobian;
+use crate::connection::{RETRY, status_of};
 use crate::convert::{Refused, answered, refused};
 use crate::known::Known;
 use crate::skipped::Skipped;
@@ -42,6 +43,8 @@ struct Turn {
     open: Option<Open>,
     /// What broke, for the keeper to close: that takes its time.
     given_up: Option<(ShmLink, Option<Open>)>,
+    /// The port for derivatives, for the keeper to open.
+    wanted: Wanted,
     skipped: Skipped,
     batch: Vec<WadeForces>,
     /// When the first of the batches was asked that have had no answer since.
@@ -51,8 +54,50 @@ struct Turn {
 }
 
 struct Open {
-    asked: Asked<Query, Answer>,
+    asked: Question,
     at: Instant,
+}
+
+enum Question {
+    Forces(Asked<Query, Answer>),
+    Jacobian(Asked<Query, JacobianAnswer>),
+}
+
+impl Question {
+    fn ask(link: &mut ShmLink, query: Query, jacobian: bool) -> Result<Self, Lost> {
+        if jacobian {
+            return link.ask_jacobian(query).map(Self::Jacobian);
+        }
+        link.ask(query).map(Self::Forces)
+    }
+
+    /// The answer, if there is one until the deadline, with derivatives where they were asked for.
+    fn answer(
+        &self,
+        link: &mut ShmLink,
+        deadline: Instant,
+        jacobian: Option<&mut Jacobian>,
+    ) -> Result<Option<Result<WadeForces, Refused>>, Lost> {
+        match self {
+            Self::Forces(asked) => link.answer(asked, deadline, answered),
+            Self::Jacobian(asked) => link.answer_jacobian(asked, deadline, |page| {
+                let forces = answered(&page.answer)?;
+                if let Some(jacobian) = jacobian {
+                    *jacobian = page.jacobian;
+                }
+                Ok(forces)
+            }),
+        }
+    }
+}
+
+/// Whether the keeper is to open the port for derivatives.
+#[derive(Clone, Copy, PartialEq)]
+enum Wanted {
+    No,
+    Yes,
+    /// The server has none.
+    Refused(WadeStatus),
 }
 
 impl Shm {
@@ -68,6 +113,7 @@ impl Shm {
             link: None,
             open: None,
             given_up: None,
+            wanted: Wanted::No,
             skipped: Skipped::default(),
             batch: Vec::with_capacity(max_batch),
             batch_asked: None,
@@ -91,15 +137,18 @@ impl Shm {
         state: &State,
         session: u64,
         budget: Budget,
-        forces: &mut WadeForces,
+        (forces, jacobian): (&mut WadeForces, Option<&mut Jacobian>),
     ) -> WadeStatus {
-        let turn = lock_until(&self.shared.turn, budget.deadline);
+        let turn = match &jacobian {
+            None => lock_until(&self.shared.turn, budget.deadline),
+            Some(_) => self.lock_with_jacobian(budget.deadline),
+        };
         let Some(mut turn) = turn else {
             self.shared.known.last.get(forces);
             return WadeStatus::Timeout;
         };
         let query = Query { session, ..Query::from(state) };
-        let status = turn.evaluate(&self.shared, query, budget);
+        let status = turn.evaluate(&self.shared, query, budget, jacobian);
         self.wake_keeper(&turn);
         // while it is still this thread's turn, so that no other's answer comes between
         self.shared.known.last.get(forces);
@@ -107,6 +156,25 @@ impl Shm {
             forces.blame(&invalid);
         }
         status
+    }
+
+    /// This thread's turn, once the port for derivatives is open or nobody will open it.
+    fn lock_with_jacobian(&self, deadline: Instant) -> Option<MutexGuard<'_, Turn>> {
+        loop {
+            let mut turn = lock_until(&self.shared.turn, deadline)?;
+            let lacks = turn.link.as_ref().is_some_and(|link| !link.has_jacobian());
+            if !lacks || matches!(turn.wanted, Wanted::Refused(_)) {
+                return Some(turn);
+            }
+            turn.wanted = Wanted::Yes;
+            drop(turn);
+            self.keeper.thread().unpark();
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
+            }
+            thread::sleep(left.min(PAUSE));
+        }
     }
 
     /// Asks for the forces in the states of a batch until the deadline; all of them are written, or none.
@@ -145,12 +213,21 @@ impl Shm {
 }
 
 impl Turn {
-    fn evaluate(&mut self, shared: &Shared, query: Query, budget: Budget) -> WadeStatus {
+    fn evaluate(
+        &mut self,
+        shared: &Shared,
+        query: Query,
+        budget: Budget,
+        jacobian: Option<&mut Jacobian>,
+    ) -> WadeStatus {
         let Budget { start, deadline } = budget;
         let Some(link) = &mut self.link else { return shared.why_not() };
+        if let (Some(_), Wanted::Refused(status)) = (&jacobian, self.wanted) {
+            return status;
+        }
         let query = Query { time_step_s: self.skipped.step(query.session, query.time_step_s), ..query };
         if let Some(open) = &self.open {
-            match link.answer(&open.asked, deadline, answered) {
+            match open.asked.answer(link, deadline, None) {
                 Ok(Some(answer)) => {
                     if let Ok(forces) = answer {
                         shared.known.last.put(forces, open.at);
@@ -162,9 +239,11 @@ impl Turn {
                 Err(_) => return self.give_up(shared, WadeStatus::NoServer),
             }
         }
-        let Ok(asked) = link.ask(query) else { return self.give_up(shared, WadeStatus::NoServer) };
+        let Ok(asked) = Question::ask(link, query, jacobian.is_some()) else {
+            return self.give_up(shared, WadeStatus::NoServer);
+        };
         self.skipped.asked();
-        match link.answer(&asked, deadline, answered) {
+        match asked.answer(link, deadline, jacobian) {
             Ok(Some(Ok(forces))) => {
                 shared.known.last.put(forces, start);
                 WadeStatus::Ok
@@ -217,7 +296,7 @@ impl Turn {
     fn give_up(&mut self, shared: &Shared, status: WadeStatus) -> WadeStatus {
         shared.known.connection.lost();
         // what was remembered is lost with the link
-        (self.skipped, self.batch_asked) = (Skipped::default(), None);
+        (self.skipped, self.batch_asked, self.wanted) = (Skipped::default(), None, Wanted::No);
         self.given_up = self.link.take().map(|link| (link, self.open.take()));
         status
     }
@@ -261,7 +340,12 @@ impl Shared {
     fn keep(&self) {
         while !self.known.connection.is_stopped() {
             let mut turn = lock(&self.turn);
-            let (given_up, linked) = (turn.given_up.take(), turn.link.is_some());
+            let given_up = turn.given_up.take();
+            if let (Wanted::Yes, Some(link)) = (turn.wanted, &mut turn.link) {
+                let opened = link.open_jacobian(&self.names, &self.vehicle);
+                turn.wanted = opened.map_or_else(|error| Wanted::Refused(status_of(&error)), |()| Wanted::No);
+            }
+            let linked = turn.link.is_some();
             drop(turn);
             if let Some((link, open)) = given_up {
                 drop((open, link));

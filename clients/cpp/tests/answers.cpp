@@ -73,6 +73,45 @@ void the_same_bits_over_every_transport_alone_and_in_a_batch(const Server &serve
   CHECK(std::abs(sum - static_cast<double>(first.force_n[2])) < 1e-2);
 }
 
+void the_same_derivatives_over_every_transport(const Server &server) {
+  const auto asked = states(20);
+  std::vector<wade::Jacobian> reference;
+  for (const auto &address : server.addresses()) {
+    wade::Client client = connected(address, "husky");
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      wade::Forces with, without;
+      wade::Jacobian jacobian;
+      CHECK_EQUAL(client.evaluate(asked[i], patience, with, jacobian), wade::Status::ok);
+      CHECK_EQUAL(client.evaluate(asked[i], patience, without), wade::Status::ok);
+      CHECK(same(with, without));
+      if (reference.size() == i) reference.push_back(jacobian);
+      CHECK(std::memcmp(&jacobian, &reference[i], sizeof jacobian) == 0);
+    }
+    // what there is no answer for leaves them as they were
+    wade::Forces forces;
+    wade::Jacobian kept = reference.front();
+    wade::State wrong = asked.front();
+    wrong.density_kgpm3 = -1.0F;
+    CHECK_EQUAL(client.evaluate(wrong, patience, forces, kept), wade::Status::invalid_state);
+    CHECK(std::memcmp(&kept, &reference.front(), sizeof kept) == 0);
+  }
+  // against differences of the force ahead by the speed ahead, which are those of single precision
+  wade::Client client = connected(server.shm(), "husky");
+  wade::State state = wade::state(0.2F);
+  const auto ahead = [&](float speed) {
+    wade::Forces forces;
+    state.velocity_mps[0] = speed;
+    CHECK_EQUAL(client.evaluate(state, patience, forces), wade::Status::ok);
+    return static_cast<double>(forces.force_n[0]);
+  };
+  const double difference = (ahead(1.01F) - ahead(0.99F)) / 0.02;
+  wade::Forces forces;
+  wade::Jacobian jacobian;
+  state.velocity_mps[0] = 1.0F;
+  CHECK_EQUAL(client.evaluate(state, patience, forces, jacobian), wade::Status::ok);
+  CHECK(difference < 0.0 && std::abs(static_cast<double>(jacobian.by_rows[0][0]) / difference - 1.0) < 0.02);
+}
+
 void a_vehicle_is_told(const Server &server) {
   static wade::Vehicle vehicle;
   for (const auto &address : server.addresses()) {
@@ -136,6 +175,7 @@ int main() {
   Server server;
   server.start();
   the_same_bits_over_every_transport_alone_and_in_a_batch(server);
+  the_same_derivatives_over_every_transport(server);
   a_vehicle_is_told(server);
   threads_share_a_client(server);
 }

@@ -73,7 +73,7 @@ def rust_type(dtype: np.dtype[Any]) -> str:
     """How Rust writes a field of this type."""
     names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|u1": "u8", "|S64": "[u8; PROVENANCE_LEN]"}
     reserved = ("RESERVED_LEN", "ANSWER_RESERVED_LEN")
-    rooms = ("MAX_SURFACES", "MAX_BATCH", "MAX_EFFECTS", "MAX_QUANTITIES", "MAX_WHEELS", *reserved)
+    rooms = ("MAX_SURFACES", "MAX_BATCH", "MAX_EFFECTS", "MAX_QUANTITIES", "MAX_WHEELS", "DERIVATIVES", *reserved)
     lengths = {getattr(shm_layout, room): room for room in rooms}
     structs = {shm_layout.QUERY: "Query", shm_layout.ANSWER: "Answer", shm_layout.BATCH_HEADER: "BatchHeader"}
     structs[shm_layout.EFFECT_ANSWER] = "EffectAnswer"
@@ -91,6 +91,7 @@ def rust_type(dtype: np.dtype[Any]) -> str:
         ("EffectAnswer", shm_layout.EFFECT_ANSWER),
         ("SurfaceAnswer", shm_layout.SURFACE_ANSWER),
         ("Answer", shm_layout.ANSWER),
+        ("JacobianAnswer", shm_layout.JACOBIAN_ANSWER),
         ("BatchHeader", shm_layout.BATCH_HEADER),
         ("BatchQuery", shm_layout.BATCH_QUERY),
         ("BatchAnswer", shm_layout.BATCH_ANSWER),
@@ -182,6 +183,7 @@ def test_the_names_are_the_servers() -> None:
     ours = (
         shm_layout.evaluate_name("", "{vehicle}"),
         shm_layout.evaluate_batch_name("", "{vehicle}"),
+        shm_layout.evaluate_jacobian_name("", "{vehicle}"),
         shm_layout.served_name(""),
         shm_layout.wake_name(""),
         shm_layout.done_name(""),

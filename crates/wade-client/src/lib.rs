@@ -212,6 +212,9 @@ impl Client {
         match self {
             Self::InProcess(client) => client.evaluate(state),
             Self::Grpc(client) => client.evaluate(state).map(Reply::from),
+            Self::Shm(client) if state.jacobian => {
+                client.evaluate_with_jacobian(state).map(|page| Reply::from(&page))
+            }
             Self::Shm(client) => client.evaluate(state).map(|answer| Reply::from(&answer)),
         }
     }
@@ -221,6 +224,11 @@ impl Client {
         match self {
             Self::InProcess(client) => states.iter().map(|state| client.evaluate(state)).collect(),
             Self::Grpc(client) => client.evaluate_batch(states).map(grpc::replies),
+            Self::Shm(client) if states.iter().any(|state| state.jacobian) => {
+                // a batch has no room for derivatives
+                let replies = |state| client.evaluate_with_jacobian(state).map(|page| Reply::from(&page));
+                states.iter().map(replies).collect()
+            }
             Self::Shm(client) => {
                 client.evaluate_batch(states).map(|answers| answers.iter().map(Reply::from).collect())
             }
@@ -234,6 +242,9 @@ impl Client {
             (Self::InProcess(client), _) => client.compute(states),
             (Self::Grpc(client), [state]) => client.evaluate(state).map(|response| response.compute_ns),
             (Self::Grpc(client), _) => client.evaluate_batch(states).map(|response| response.compute_ns),
+            (Self::Shm(client), [state]) if state.jacobian => {
+                client.evaluate_with_jacobian(state).map(|page| page.answer.compute_ns)
+            }
             (Self::Shm(client), [state]) => client.evaluate(state).map(|answer| answer.compute_ns),
             (Self::Shm(client), _) => client.compute_batch(states),
         }

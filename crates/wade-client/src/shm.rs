@@ -9,8 +9,8 @@ use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply};
 use wade_core::effects::{Effect, LeftOut};
 use wade_wire::State;
 use wade_wire::shm::layout::{
-    Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, HAS_DAMPING, MAX_BATCH, Names, Query, Status,
-    SurfaceAnswer,
+    Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, HAS_DAMPING, JacobianAnswer, MAX_BATCH, Names, Query,
+    Status, SurfaceAnswer,
 };
 use wade_wire::shm::{self, Wait};
 
@@ -42,16 +42,35 @@ impl ShmClient {
         Self { names: Names::new(namespace), ..self }
     }
 
-    /// The forces in one state.
+    /// The forces in one state, which asks for no derivatives.
     pub fn evaluate(&mut self, state: &State) -> Result<Answer, ClientError> {
         let query = Query { session: self.session, ..Query::from(state) };
         let answer = self.exchange(|link, deadline| {
             let asked = link.ask(query)?;
             link.answer(&asked, deadline, Answer::copied)
         })?;
+        self.check(&answer, state)?;
+        Ok(answer)
+    }
+
+    /// The forces in one state, and their derivatives.
+    pub fn evaluate_with_jacobian(&mut self, state: &State) -> Result<JacobianAnswer, ClientError> {
+        let query = Query { session: self.session, ..Query::from(&State { jacobian: true, ..*state }) };
+        let (names, vehicle) = (self.names.clone(), self.vehicle.clone());
+        self.link()?.open_jacobian(&names, &vehicle)?;
+        let page = self.exchange(|link, deadline| {
+            let asked = link.ask_jacobian(query)?;
+            link.answer_jacobian(&asked, deadline, JacobianAnswer::copied)
+        })?;
+        self.check(&page.answer, state)?;
+        Ok(page)
+    }
+
+    /// Passes an answer that has forces.
+    fn check(&self, answer: &Answer, state: &State) -> Result<(), ClientError> {
         match answer.refusal_of(state) {
             Some(invalid) => Err(invalid.into()),
-            None if answer.status == Status::Ok as u32 => Ok(answer),
+            None if answer.status == Status::Ok as u32 => Ok(()),
             None => Err(self.refused(answer.status)),
         }
     }
@@ -108,17 +127,21 @@ impl ShmClient {
         }
     }
 
+    /// The link, opened where there is none.
+    fn link(&mut self) -> Result<&mut ShmLink, ClientError> {
+        match &mut self.link {
+            Some(link) => Ok(link),
+            none => Ok(none.insert(ShmLink::open(&self.names, &self.vehicle, self.wait)?)),
+        }
+    }
+
     /// One call on a link that is opened where there is none and given up where nobody answers.
     fn exchange<T>(
         &mut self,
         call: impl FnOnce(&mut ShmLink, Instant) -> Result<Option<T>, Lost>,
     ) -> Result<T, ClientError> {
         let deadline = Instant::now() + self.timeout;
-        let link = match &mut self.link {
-            Some(link) => link,
-            None => self.link.insert(ShmLink::open(&self.names, &self.vehicle, self.wait)?),
-        };
-        let result = match call(link, deadline) {
+        let result = match call(self.link()?, deadline) {
             Ok(Some(taken)) => return Ok(taken),
             Ok(None) => Err(ClientError::Timeout(self.timeout)),
             Err(lost) => Err(ClientError::NoServer { at: "shared memory".into(), reason: lost.to_string() }),
@@ -174,5 +197,11 @@ impl From<&Answer> for Reply {
             jacobian: None,
             compute_ns: answer.compute_ns,
         }
+    }
+}
+
+impl From<&JacobianAnswer> for Reply {
+    fn from(page: &JacobianAnswer) -> Self {
+        Self { jacobian: Some(page.jacobian), ..Self::from(&page.answer) }
     }
 }

@@ -18,7 +18,8 @@ use tonic::Code;
 
 use super::ClientError;
 use wade_wire::shm::layout::{
-    Answer, BatchAnswer, BatchHeader, BatchQuery, Names, Query, SERVER_POLLS, VERSION, wake_name,
+    Answer, BatchAnswer, BatchHeader, BatchQuery, JacobianAnswer, Names, Query, SERVER_POLLS, VERSION,
+    wake_name,
 };
 use wade_wire::shm::served::{self, Served};
 use wade_wire::shm::{self, OpenError, ShmError, Wait, room};
@@ -34,11 +35,13 @@ const SPINS_PER_LOOK: u32 = 64;
 pub struct ShmLink {
     single: Client<Ipc, Query, (), Answer, ()>,
     batch: Client<Ipc, BatchQuery, (), BatchAnswer, ()>,
+    /// Opened by whoever asks for derivatives.
+    jacobian: Option<Client<Ipc, Query, (), JacobianAnswer, ()>>,
     wake: Notifier<Ipc>,
     sleep: Option<(Listener<Ipc>, u64)>,
     server_polls: bool,
     sequence: u64,
-    _node: Node<Ipc>,
+    node: Node<Ipc>,
 }
 
 /// A question that is open. Dropped, it is withdrawn.
@@ -95,18 +98,13 @@ impl ShmLink {
             // other clients keep the service of a server that is gone
             return Err(why_not(names, vehicle));
         }
-        let no_place = |error: &dyn std::fmt::Display| ClientError::Refused {
-            code: Code::ResourceExhausted,
-            message: format!(
-                "no place for another client of {vehicle}: {error}; the limit is shm.max_clients"
-            ),
-        };
+        let no_place = |error: &dyn std::fmt::Display| no_place(vehicle, error);
         let single = single.client_builder().create().map_err(|error| no_place(&error))?;
         let batch = batch.client_builder().create().map_err(|error| no_place(&error))?;
         let wake = shm::events(&node, &names.wake()).map_err(failed)?.notifier_builder().create();
         let wake = wake.map_err(|error| no_place(&error))?;
         let sleep = (wait == Wait::Block).then(|| listener(&node, names)).transpose().map_err(failed)?;
-        Ok(Self { single, batch, wake, sleep, server_polls: false, sequence: 0, _node: node })
+        Ok(Self { single, batch, jacobian: None, wake, sleep, server_polls: false, sequence: 0, node })
     }
 
     /// Asks for the forces in one state.
@@ -126,6 +124,51 @@ impl ShmLink {
         take: impl FnOnce(&Answer) -> T,
     ) -> Result<Option<T>, Lost> {
         self.until(deadline, asked, |answer| (answer.flags, take(answer)))
+    }
+
+    /// Whether [`Self::open_jacobian`] has opened the port for derivatives.
+    pub fn has_jacobian(&self) -> bool {
+        self.jacobian.is_some()
+    }
+
+    /// Opens the port for derivatives, where it is not open yet. Takes milliseconds.
+    pub fn open_jacobian(&mut self, names: &Names, vehicle: &str) -> Result<(), ClientError> {
+        if self.jacobian.is_some() {
+            return Ok(());
+        }
+        let at = names.evaluate_jacobian(vehicle);
+        let service =
+            shm::open::<_, Query, JacobianAnswer>(&self.node, &at).map_err(|error| match error {
+                OpenError::Failed(error) => ClientError::NoServer { at, reason: error.to_string() },
+                OpenError::Absent | OpenError::OtherTypes => ClientError::Refused {
+                    code: Code::Unimplemented,
+                    message: format!(
+                        "the server has no derivatives over shared memory: it is of an earlier version ({at})"
+                    ),
+                },
+            })?;
+        let port = service.client_builder().create().map_err(|error| no_place(vehicle, &error))?;
+        self.jacobian = Some(port);
+        Ok(())
+    }
+
+    /// Asks for the forces in one state with their derivatives, once [`Self::open_jacobian`] has opened the port.
+    pub fn ask_jacobian(&mut self, query: Query) -> Result<Asked<Query, JacobianAnswer>, Lost> {
+        let (sequence, wake_key) = (self.next_sequence(), self.wake_key());
+        let port = self.jacobian.as_ref().ok_or(Lost::Server)?;
+        let pending = port.send_copy(Query { sequence, wake_key, ..query }).map_err(Lost::Send)?;
+        self.notify();
+        connected(pending)
+    }
+
+    /// What `take` makes of the answer with derivatives; as [`ShmLink::answer`].
+    pub fn answer_jacobian<T>(
+        &mut self,
+        asked: &Asked<Query, JacobianAnswer>,
+        deadline: Instant,
+        take: impl FnOnce(&JacobianAnswer) -> T,
+    ) -> Result<Option<T>, Lost> {
+        self.until(deadline, asked, |page| (page.answer.flags, take(page)))
     }
 
     /// Asks for the forces in the states of a batch: those of `queries` after the first [`MAX_BATCH`](wade_wire::shm::layout::MAX_BATCH) are left out.
@@ -206,6 +249,13 @@ impl ShmLink {
                 }
             }
         }
+    }
+}
+
+fn no_place(vehicle: &str, error: &dyn std::fmt::Display) -> ClientError {
+    ClientError::Refused {
+        code: Code::ResourceExhausted,
+        message: format!("no place for another client of {vehicle}: {error}; the limit is shm.max_clients"),
     }
 }
 

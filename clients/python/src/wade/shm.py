@@ -11,6 +11,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -20,7 +21,7 @@ from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
 from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
 from .local import SessionStream, flags, session_numbers
-from .shm_link import Link, Lost, memory, vehicles
+from .shm_link import BATCH, JACOBIAN, SINGLE, Link, Lost, Service, memory, vehicles
 from .state import TOLD_AT, State
 
 _T = TypeVar("_T")
@@ -62,15 +63,17 @@ class ShmClient:
         def write(address: int, wake_key: int) -> None:
             ctypes.memmove(address, _query(self._sequence, wake_key, session, flagged, floats), layout.QUERY.itemsize)
 
+        service, dtype = (JACOBIAN, layout.JACOBIAN_ANSWER) if state.jacobian else (SINGLE, layout.ANSWER)
         with self._lock:
-            answer = self._exchange(vehicle, False, write, _read, end, timeout_s)
+            page = self._exchange(vehicle, service, write, lambda address: _read(address, dtype), end, timeout_s)
+        answer, jacobian = (page["answer"], page["jacobian"]) if state.jacobian else (page, None)
         _check(answer["status"], answer, None, _wheels(floats) if state.wheel_speed_radps is not None else 0)
-        return _forces(answer)
+        return _forces(answer, jacobian)
 
     def evaluate_batch(
         self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
     ) -> Forces:
-        """The forces in N states of one vehicle, which travel 256 at a time."""
+        """The forces in N states of one vehicle, which travel 256 at a time, and alone with derivatives."""
         timeout_s, end = self._end(timeout_s)
         rows, flagged = states.rows(), flags(states)
         length = states.length(rows)
@@ -80,15 +83,18 @@ class ShmClient:
             forces: Forces | None = None
             start = 0
             while start < length:
-                chunk = slice(start, min(start + layout.MAX_BATCH, length))
+                chunk = slice(start, min(start + (1 if states.jacobian else layout.MAX_BATCH), length))
 
                 def write(address: int, wake_key: int, chunk: slice = chunk) -> None:
-                    _write_batch(address, (self._sequence, wake_key), flagged, sessions, rows, chunk)
+                    write = _write_row if states.jacobian else _write_batch
+                    write(address, (self._sequence, wake_key), flagged, sessions, rows, chunk)
 
                 def read(address: int, forces: Forces | None = forces, chunk: slice = chunk) -> Forces:
-                    return _read_batch(address, forces, length, chunk, surfaces, wheels)
+                    read = _read_row if states.jacobian else _read_batch
+                    return read(address, forces, length, chunk, surfaces, wheels)
 
-                answered = self._exchange(vehicle, True, write, read, end, timeout_s)
+                service = JACOBIAN if states.jacobian else BATCH
+                answered = self._exchange(vehicle, service, write, read, end, timeout_s)
                 if forces is not None and answered is not forces:
                     # a bundle that was exchanged on the way would mix two versions in one answer: from the start again,
                     # without moving on those runs that have moved
@@ -127,7 +133,7 @@ class ShmClient:
     def _exchange(
         self,
         vehicle: str,
-        batch: bool,
+        service: Service,
         write: Callable[[int, int], None],
         read: Callable[[int], _T],
         end: float,
@@ -139,11 +145,11 @@ class ShmClient:
         self._sequence += 1
         try:
             try:
-                response = self._connected().exchange(vehicle, batch, write, end, timeout_s)
+                response = self._connected().exchange(vehicle, service, write, end, timeout_s)
             except Lost:
                 # a server that was restarted is found by new ports
                 self._link = None
-                response = self._connected().exchange(vehicle, batch, write, end, timeout_s)
+                response = self._connected().exchange(vehicle, service, write, end, timeout_s)
         except Lost:
             link, self._link = self._connected(), None
             raise link.why_not(vehicle) from None
@@ -179,9 +185,9 @@ def _query(sequence: int, wake_key: int, session: int, flags: int, floats: list[
         return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *values)
 
 
-def _read(address: int) -> np.void:
-    answer: np.void = np.frombuffer(ctypes.string_at(address, layout.ANSWER.itemsize), layout.ANSWER)[0]
-    return answer
+def _read(address: int, dtype: np.dtype[Any]) -> np.void:
+    page: np.void = np.frombuffer(ctypes.string_at(address, dtype.itemsize), dtype)[0]
+    return page
 
 
 def _write_batch(
@@ -192,6 +198,18 @@ def _write_batch(
     header, queries = batch["header"], batch["queries"][:count]
     header["sequence"], header["wake_key"] = who
     header["flags"], header["count"] = 0, count
+    _write_queries(queries, flags, sessions, rows, chunk)
+
+
+def _write_row(
+    address: int, who: tuple[int, int], flags: int, sessions: Any, rows: dict[str, Array], chunk: slice
+) -> None:
+    query = np.frombuffer(memory(address, layout.QUERY.itemsize), layout.QUERY)
+    _write_queries(query, flags, sessions, rows, chunk)
+    query["sequence"], query["wake_key"] = who
+
+
+def _write_queries(queries: Any, flags: int, sessions: Any, rows: dict[str, Array], chunk: slice) -> None:
     # the place holds what an earlier batch left
     queries[...] = layout.UNSET_QUERY
     queries["session"] = sessions[chunk]
@@ -205,7 +223,7 @@ def _write_batch(
         place[...] = array[chunk]
 
 
-def _forces(answer: np.void) -> Forces:
+def _forces(answer: np.void, jacobian: Array | None) -> Forces:
     surfaces, flags = answer["surfaces"][: _surface_count(answer)], int(answer["flags"])
     has_base = flags & layout.HAS_DAMPING != 0
     effects, effect_force, effect_moment, left_out, effect_surface_force, effects_outside = _effects(answer, surfaces)
@@ -227,7 +245,7 @@ def _forces(answer: np.void) -> Forces:
         effect_surface_force_n=effect_surface_force,
         effects_outside=effects_outside,
         added_mass=answer["added_mass"].reshape(6, 6) if flags & layout.HAS_ADDED_MASS else None,
-        jacobian=None,
+        jacobian=None if jacobian is None else jacobian.reshape(6, layout.JACOBIAN_COLUMNS),
         damping=answer["damping"].reshape(6, 6) if has_base else None,
         water_level_m=answer["water_level_m"] if has_base else None,
         bed_clearance_m=answer["bed_clearance_m"] if has_base else None,
@@ -263,7 +281,27 @@ def _read_batch(
     batch = np.frombuffer(memory(address, layout.BATCH_ANSWER.itemsize), layout.BATCH_ANSWER)[0]
     index = int(batch["index"]) % layout.MAX_BATCH
     _check(batch["status"], batch["answers"][index], chunk.start + index, wheels)
-    answers = batch["answers"][: chunk.stop - chunk.start]
+    return _read_answers(batch["answers"], int(batch["compute_ns"]), forces, length, chunk, with_surfaces)
+
+
+def _read_row(
+    address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool, wheels: int
+) -> Forces:
+    page = np.frombuffer(memory(address, layout.JACOBIAN_ANSWER.itemsize), layout.JACOBIAN_ANSWER)
+    answer = page["answer"]
+    _check(answer["status"][0], answer[0], chunk.start, wheels)
+    read = _read_answers(answer, int(answer["compute_ns"][0]), forces, length, chunk, with_surfaces)
+    if read.jacobian is None:
+        read = replace(read, jacobian=np.empty((length, 6, layout.JACOBIAN_COLUMNS), np.float32))
+    assert read.jacobian is not None
+    read.jacobian[chunk] = page["jacobian"].reshape(1, 6, -1)
+    return read
+
+
+def _read_answers(
+    answers: Any, compute_ns: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool
+) -> Forces:
+    answers = answers[: chunk.stop - chunk.start]
     if forces is None or forces.bundle_version != answers[0]["bundle_version"]:
         forces = _empty(answers[0], length, _surface_count(answers[0]) if with_surfaces else 0)
     forces.force_n[chunk], forces.moment_nm[chunk] = answers["force_n"], answers["moment_nm"]
@@ -285,7 +323,7 @@ def _read_batch(
             values[chunk] = answers[name]
     _read_effects(answers, forces, chunk)
     np.asarray(forces.session_begins)[chunk] = answers["flags"] & layout.SESSION_BEGINS != 0
-    forces.compute_ns += int(batch["compute_ns"])
+    forces.compute_ns += compute_ns
     return forces
 
 

@@ -42,7 +42,7 @@ HAS_WHEEL_LEVELS = 256
 HYDROSTATIC = 512
 QUASI_STEADY = 1024
 FULL = 2048
-#: Flag of a query: the derivatives are asked for, for which the pages of these services have no room.
+#: Flag of a query: the derivatives are asked for, for which `evaluate_jacobian_name` alone has room.
 JACOBIAN = 4096
 #: Flag of an answer: the server polls, so that waking it is of no use.
 SERVER_POLLS = 1
@@ -131,6 +131,12 @@ ANSWER = np.dtype(
         ("reserved", "u1", ANSWER_RESERVED_LEN),
     ]
 )
+
+#: Columns of the derivatives, and their numbers.
+JACOBIAN_COLUMNS = 11
+DERIVATIVES = 6 * JACOBIAN_COLUMNS
+
+JACOBIAN_ANSWER = np.dtype([("answer", ANSWER), ("jacobian", "<f4", DERIVATIVES), _RESERVED])
 
 BATCH_HEADER = np.dtype(
     [("sequence", "<u8"), ("wake_key", "<u8"), ("flags", "<u8"), ("count", "<u4"), ("spare", "<u4"), _RESERVED]
@@ -238,6 +244,7 @@ def _payload(name: str, dtype: np.dtype[Any]) -> type[ctypes.Structure]:
 
 Query = _payload("Query", QUERY)
 Answer = _payload("Answer", ANSWER)
+JacobianAnswer = _payload("JacobianAnswer", JACOBIAN_ANSWER)
 BatchQuery = _payload("BatchQuery", BATCH_QUERY)
 BatchAnswer = _payload("BatchAnswer", BATCH_ANSWER)
 
@@ -250,6 +257,11 @@ def evaluate_name(namespace: str, vehicle: str) -> str:
 def evaluate_batch_name(namespace: str, vehicle: str) -> str:
     """Name of a vehicle's service for batches."""
     return f"{namespace}/{VERSION}/evaluate_batch/{vehicle}"
+
+
+def evaluate_jacobian_name(namespace: str, vehicle: str) -> str:
+    """Name of a vehicle's service for single states with derivatives."""
+    return f"{namespace}/{VERSION}/evaluate_jacobian/{vehicle}"
 
 
 def served_name(namespace: str) -> str:

@@ -11,9 +11,10 @@ from collections.abc import Callable
 from typing import Any
 
 import iceoryx2 as iox
+import numpy as np
 
 from . import shm_layout as layout
-from .errors import DeadlineExceeded, LayoutMismatch, ResourceExhausted, ServerUnavailable, UnknownVehicle
+from .errors import DeadlineExceeded, LayoutMismatch, Refused, ResourceExhausted, ServerUnavailable, UnknownVehicle
 
 #: What iceoryx2 raises where a port broke; it has no common base.
 _FAILURES = (
@@ -27,12 +28,24 @@ _FAILURES = (
     iox.RequestResponseOpenError,
 )
 
-# where status and flags of an answer lie, by whether it is a batch's
-_STATUS_AT = {
-    False: layout.fields(layout.ANSWER)["status"][1],
-    True: layout.fields(layout.BATCH_ANSWER)["status"][1],
-}
-_FLAGS_AT = {False: layout.fields(layout.ANSWER)["flags"][1], True: layout.fields(layout.BATCH_ANSWER)["flags"][1]}
+
+class Service:
+    """A service of a vehicle: its name, its types, and where the status and the flags of an answer lie."""
+
+    def __init__(
+        self,
+        name: Callable[[str, str], str],
+        types: tuple[type[ctypes.Structure], type[ctypes.Structure]],
+        answer: np.dtype[Any],
+    ):
+        self.name, self.types = name, types
+        self.status_at, self.flags_at = (layout.fields(answer)[field][1] for field in ("status", "flags"))
+
+
+SINGLE = Service(layout.evaluate_name, (layout.Query, layout.Answer), layout.ANSWER)
+#: Its answer begins with that of a single state.
+JACOBIAN = Service(layout.evaluate_jacobian_name, (layout.Query, layout.JacobianAnswer), layout.ANSWER)
+BATCH = Service(layout.evaluate_batch_name, (layout.BatchQuery, layout.BatchAnswer), layout.BATCH_ANSWER)
 
 # its log would go to standard output, and says of every server that is not there that it is not there
 iox.set_log_level_from_env_or(iox.LogLevel.Fatal)
@@ -112,7 +125,7 @@ class Link:
         self._server_polls = False
         # names this client's listener among all others'; 0 where the client polls
         self._wake_key = secrets.randbits(63) + 1 if blocks else 0
-        self._ports: dict[tuple[str, bool], Any] = {}
+        self._ports: dict[tuple[str, Service], Any] = {}
         _check_room()
         try:
             # the signals belong to the program
@@ -126,11 +139,11 @@ class Link:
         self._listener: Any = None
 
     def exchange(
-        self, vehicle: str, batch: bool, write: Callable[[int, int], None], end: float, timeout_s: float
+        self, vehicle: str, service: Service, write: Callable[[int, int], None], end: float, timeout_s: float
     ) -> Any:
         """Sends what `write` puts at the address of a request, and gives the response, which lies in shared memory."""
         try:
-            port = self._ports.get((vehicle, batch)) or self._open(vehicle, batch)
+            port = self._ports.get((vehicle, service)) or self._open(vehicle, service)
             request = port.loan_uninit()
             write(request.payload_ptr, self._wake_key)
             pending = request.assume_init().send()
@@ -139,16 +152,16 @@ class Link:
             if not self._server_polls:
                 self._notify()
             response = self._await(pending, end, timeout_s)
-            flags = ctypes.c_uint64.from_address(response.payload_ptr + _FLAGS_AT[batch]).value
+            flags = ctypes.c_uint64.from_address(response.payload_ptr + service.flags_at).value
             self._server_polls = bool(flags & layout.SERVER_POLLS)
-            status = ctypes.c_uint32.from_address(response.payload_ptr + _STATUS_AT[batch]).value
+            status = ctypes.c_uint32.from_address(response.payload_ptr + service.status_at).value
             if status == layout.STATUS_NOT_SERVED:
                 raise self._not_served(vehicle)
             return response
         except _FAILURES as failure:
             raise ServerUnavailable(self._at(), str(failure)) from None
 
-    def why_not(self, vehicle: str) -> Exception:
+    def why_not(self, vehicle: str, service: Service = SINGLE) -> Exception:
         """The reason why there is no server for a vehicle."""
         try:
             served = vehicles(self._namespace)
@@ -156,6 +169,8 @@ class Link:
             return failure
         if vehicle not in served:
             return UnknownVehicle(vehicle, f"vehicle {vehicle!r} is not served; there are: {', '.join(served)}")
+        if service is JACOBIAN:
+            return Refused("no derivatives", "over shared memory the server has none; it is of an earlier version")
         return ServerUnavailable(self._at(), f"the server has not opened {vehicle}")
 
     def _not_served(self, vehicle: str) -> UnknownVehicle:
@@ -170,23 +185,22 @@ class Link:
     def _at(self) -> str:
         return _at(self._namespace)
 
-    def _exchange_service(self, vehicle: str, batch: bool) -> Any:
-        types = (layout.BatchQuery, layout.BatchAnswer) if batch else (layout.Query, layout.Answer)
-        name = (layout.evaluate_batch_name if batch else layout.evaluate_name)(self._namespace, vehicle)
+    def _exchange_service(self, vehicle: str, service: Service) -> Any:
+        name = service.name(self._namespace, vehicle)
         try:
-            service = iox.ServiceName.new(name)
-            return self._node.service_builder(service).request_response(*types).open()
+            builder = self._node.service_builder(iox.ServiceName.new(name))
+            return builder.request_response(*service.types).open()
         except iox.SemanticStringError:
             raise self.why_not(vehicle) from None
         except iox.RequestResponseOpenError as failure:
             if str(failure) == "DoesNotExist":
-                raise self.why_not(vehicle) from None
+                raise self.why_not(vehicle, service) from None
             if str(failure) == "IncompatibleRequestOrResponseType":
                 raise LayoutMismatch(layout.VERSION, f"{name} with other types") from None
             raise
 
-    def _open(self, vehicle: str, batch: bool) -> Any:
-        service = self._exchange_service(vehicle, batch)
+    def _open(self, vehicle: str, kind: Service) -> Any:
+        service = self._exchange_service(vehicle, kind)
         if self._wake is None:
             self._open_events()
         try:
@@ -194,7 +208,7 @@ class Link:
         except iox.ClientCreateError as failure:
             message = f"no place for another client of {vehicle}: {failure}; the server's limit is shm.max_clients"
             raise ResourceExhausted(message, None) from None
-        self._ports[vehicle, batch] = port
+        self._ports[vehicle, kind] = port
         return port
 
     def _open_events(self) -> None:

@@ -116,8 +116,7 @@ class State:
     #: The caller adds `Forces.added_mass` to a mass matrix of his own: the forces leave `-M_A nu_dot` out and keep the
     #: rest. One for the whole batch.
     implicit_added_mass: bool = False
-    #: Answer with `Forces.jacobian`; refused over shared memory, of a vehicle with effects and of one without the
-    #: physical base. One for the whole batch.
+    #: Answer with `Forces.jacobian`; refused of a vehicle without the physical base. One for the whole batch.
     jacobian: bool = False
     #: Over shared memory, the number of a run of states that follow each other, for effects that remember (waves,
     #: flooding): one an environment, `[N]` in a batch. A run in batches is another than that of the same number in

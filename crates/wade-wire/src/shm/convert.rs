@@ -3,8 +3,8 @@
 use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, FULL, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE,
     HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_SHAFT_POWER, HAS_WATER_LEVEL, HAS_WHEEL_COUNT,
-    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, JACOBIAN, MAX_BATCH, MAX_EFFECTS,
-    MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, Status, SurfaceAnswer,
+    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, JACOBIAN, JacobianAnswer,
+    MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, Status, SurfaceAnswer,
 };
 use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, by_rows, single};
 use wade_core::domain::{Outside, Quantity};
@@ -36,9 +36,6 @@ impl Query {
         }
         if self.has(HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m)? {
             return Err(InvalidState::new(Field::WheelWaterLevel, Problem::Unsupported));
-        }
-        if self.flags & JACOBIAN != 0 {
-            return Err(InvalidState::new(Field::Jacobian, Problem::Unsupported));
         }
         let optional = |flag: u64, field: Field, value: f32| {
             Ok::<_, InvalidState>(self.has(flag, field, &[value])?.then_some(value))
@@ -74,7 +71,7 @@ impl Query {
                 FULL => Some(Physics::Full),
                 _ => return Err(InvalidState::new(Field::Physics, Problem::Unknown)),
             },
-            jacobian: false,
+            jacobian: self.flags & JACOBIAN != 0,
         })
     }
 
@@ -314,6 +311,13 @@ impl Answer {
         std::str::from_utf8(bytes)
             .or_else(|e| std::str::from_utf8(&bytes[..e.valid_up_to()]))
             .unwrap_or_default()
+    }
+}
+
+impl JacobianAnswer {
+    /// A copy, for which what counts is read alone.
+    pub fn copied(&self) -> Self {
+        Self { answer: self.answer.copied(), jacobian: self.jacobian, ..Self::UNSET }
     }
 }
 

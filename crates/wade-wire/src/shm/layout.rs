@@ -4,6 +4,7 @@
 //! | --- | --- | --- | --- |
 //! | `<namespace>/v4/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
 //! | `<namespace>/v4/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
+//! | `<namespace>/v4/evaluate_jacobian/<vehicle>` | request-response | [`Query`] | [`JacobianAnswer`] |
 //! | `<namespace>/v4/wake` | event | a client wakes the server | |
 //! | `<namespace>/v4/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
 //! | `<namespace>/served` | event | nobody connects: its attributes tell [`SERVED_LAYOUT`] and [`SERVED_VEHICLES`], in every version | |
@@ -20,6 +21,7 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 
+use crate::DERIVATIVES;
 use wade_core::domain::Quantity;
 use wade_core::effects::{BoxQuantity, PHYSICS};
 use wade_core::vehicle::MAX_SURFACES;
@@ -69,6 +71,16 @@ impl Names {
         format!("{}/{VERSION}/evaluate_batch/{vehicle}", self.namespace)
     }
 
+    /// A vehicle's service for single queries with derivatives.
+    pub fn evaluate_jacobian(&self, vehicle: &str) -> String {
+        format!("{}/{VERSION}/evaluate_jacobian/{vehicle}", self.namespace)
+    }
+
+    /// Every service of a vehicle.
+    pub fn of_vehicle(&self, vehicle: &str) -> [String; 3] {
+        [self.evaluate(vehicle), self.evaluate_batch(vehicle), self.evaluate_jacobian(vehicle)]
+    }
+
     /// Service whose attributes tell which layout and vehicles are served, whatever the version of the layout.
     pub fn served(&self) -> String {
         format!("{}/served", self.namespace)
@@ -115,7 +127,8 @@ pub const HYDROSTATIC: u64 = 512;
 pub const QUASI_STEADY: u64 = 1024;
 /// Flag of [`Query::flags`]: the whole physical base, however the server is set.
 pub const FULL: u64 = 2048;
-/// Flag of [`Query::flags`]: the derivatives of the wrench are asked for, for which the pages of these services have no room.
+/// Flag of [`Query::flags`]: the derivatives of the wrench are asked for, for which only [`Names::evaluate_jacobian`] has room: it
+/// gives them with the flag and without it.
 pub const JACOBIAN: u64 = 4096;
 /// Flag of [`Answer::flags`]: the server polls, so that waking it is of no use.
 pub const SERVER_POLLS: u64 = 1;
@@ -277,6 +290,20 @@ pub struct Answer {
     pub reserved: [u8; ANSWER_RESERVED_LEN],
 }
 
+/// The answer to a [`Query`] with the derivatives of its wrench. 5,472 bytes.
+#[derive(Debug, Clone, Copy, ZeroCopySend)]
+#[repr(C)]
+#[type_name("wade::v4::JacobianAnswer")]
+pub struct JacobianAnswer {
+    /// As of the service for single queries.
+    pub answer: Answer,
+    /// Derivatives of `force_n` and `moment_nm` by rows, with the columns of [`Jacobian`](wade_core::model::Jacobian); NaN where
+    /// there are no forces.
+    pub jacobian: [f32; DERIVATIVES],
+    /// Zero.
+    pub reserved: [u8; RESERVED_LEN],
+}
+
 /// What comes before the states of a batch. 160 bytes.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
@@ -422,6 +449,12 @@ impl Answer {
     };
 }
 
+impl JacobianAnswer {
+    /// An answer that says nothing yet.
+    pub const UNSET: Self =
+        Self { answer: Answer::UNSET, jacobian: [f32::NAN; DERIVATIVES], reserved: [0; RESERVED_LEN] };
+}
+
 impl BatchHeader {
     /// Nobody asks for anything.
     pub const UNSET: Self =
@@ -431,6 +464,7 @@ impl BatchHeader {
 const _: () = assert!(size_of::<Query>() == 328 && align_of::<Query>() == 8);
 const _: () = assert!(size_of::<EffectAnswer>() == 32 && size_of::<SurfaceAnswer>() == 52);
 const _: () = assert!(size_of::<Answer>() == 5080 && align_of::<Answer>() == 8);
+const _: () = assert!(size_of::<JacobianAnswer>() == 5080 + 4 * DERIVATIVES + RESERVED_LEN);
 const _: () = assert!(size_of::<BatchHeader>() == 160);
 const _: () = assert!(size_of::<BatchQuery>() == 160 + 328 * MAX_BATCH);
 const _: () = assert!(size_of::<BatchAnswer>() == 168 + 5080 * MAX_BATCH);
