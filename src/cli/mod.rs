@@ -4,6 +4,7 @@ mod campaign;
 mod dataset;
 mod doctor;
 mod eval;
+mod fmu;
 mod gap;
 mod gap_bench;
 mod import;
@@ -68,6 +69,7 @@ enum Command {
     Validate(validate::Validate),
     Gap(gap::Gap),
     Vehicle(vehicle::Vehicle),
+    Fmu(fmu::FmuCommand),
     Doctor(doctor::Doctor),
     Completions(shell::Completions),
     Man(shell::Man),
@@ -91,6 +93,7 @@ impl Cli {
             Command::Validate(command) => command.run(),
             Command::Gap(command) => command.run(),
             Command::Vehicle(command) => command.run(),
+            Command::Fmu(command) => command.run(),
             Command::Doctor(command) => command.run(),
             Command::Completions(command) => command.run(),
             Command::Man(command) => command.run(),

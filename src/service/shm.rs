@@ -124,10 +124,17 @@ pub(crate) struct Opening {
 
 type Request<Q, A> = ActiveRequest<ipc::Service, Q, (), A, ()>;
 
+/// Who asks: a port, or a client that names itself, whose ports are one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Asker {
+    Port(UniqueClientId),
+    Owner(u64),
+}
+
 /// A run of states of one client and one vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Run {
-    client: UniqueClientId,
+    asker: Asker,
     /// Number of the vehicle's ports.
     ports: usize,
     session: u64,
@@ -425,11 +432,11 @@ impl Desk {
     fn evaluate<P: Page>(
         &mut self,
         at: At,
-        client: UniqueClientId,
+        asker: Asker,
         query: &Query,
         page: &mut P,
     ) -> Result<(), InvalidState> {
-        let run = Run { client, ports: at.ports, session: query.session };
+        let run = Run { asker, ports: at.ports, session: query.session };
         let (answer, mut room) = page.parts();
         let asked = query.state().and_then(|state| match (&room, state.jacobian) {
             (None, true) => Err(InvalidState::new(Field::Jacobian, Problem::Unsupported)),
@@ -467,7 +474,8 @@ impl Desk {
         let query = copy(request.payload());
         let Some(mut slot) = loaned(request.loan_uninit()) else { return };
         let page = in_place(slot.payload_mut());
-        let outcome = self.evaluate(at, request.origin(), &query, page);
+        let asker = if query.owner == 0 { Asker::Port(request.origin()) } else { Asker::Owner(query.owner) };
+        let outcome = self.evaluate(at, asker, &query, page);
         let (answer, _) = page.parts();
         let (is_outside, status) = (answer.is_outside(), answer.status);
         // SAFETY: it has been written.
@@ -535,7 +543,8 @@ impl Desk {
         for i in 0..if valid { count } else { 0 } {
             let query = copy(&request.payload().queries[i]);
             let slot = &mut answer.answers[i];
-            if self.evaluate(at, request.origin(), &query, slot).is_err() {
+            // a run in batches is another than that of the same number in single calls
+            if self.evaluate(at, Asker::Port(request.origin()), &query, slot).is_err() {
                 (answer.status, answer.index) = (Status::InvalidState as u32, i as u32);
                 break;
             }

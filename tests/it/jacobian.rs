@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use crate::common::paper::put_into;
 use crate::common::{Numbers, Served, VEHICLES, comparable, copy_of_vehicles, copy_with_every_effect};
-use wade_client::{InProcess, Reply};
+use wade_client::{Client, InProcess, Method, Reply};
 use wade_core::bundle;
 use wade_core::model::kernel::Isa;
 use wade_wire::State;
+use wade_wire::shm::Wait;
 
 fn library(folder: &std::path::Path, vehicle: &str) -> InProcess {
     let served = bundle::load_served(&folder.join(vehicle), Isa::available()[0]).expect("sound");
@@ -66,6 +67,26 @@ fn those_of_a_vehicle_with_effects_too() {
     let folder = copy_with_every_effect();
     let served = Served::with(|config| config.vehicles = folder.path().to_owned());
     check(&served, folder.path(), false);
+}
+
+#[test]
+fn a_run_with_derivatives_and_without_is_one() {
+    let served = Served::start();
+    let states: Vec<State> = states(20)
+        .into_iter()
+        .enumerate()
+        .map(|(i, state)| State { time_step: 0.01, jacobian: i % 3 == 1, ..state })
+        .collect();
+    let mut library = library(&shipped(), "husky").in_session();
+    let expected: Vec<Reply> =
+        states.iter().map(|state| comparable(library.evaluate(state).expect("valid"))).collect();
+    let shm = served.shm("husky", Wait::Block).in_session(5);
+    let clients = [Client::Shm(Box::new(shm)), Client::Grpc(Box::new(served.tcp("husky", Method::Stream)))];
+    for mut client in clients {
+        for (state, expected) in states.iter().zip(&expected) {
+            assert_eq!(comparable(client.evaluate(state).expect("answered")), *expected, "{client:?}");
+        }
+    }
 }
 
 #[test]

@@ -8,11 +8,12 @@ use serde_json::Value;
 use crate::{output, root};
 
 /// What each crate may depend on, and does.
-const EDGES: [(&str, &[&str]); 10] = [
+const EDGES: [(&str, &[&str]); 11] = [
     ("wade-core", &[]),
     ("wade-wire", &["wade-core"]),
     ("wade-client", &["wade-core", "wade-wire"]),
     ("wade-client-c", &["wade-client", "wade-core", "wade-wire"]),
+    ("wade-fmu", &["wade-client", "wade-core", "wade-wire"]),
     // in process: no client, no server
     ("wade-python", &["wade-core", "wade-wire"]),
     ("wade-learn", &["wade-core"]),
@@ -23,7 +24,16 @@ const EDGES: [(&str, &[&str]); 10] = [
     ("wade-import", &["wade-core"]),
     (
         "wade",
-        &["wade-client", "wade-core", "wade-gap", "wade-gap-bench", "wade-import", "wade-learn", "wade-wire"],
+        &[
+            "wade-client",
+            "wade-core",
+            "wade-fmu",
+            "wade-gap",
+            "wade-gap-bench",
+            "wade-import",
+            "wade-learn",
+            "wade-wire",
+        ],
     ),
 ];
 
@@ -114,7 +124,7 @@ fn imports(text: &str) -> BTreeSet<String> {
 /// Every source of the workspace's Rust packages, but for tests and benchmarks.
 fn all_sources() -> Vec<PathBuf> {
     let mut found = Vec::new();
-    for folder in ["src", "crates", "clients/cpp/src", "clients/python/native/src"] {
+    for folder in ["src", "crates", "clients/cpp/src", "clients/fmi/src", "clients/python/native/src"] {
         sources(&root().join(folder), &mut found);
     }
     found.retain(|path| !path.components().any(|part| part.as_os_str() == "tests"));
@@ -161,7 +171,7 @@ fn an_embedder_compiles_no_more_than_the_model_needs() {
             assert!(!crates.contains(name), "wade-core depends on {name}");
         }
     }
-    for package in ["wade-client", "wade-client-c", "wade-python"] {
+    for package in ["wade-client", "wade-client-c", "wade-fmu", "wade-python"] {
         let crates = crates_of(package, &[]);
         for name in NOT_IN_A_CLIENT {
             assert!(!crates.contains(name), "{package} depends on {name}");

@@ -72,7 +72,7 @@ def rust_fields(struct: str) -> list[tuple[str, str]]:
 def rust_type(dtype: np.dtype[Any]) -> str:
     """How Rust writes a field of this type."""
     names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|u1": "u8", "|S64": "[u8; PROVENANCE_LEN]"}
-    reserved = ("RESERVED_LEN", "ANSWER_RESERVED_LEN")
+    reserved = ("RESERVED_LEN", "RESERVED_LEFT")
     rooms = ("MAX_SURFACES", "MAX_BATCH", "MAX_EFFECTS", "MAX_QUANTITIES", "MAX_WHEELS", "DERIVATIVES", *reserved)
     lengths = {getattr(shm_layout, room): room for room in rooms}
     structs = {shm_layout.QUERY: "Query", shm_layout.ANSWER: "Answer", shm_layout.BATCH_HEADER: "BatchHeader"}
@@ -134,7 +134,7 @@ def test_a_page_of_the_first_commit_of_the_layout_says_what_it_said(name: str, d
     for row, field in enumerate(shm_layout.fields(dtype)):
         if field == "provenance":
             assert page[field] == b"the first page of v4"
-        elif field in ("reserved", "wheel_count", "shaft_power_w"):
+        elif field in ("reserved", "owner", "wheel_count", "shaft_power_w"):
             # what got a meaning later was reserved on the first day
             assert not any(words(page[field])), field
         else:

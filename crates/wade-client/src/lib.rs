@@ -180,6 +180,16 @@ impl InProcess {
         Self { session: Some(Session::default()), ..self }
     }
 
+    /// What lasts from state to state; none where each is by itself.
+    pub fn session(&self) -> Option<&Session> {
+        self.session.as_ref()
+    }
+
+    /// Goes on from what lasted at another time.
+    pub fn set_session(&mut self, session: Session) {
+        self.session = Some(session);
+    }
+
     /// The forces in one state.
     pub fn evaluate(&mut self, state: &State) -> Result<Reply, ClientError> {
         let state = state.check_for(&self.vehicle)?;

@@ -41,6 +41,8 @@ pub struct ShmLink {
     sleep: Option<(Listener<Ipc>, u64)>,
     server_polls: bool,
     sequence: u64,
+    /// Names this client in its queries.
+    owner: u64,
     node: Node<Ipc>,
 }
 
@@ -104,13 +106,26 @@ impl ShmLink {
         let wake = shm::events(&node, &names.wake()).map_err(failed)?.notifier_builder().create();
         let wake = wake.map_err(|error| no_place(&error))?;
         let sleep = (wait == Wait::Block).then(|| listener(&node, names)).transpose().map_err(failed)?;
-        Ok(Self { single, batch, jacobian: None, wake, sleep, server_polls: false, sequence: 0, node })
+        Ok(Self {
+            single,
+            batch,
+            jacobian: None,
+            wake,
+            sleep,
+            server_polls: false,
+            sequence: 0,
+            owner: drawn(),
+            node,
+        })
     }
 
     /// Asks for the forces in one state.
     pub fn ask(&mut self, query: Query) -> Result<Asked<Query, Answer>, Lost> {
         let (sequence, wake_key) = (self.next_sequence(), self.wake_key());
-        let pending = self.single.send_copy(Query { sequence, wake_key, ..query }).map_err(Lost::Send)?;
+        let pending = self
+            .single
+            .send_copy(Query { sequence, wake_key, owner: self.owner, ..query })
+            .map_err(Lost::Send)?;
         self.notify();
         connected(pending)
     }
@@ -156,7 +171,8 @@ impl ShmLink {
     pub fn ask_jacobian(&mut self, query: Query) -> Result<Asked<Query, JacobianAnswer>, Lost> {
         let (sequence, wake_key) = (self.next_sequence(), self.wake_key());
         let port = self.jacobian.as_ref().ok_or(Lost::Server)?;
-        let pending = port.send_copy(Query { sequence, wake_key, ..query }).map_err(Lost::Send)?;
+        let pending =
+            port.send_copy(Query { sequence, wake_key, owner: self.owner, ..query }).map_err(Lost::Send)?;
         self.notify();
         connected(pending)
     }
@@ -301,10 +317,15 @@ fn is_absent(service: &str) -> bool {
     })
 }
 
+/// A number that no other client has, and that is not 0.
+fn drawn() -> u64 {
+    // the standard library's hasher is seeded at random in each process, and again for each instance
+    RandomState::new().hash_one(std::process::id()).max(1)
+}
+
 /// A listener under a name that no other client has.
 fn listener(node: &Node<Ipc>, names: &Names) -> Result<(Listener<Ipc>, u64), ShmError> {
-    // the standard library's hasher is seeded at random in each process, and again for each instance
-    let key = RandomState::new().hash_one(std::process::id()).max(1);
+    let key = drawn();
     let error = |error: &dyn std::fmt::Display| ShmError::new("a listener")(error);
     let name = PortName::new(&wake_name(key)).map_err(|e| error(&format!("{e:?}")))?;
     let listener = shm::events(node, &names.done())?.listener_builder().name(&name).create();

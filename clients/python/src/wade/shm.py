@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import secrets
 import threading
 import time
 from collections.abc import Callable
@@ -50,6 +51,8 @@ class ShmClient:
         self._lock = threading.Lock()
         self._link: Link | None = None
         self._sequence = 0
+        # its sessions are the same on the services with derivatives and without
+        self._owner = secrets.randbits(63) + 1
         self._sessions = session_numbers()
 
     def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
@@ -61,7 +64,8 @@ class ShmClient:
         floats, flagged = state.floats(), flags(state)
 
         def write(address: int, wake_key: int) -> None:
-            ctypes.memmove(address, _query(self._sequence, wake_key, session, flagged, floats), layout.QUERY.itemsize)
+            who = self._sequence, wake_key, session, flagged
+            ctypes.memmove(address, _query(who, floats, self._owner), layout.QUERY.itemsize)
 
         service, dtype = (JACOBIAN, layout.JACOBIAN_ANSWER) if state.jacobian else (SINGLE, layout.ANSWER)
         with self._lock:
@@ -87,7 +91,8 @@ class ShmClient:
 
                 def write(address: int, wake_key: int, chunk: slice = chunk) -> None:
                     write = _write_row if states.jacobian else _write_batch
-                    write(address, (self._sequence, wake_key), flagged, sessions, rows, chunk)
+                    who = self._sequence, wake_key, self._owner
+                    write(address, who, flagged, sessions, rows, chunk)
 
                 def read(address: int, forces: Forces | None = forces, chunk: slice = chunk) -> Forces:
                     read = _read_row if states.jacobian else _read_batch
@@ -172,17 +177,17 @@ _PER_ROW = {
 }
 
 
-def _query(sequence: int, wake_key: int, session: int, flags: int, floats: list[float]) -> bytes:
+def _query(who: tuple[int, int, int, int], floats: list[float], owner: int) -> bytes:
     # in the order of the layout; the wheels' levels are not set
     stated, (heading, depth_rate, *wheels, level, clearance, bed, time_step) = floats[:TOLD_AT], floats[TOLD_AT:]
     values = (*stated, time_step, heading, depth_rate, level, clearance, bed, *wheels, *_NO_LEVELS)
     try:
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *values)
+        return layout.QUERY_STRUCT.pack(*who, *values, owner)
     except OverflowError:
         # beyond single precision: infinite, which the server refuses and names
         limit = float(np.finfo(np.float32).max)
         values = tuple(math.copysign(math.inf, x) if abs(x) > limit else x for x in values)
-        return layout.QUERY_STRUCT.pack(sequence, wake_key, session, flags, *values)
+        return layout.QUERY_STRUCT.pack(*who, *values, owner)
 
 
 def _read(address: int, dtype: np.dtype[Any]) -> np.void:
@@ -191,22 +196,22 @@ def _read(address: int, dtype: np.dtype[Any]) -> np.void:
 
 
 def _write_batch(
-    address: int, who: tuple[int, int], flags: int, sessions: Any, rows: dict[str, Array], chunk: slice
+    address: int, who: tuple[int, int, int], flags: int, sessions: Any, rows: dict[str, Array], chunk: slice
 ) -> None:
     batch = np.frombuffer(memory(address, layout.BATCH_QUERY.itemsize), layout.BATCH_QUERY)[0]
     count = chunk.stop - chunk.start
     header, queries = batch["header"], batch["queries"][:count]
-    header["sequence"], header["wake_key"] = who
+    header["sequence"], header["wake_key"], _ = who
     header["flags"], header["count"] = 0, count
     _write_queries(queries, flags, sessions, rows, chunk)
 
 
 def _write_row(
-    address: int, who: tuple[int, int], flags: int, sessions: Any, rows: dict[str, Array], chunk: slice
+    address: int, who: tuple[int, int, int], flags: int, sessions: Any, rows: dict[str, Array], chunk: slice
 ) -> None:
     query = np.frombuffer(memory(address, layout.QUERY.itemsize), layout.QUERY)
     _write_queries(query, flags, sessions, rows, chunk)
-    query["sequence"], query["wake_key"] = who
+    query["sequence"], query["wake_key"], query["owner"] = who
 
 
 def _write_queries(queries: Any, flags: int, sessions: Any, rows: dict[str, Array], chunk: slice) -> None:

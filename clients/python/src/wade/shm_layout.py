@@ -21,7 +21,7 @@ MAX_QUANTITIES = 16
 MAX_WHEELS = 8
 PROVENANCE_LEN = 64
 RESERVED_LEN = 128
-ANSWER_RESERVED_LEN = 120
+RESERVED_LEFT = 120
 
 #: Attributes of the service of `served_name`: the version of the layout, and lists of the vehicles that are served.
 SERVED_LAYOUT = "layout"
@@ -84,7 +84,8 @@ QUERY = np.dtype(
         ("bed", "<f4"),
         ("wheel_speed_radps", "<f4", MAX_WHEELS),
         ("wheel_water_level_m", "<f4", MAX_WHEELS),
-        _RESERVED,
+        ("owner", "<u8"),
+        ("reserved", "u1", RESERVED_LEFT),
     ]
 )
 
@@ -128,7 +129,7 @@ ANSWER = np.dtype(
         ("damping", "<f4", 36),
         ("wheel_count", "<u4"),
         ("shaft_power_w", "<f4"),
-        ("reserved", "u1", ANSWER_RESERVED_LEN),
+        ("reserved", "u1", RESERVED_LEFT),
     ]
 )
 

@@ -38,8 +38,8 @@ pub const MAX_WHEELS: usize = wade_core::vehicle::MAX_WHEELS;
 pub const PROVENANCE_LEN: usize = 64;
 /// Bytes that each message had without a meaning when the layout began.
 pub const RESERVED_LEN: usize = 128;
-/// Those of them that an [`Answer`] has left.
-pub const ANSWER_RESERVED_LEN: usize = 120;
+/// Those of them that an [`Answer`] and a [`Query`] have left.
+pub const RESERVED_LEFT: usize = 120;
 
 /// Version of the layout, as the names of the services have it.
 pub const VERSION: &str = "v4";
@@ -191,8 +191,11 @@ pub struct Query {
     pub wheel_speed_radps: [f32; MAX_WHEELS],
     /// Height of the water surface above the body origin along up at each wheel [m], in the same order.
     pub wheel_water_level_m: [f32; MAX_WHEELS],
+    /// The client's own number, drawn at random: its sessions are the same on the services for single queries with derivatives
+    /// and without. 0 for none: they are apart.
+    pub owner: u64,
     /// Zero.
-    pub reserved: [u8; RESERVED_LEN],
+    pub reserved: [u8; RESERVED_LEFT],
 }
 
 /// The load of one effect. 32 bytes.
@@ -287,7 +290,7 @@ pub struct Answer {
     /// state it the flag is clear.
     pub shaft_power_w: f32,
     /// Zero.
-    pub reserved: [u8; ANSWER_RESERVED_LEN],
+    pub reserved: [u8; RESERVED_LEFT],
 }
 
 /// The answer to a [`Query`] with the derivatives of its wrench. 5,472 bytes.
@@ -396,7 +399,8 @@ impl Query {
         bed: f32::NAN,
         wheel_speed_radps: [f32::NAN; MAX_WHEELS],
         wheel_water_level_m: [f32::NAN; MAX_WHEELS],
-        reserved: [0; RESERVED_LEN],
+        owner: 0,
+        reserved: [0; RESERVED_LEFT],
     };
 }
 
@@ -445,7 +449,7 @@ impl Answer {
         damping: [f32::NAN; 36],
         wheel_count: 0,
         shaft_power_w: f32::NAN,
-        reserved: [0; ANSWER_RESERVED_LEN],
+        reserved: [0; RESERVED_LEFT],
     };
 }
 

@@ -84,7 +84,7 @@ words_of_structs! {
     Query: sequence, wake_key, session, flags, depth_m, density_kgpm3, velocity_mps, current_mps,
         angular_velocity_radps, acceleration_mps2, angular_acceleration_radps2, gravity_direction, time_step_s,
         heading_rad, depth_rate_mps, water_level_m, bed_clearance_m, bed, wheel_speed_radps, wheel_water_level_m,
-        reserved;
+        owner, reserved;
     EffectAnswer: effect, left_out, force_n, moment_nm;
     SurfaceAnswer: force_n, point_m, couple_nm, effect_force_n, wetted_fraction;
     Answer: sequence, compute_ns, flags, status, field, problem, bundle_version, surface_count, effect_count, force_n,
@@ -131,7 +131,7 @@ fn fields<T: Words>(name: &str, page: &T, rows: &[(&str, Vec<f64>)]) {
         let expected: Vec<f64> = match *field {
             "reserved" | "spare" => vec![0.0; words.len()],
             // reserved on the first day
-            "wheel_count" | "shaft_power_w" => vec![0.0; words.len()],
+            "owner" | "wheel_count" | "shaft_power_w" => vec![0.0; words.len()],
             // a text, not a number
             "provenance" => {
                 let mut text = b"the first page of v4".map(f64::from).to_vec();
@@ -152,7 +152,7 @@ fn is_a_set_query(name: &str, query: &Query) {
     let rows = rows!(query; sequence, wake_key, session, flags, depth_m, density_kgpm3, velocity_mps, current_mps,
         angular_velocity_radps, acceleration_mps2, angular_acceleration_radps2, gravity_direction, time_step_s,
         heading_rad, depth_rate_mps, water_level_m, bed_clearance_m, bed, wheel_speed_radps, wheel_water_level_m,
-        reserved);
+        owner, reserved);
     fields(name, query, &rows);
 }
 
