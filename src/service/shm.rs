@@ -216,7 +216,7 @@ pub struct ShmServer {
     ports: Vec<Ports>,
     wake: Listener<ipc::Service>,
     told: Told,
-    desk: Desk,
+    responder: Responder,
     files: ServiceFiles,
 }
 
@@ -229,7 +229,7 @@ struct Told {
 }
 
 /// What it takes to answer.
-struct Desk {
+struct Responder {
     engine: Arc<Engine>,
     metrics: Arc<Metrics>,
     evaluator: Evaluator,
@@ -254,7 +254,7 @@ impl ShmServer {
         })?;
         let wake = events(&node, &names.wake())?.listener_builder().create();
         let done = events(&node, &names.done())?.notifier_builder().create();
-        let desk = Desk {
+        let responder = Responder {
             engine,
             metrics,
             evaluator: Evaluator::default(),
@@ -270,7 +270,7 @@ impl ShmServer {
             files.add(&name, MessagingPattern::Event);
         }
         let told = Told::default();
-        let mut server = Self { config, names, node, ports: Vec::new(), wake, told, desk, files };
+        let mut server = Self { config, names, node, ports: Vec::new(), wake, told, responder, files };
         for vehicle in server.without_ports() {
             server.open_ports(vehicle)?;
         }
@@ -285,7 +285,7 @@ impl ShmServer {
 
     /// Vehicles that are served and have no ports yet.
     fn without_ports(&self) -> Vec<String> {
-        let vehicles = self.desk.engine.vehicles();
+        let vehicles = self.responder.engine.vehicles();
         let has_ports = |name: &String| self.ports.iter().any(|ports| ports.vehicle == *name);
         vehicles.keys().filter(|name| !has_ports(name)).cloned().collect()
     }
@@ -301,7 +301,7 @@ impl ShmServer {
         for name in names.of_vehicle(&vehicle) {
             self.files.add(&name, MessagingPattern::RequestResponse);
         }
-        let metrics = &self.desk.metrics;
+        let metrics = &self.responder.metrics;
         self.ports.push(Ports {
             single,
             jacobian,
@@ -353,7 +353,7 @@ impl ShmServer {
 
     /// Tells clients which vehicles there are, where that has changed.
     fn tell(&mut self) {
-        let vehicles = self.desk.engine.vehicles();
+        let vehicles = self.responder.engine.vehicles();
         if vehicles.keys().eq(&self.told.vehicles) {
             return;
         }
@@ -393,26 +393,26 @@ impl ShmServer {
         let mut any = false;
         for (number, ports) in self.ports.iter_mut().enumerate() {
             any |= ports.single.take() | ports.jacobian.take() | ports.batch.take();
-            if let Ok(vehicle) = self.desk.engine.vehicle(&ports.vehicle) {
+            if let Ok(vehicle) = self.responder.engine.vehicle(&ports.vehicle) {
                 let at = At { vehicle: &vehicle, ports: number };
                 for (arrived, request) in ports.single.waiting.drain(..) {
-                    self.desk.answer(at, arrived, &request, &ports.single_recorder);
+                    self.responder.answer(at, arrived, &request, &ports.single_recorder);
                 }
                 for (arrived, request) in ports.jacobian.waiting.drain(..) {
-                    self.desk.answer(at, arrived, &request, &ports.single_recorder);
+                    self.responder.answer(at, arrived, &request, &ports.single_recorder);
                 }
                 for (arrived, request) in ports.batch.waiting.drain(..) {
-                    self.desk.answer_batch(at, arrived, &request, &ports.batch_recorder);
+                    self.responder.answer_batch(at, arrived, &request, &ports.batch_recorder);
                 }
             } else {
                 for (_, request) in ports.single.waiting.drain(..) {
-                    self.desk.decline(&request);
+                    self.responder.decline(&request);
                 }
                 for (_, request) in ports.jacobian.waiting.drain(..) {
-                    self.desk.decline(&request);
+                    self.responder.decline(&request);
                 }
                 for (_, request) in ports.batch.waiting.drain(..) {
-                    self.desk.decline_batch(&request);
+                    self.responder.decline_batch(&request);
                 }
             }
         }
@@ -427,7 +427,7 @@ struct At<'s> {
     ports: usize,
 }
 
-impl Desk {
+impl Responder {
     /// Writes the answer to a query, in its session where it has one.
     fn evaluate<P: Page>(
         &mut self,

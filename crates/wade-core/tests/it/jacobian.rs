@@ -4,7 +4,7 @@ use nalgebra::{SVector, UnitQuaternion, UnitVector3};
 use wade_core::condition::{Condition, GroundContact};
 use wade_core::effects::Circumstances;
 use wade_core::forces::Forces;
-use wade_core::frame::{Vec3, up_from_roll_pitch};
+use wade_core::frame::Vec3;
 use wade_core::model::{COLUMNS, Jacobian, JacobianWorkspace, Model, Workspace};
 use wade_core::physics::{BaseLoads, Memory, Motion, Physics, STATED_NONE};
 use wade_core::served::{Loads, ServedVehicle, Session};
