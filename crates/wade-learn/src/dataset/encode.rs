@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::sync::Arc;
 
-use parquet::basic::Compression;
+use parquet::basic::{Compression, Encoding};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
@@ -30,8 +30,9 @@ const FRAME: &str = "body frame: right-handed, x forward, y left, z up, origin a
 pub(super) enum Loads {
     /// By a dictionary. A file that is written again has the bytes, and so the digest, that provenances of weights state.
     Dictionary,
-    /// As they are: nearly every load is another, and a dictionary of them makes the file half as large again.
-    Plain,
+    /// By the places of their bytes: nearly every load is another, so a dictionary of them makes the file half as large again,
+    /// but their exponents are alike.
+    Split,
 }
 
 /// Writes the whole file; the data set has been checked.
@@ -48,9 +49,11 @@ pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset, loads: Loa
         .set_created_by(CREATED_BY.to_owned())
         .set_key_value_metadata(Some(pairs.map(|(key, value)| KeyValue::new(key.to_owned(), value)).into()));
     // those at rest repeat from section to section
-    let moving = LOADS.iter().filter(|column| loads == Loads::Plain && !column.names[0].starts_with("rest"));
+    let moving = LOADS.iter().filter(|column| loads == Loads::Split && !column.names[0].starts_with("rest"));
     for name in moving.flat_map(|column| column.names) {
-        properties = properties.set_column_dictionary_enabled(name.into(), false);
+        properties = properties
+            .set_column_dictionary_enabled(name.into(), false)
+            .set_column_encoding(name.into(), Encoding::BYTE_STREAM_SPLIT);
     }
     let properties = Arc::new(properties.build());
     let mut writer = SerializedFileWriter::new(to, Arc::new(message()?), properties)?;
