@@ -2,6 +2,7 @@
 
     python clients/python/examples/wading_env.py        # with wade serve running on this machine
 
+`gymnasium.make("wade/Wading-v0")` is one of them, once this module is imported; `wading_training.py` learns to cross.
 Each river has a depth and a current of its own, which the policy does not choose. A vehicle that wades deeper stands
 lighter on its wheels and has less traction to hold against the current; afloat it has none. The motion is planar and
 level: surge, sway and yaw, integrated by semi-implicit Euler steps.
@@ -31,6 +32,10 @@ TIMESTEP_S, STEPS = 0.02, 600
 #: From shore to shore, and half the width of the ford [m].
 LENGTH, HALF_WIDTH = 10.0, 3.0
 
+#: Of the observations: an episode ends well before.
+LEAST = np.array([-1, -2, -1, -1, -10, -10, -10, 0, 0, -1], np.float32)
+MOST = np.array([2, 2, 1, 1, 10, 10, 10, 1, 2, 1], np.float32)
+
 Array = NDArray[np.float64]
 
 
@@ -44,7 +49,7 @@ class WadingVectorEnv(VectorEnv[Any, Any, Any]):
 
     def __init__(self, client: wade.Client, num_envs: int):
         self.num_envs = num_envs
-        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (10,), np.float32)
+        self.single_observation_space = gymnasium.spaces.Box(LEAST, MOST)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, num_envs)
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
@@ -60,7 +65,7 @@ class WadingVectorEnv(VectorEnv[Any, Any, Any]):
         super().reset(seed=seed)
         self._done[:] = False
         self._begin(np.ones(self.num_envs, bool))
-        return self._observe(), {}
+        return self.observe(), {}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """One time step of all; a vehicle whose episode ended begins anew instead."""
@@ -76,7 +81,7 @@ class WadingVectorEnv(VectorEnv[Any, Any, Any]):
         truncated = ~terminated & (self._ages >= STEPS)
         reward = np.where(begins, 0.0, reward + 5.0 * across)
         self._done = terminated | truncated
-        return self._observe(), reward, terminated, truncated, {}
+        return self.observe(), reward, terminated, truncated, {}
 
     def depth(self) -> Array:
         """Water under each vehicle [m]: none on the shores, all in the middle."""
@@ -122,7 +127,8 @@ class WadingVectorEnv(VectorEnv[Any, Any, Any]):
         self.rates[which], self._load[which], self._ages[which] = 0.0, 1.0, 0
         self.river_depth[which], self.current[which] = random.uniform(0.1, 0.4, count), random.uniform(-0.6, 0.6, count)
 
-    def _observe(self) -> Any:
+    def observe(self) -> Any:
+        """What each vehicle sees."""
         x, y, yaw = self.pose.T
         columns = (
             x / LENGTH,
@@ -135,6 +141,43 @@ class WadingVectorEnv(VectorEnv[Any, Any, Any]):
             self.current,
         )
         return np.stack(columns, axis=1, dtype=np.float32, casting="same_kind")
+
+
+class WadingEnv(gymnasium.Env[Any, Any]):
+    """One vehicle of `WadingVectorEnv`, for learners that take one at a time. It stays where its episode ended."""
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012, as gymnasium declares it
+
+    def __init__(self, client: wade.Client | None = None, namespace: str = "wade"):
+        self._client = wade.ShmClient(namespace, timeout_s=60.0) if client is None else client
+        self._owns_client = client is None
+        self._vector = WadingVectorEnv(self._client, 1)
+        self.observation_space = self._vector.single_observation_space
+        self.action_space = self._vector.single_action_space
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """A new river."""
+        super().reset(seed=seed)
+        # one generator: a run without seeds goes on with the numbers that the last seed began
+        self._vector.np_random = self.np_random
+        return self._vector.reset()[0][0], {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """One time step."""
+        observations, rewards, terminated, truncated, _ = self._vector.step(np.asarray(action)[None])
+        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), {}
+
+    def close(self) -> None:
+        """Closes a client that it opened itself."""
+        if self._owns_client and isinstance(self._client, wade.ShmClient):
+            self._client.close()
+
+
+def _vectorised(num_envs: int = 1, client: wade.Client | None = None, namespace: str = "wade") -> WadingVectorEnv:
+    return WadingVectorEnv(wade.ShmClient(namespace, timeout_s=60.0) if client is None else client, num_envs)
+
+
+gymnasium.register("wade/Wading-v0", entry_point=WadingEnv, vector_entry_point=_vectorised)
 
 
 def steer(observations: Any) -> Any:

@@ -6,14 +6,17 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
 from servers import Server
 
 import wade
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
-from wading_env import STEPS, TIMESTEP_S, WadingVectorEnv, steer
+import wading_training
+from wading_env import STEPS, TIMESTEP_S, WadingEnv, WadingVectorEnv, steer
 
 
 @pytest.fixture
@@ -41,6 +44,40 @@ def test_it_keeps_the_rules_of_gymnasium(env: WadingVectorEnv) -> None:
     observations, reward, terminated, truncated, _ = env.step(env.action_space.sample())
     assert env.observation_space.contains(observations)
     assert reward.shape == terminated.shape == truncated.shape == (16,)
+
+
+def test_one_vehicle_alone_passes_gymnasiums_own_check(server: Server) -> None:
+    alone = gymnasium.make("wade/Wading-v0", namespace=server.namespace)
+    check_env(alone.unwrapped)
+    assert isinstance(alone.unwrapped, WadingEnv)
+    alone.close()
+    many = gymnasium.make_vec("wade/Wading-v0", num_envs=3, namespace=server.namespace)
+    assert many.reset(seed=1)[0].shape == (3, 10)
+
+
+def test_one_vehicle_alone_does_what_it_does_among_others(server: Server) -> None:
+    with wade.ShmClient(server.namespace, timeout_s=20.0) as client:
+        alone, one = WadingEnv(client), WadingVectorEnv(client, 1)
+        seen, _ = alone.reset(seed=4)
+        np.testing.assert_array_equal(seen, one.reset(seed=4)[0][0])
+        for _ in range(50):
+            action = steer(seen[None])
+            seen, reward, *_ = alone.step(action[0])
+            others, rewards, *_ = one.step(action)
+            np.testing.assert_array_equal(seen, others[0])
+            assert reward == rewards[0]
+
+
+@pytest.mark.timeout(300)
+def test_a_policy_learns_to_cross_rivers(server: Server) -> None:
+    with wade.ShmClient(server.namespace, timeout_s=60.0) as client:
+        rewards: list[float] = []
+        policy = wading_training.learn(client, 5, lambda _, reward: rewards.append(reward))
+        assert rewards[-1] > rewards[0] + 3.0, rewards
+        learned = np.broadcast_to(policy, (wading_training.EXAMINATION, *policy.shape))
+        share = wading_training.examine(client, lambda seen: wading_training.act(learned, seen))
+        nothing = wading_training.examine(client, lambda seen: wading_training.act(0.0 * learned, seen))
+    assert nothing == 0.0 and share > 0.5, share
 
 
 def test_an_episode_that_ended_begins_anew_with_the_next_step(env: WadingVectorEnv) -> None:
