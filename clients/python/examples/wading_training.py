@@ -96,7 +96,7 @@ def main(arguments: list[str] | None = None) -> dict[str, float]:
     """Learns, and says who crosses how many rivers that nobody has seen."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--namespace", default="wade", help="of the server's shared memory")
-    parser.add_argument("--rounds", type=int, default=20)
+    parser.add_argument("--rounds", type=int, default=12)
     parser.add_argument("--plot", help="where the learning curve goes")
     chosen = parser.parse_args(arguments)
     rewards: list[float] = []
