@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,51 +14,15 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import FMU3Slave
 from numpy.typing import NDArray
+from servers import VEHICLES, Server, binary, environment
 
-ROOT = Path(__file__).resolve().parents[3]
-WADE = Path(os.environ["WADE_BIN"])
 LIBRARY = Path(os.environ["WADE_FMU_LIBRARY"])
 VEHICLE = "husky"
 Array = NDArray[np.float64]
 
 
-def environment() -> dict[str, str]:
-    """Without settings that would win over a test's own."""
-    return {name: value for name, value in os.environ.items() if not name.startswith("WADE_")}
-
-
-class Server:
-    """A real `wade serve`; may be killed and started again at the same places."""
-
-    def __init__(self, folder: Path):
-        self.socket, self.namespace = folder / "wade.sock", f"fmu_{uuid.uuid4().hex[:12]}"
-        self._config, self._log = folder / "wade.toml", folder / "log"
-        self._config.write_text(
-            f'[grpc]\nlisten = "127.0.0.1:0"\nunix_socket = "{self.socket}"\n'
-            f'[shm]\nnamespace = "{self.namespace}"\n[http]\nlisten = ""\n'
-        )
-        self.process: subprocess.Popen[bytes] | None = None
-
-    @property
-    def addresses(self) -> dict[str, str]:
-        return {"shm": f"shm:{self.namespace}", "grpc": f"unix:{self.socket}"}
-
-    def start(self) -> None:
-        """Returns when it answers over both."""
-        command: list[str | Path] = [WADE, "serve", "--config", self._config, "--vehicles", ROOT / "vehicles"]
-        with self._log.open("ab") as log:
-            self.process = subprocess.Popen(command, env=environment(), stdout=log, stderr=log)
-        end = time.monotonic() + 60
-        for address in self.addresses.values():
-            query: list[str | Path] = [WADE, "query", "--vehicle", VEHICLE, "--depth", "0.1", "--addr", address]
-            while subprocess.run(query, env=environment(), capture_output=True).returncode != 0:
-                assert self.process.poll() is None and time.monotonic() < end, self._log.read_text()
-                time.sleep(0.05)
-
-    def kill(self) -> None:
-        if self.process is not None:
-            self.process.kill()
-            self.process.wait()
+def addresses(server: Server) -> dict[str, str]:
+    return {"shm": f"shm:{server.namespace}", "grpc": f"unix:{server.socket}"}
 
 
 @pytest.fixture(scope="session")
@@ -73,8 +36,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def unit(folder: Path, *arguments: str) -> Path:
     """Writes a unit."""
     out = folder / f"{uuid.uuid4().hex[:8]}.fmu"
-    command: list[str | Path] = [WADE, "fmu", "--vehicle", VEHICLE, "--library", LIBRARY, "--out", out, *arguments]
-    subprocess.run(command, check=True, env=environment() | {"WADE_VEHICLES": str(ROOT / "vehicles")})
+    command: list[str | Path] = [binary(), "fmu", "--vehicle", VEHICLE, "--library", LIBRARY, "--out", out, *arguments]
+    subprocess.run(command, check=True, env=environment() | {"WADE_VEHICLES": str(VEHICLES)})
     return out
 
 

@@ -15,10 +15,11 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from conftest import VEHICLE, Run, Server, unit
+from conftest import VEHICLE, Run, addresses, unit
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
+from servers import Server
 
 STEP = 0.001
 COLUMNS = 11
@@ -76,7 +77,7 @@ def status(call: Callable[[], Any]) -> int:
 @pytest.mark.parametrize("arguments", [[], ["--surfaces"]])
 @pytest.mark.parametrize("kind", ["embedded", "shm", "grpc"])
 def test_a_unit_is_valid(kind: str, arguments: list[str], tmp_path: Path, server: Server) -> None:
-    source = ["--embedded"] if kind == "embedded" else ["--connect", server.addresses[kind]]
+    source = ["--embedded"] if kind == "embedded" else ["--connect", addresses(server)[kind]]
     out = unit(tmp_path, *source, *arguments)
     assert validate_fmu(str(out)) == []
     description = fmpy.read_model_description(str(out))
@@ -107,13 +108,13 @@ def test_a_hundred_thousand_steps_are_those_of_the_c_client(
 ) -> None:
     states = rows(100_001)
     count = {"embedded": len(states), "shm": len(states), "grpc": 2_001}
-    run_c = [os.environ["WADE_FMU_STEPS"], server.addresses["shm"], VEHICLE, str(STEP)]
+    run_c = [os.environ["WADE_FMU_STEPS"], addresses(server)["shm"], VEHICLE, str(STEP)]
     answered = {}
     for length in set(count.values()):
         out = subprocess.run(run_c, input=states[:length].tobytes(), stdout=subprocess.PIPE, check=True, timeout=200)
         answered[length] = np.frombuffer(out.stdout, np.float32)
     for kind, length in count.items():
-        run = open_run("--embedded") if kind == "embedded" else open_run("--connect", server.addresses[kind])
+        run = open_run("--embedded") if kind == "embedded" else open_run("--connect", addresses(server)[kind])
         set_row(run, states[0])
         run.begin()
         found = np.empty((length, 6), np.float32)
@@ -231,7 +232,7 @@ def test_two_masses_float_with_the_added_mass_in_their_own(open_run: Open, serve
     assert len(history) == 10_000 and np.abs(history[-500:, 2:]).max() < 1e-3, "they come to rest"
     assert abs(embedded.get("force_n")[2] / (60.0 * 9.81) - 1.0) < 1e-3, "and weigh what the water lifts"
     assert abs(history[-1, 0] - history[-1, 1] - 10.0 * 9.81 / 2000.0) < 1e-4, "with the load on its spring"
-    remote = two_masses(open_run("--connect", server.addresses["shm"]), True, 2.0)
+    remote = two_masses(open_run("--connect", addresses(server)["shm"]), True, 2.0)
     assert np.array_equal(remote, history[: len(remote)])
     # as a force of the step before, the same rest by another way
     explicit = two_masses(open_run("--embedded"), False, 20.0)
@@ -292,7 +293,7 @@ def test_a_server_that_dies_is_bridged_as_long_as_was_asked(kind: str, open_run:
     (tmp_path / "own").mkdir()
     server = Server(tmp_path / "own")
     server.start()
-    run = open_run("--connect", server.addresses[kind])
+    run = open_run("--connect", addresses(server)[kind])
     run.set("timeout_s", 0.3)
     run.set("oldest_answer_s", 2.5 * STEP)
     run.set("water_level_m", 0.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import time
-import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,8 @@ import numpy as np
 import pytest
 import wade
 from numpy.typing import NDArray
+from servers import Server, binary
 
-ROOT = Path(__file__).resolve().parents[3]
-WADE = Path(os.environ["WADE_BIN"])
 GRAVITY, MASS, DENSITY = 9.81, 50.0, 1000.0
 #: Of the shipped Husky [m].
 Z0 = -0.1845
@@ -25,38 +23,8 @@ Z0 = -0.1845
 mujoco.mj_loadPluginLibrary(os.environ["WADE_MUJOCO_PLUGIN"])
 
 
-class Server:
-    """A real `wade serve`; may be killed and started again."""
-
-    def __init__(self, folder: Path):
-        self.namespace, self.socket = f"mujoco_{uuid.uuid4().hex[:12]}", folder / "wade.sock"
-        self._config, self._log = folder / "wade.toml", folder / "log"
-        self._config.write_text(
-            f'[grpc]\nlisten = "127.0.0.1:0"\nunix_socket = "{self.socket}"\n'
-            f'[shm]\nnamespace = "{self.namespace}"\n[http]\nlisten = ""\n'
-        )
-        self._process: subprocess.Popen[bytes] | None = None
-
-    @property
-    def address(self) -> str:
-        return f"shm:{self.namespace}"
-
-    def start(self) -> None:
-        """Returns when it answers."""
-        clean = {name: value for name, value in os.environ.items() if not name.startswith("WADE_")}
-        command: list[str | Path] = [WADE, "serve", "--config", self._config, "--vehicles", ROOT / "vehicles"]
-        with self._log.open("ab") as log:
-            self._process = subprocess.Popen(command, env=clean, stdout=log, stderr=log)
-        query: list[str | Path] = [WADE, "query", "--vehicle", "husky", "--depth", "0.1", "--addr", self.address]
-        end = time.monotonic() + 60
-        while subprocess.run(query, env=clean, capture_output=True).returncode != 0:
-            assert self._process.poll() is None and time.monotonic() < end, self._log.read_text()
-            time.sleep(0.05)
-
-    def kill(self) -> None:
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+def address(server: Server) -> str:
+    return f"shm:{server.namespace}"
 
 
 @pytest.fixture(scope="session")
@@ -108,7 +76,7 @@ def run(
 
 
 def husky(server: Server, **others: Any) -> mujoco.MjModel:
-    return model(vehicle="husky", address=server.address, **others)
+    return model(vehicle="husky", address=address(server), **others)
 
 
 def test_a_vehicle_floats_with_its_own_weight_of_water(server: Server) -> None:
@@ -118,13 +86,13 @@ def test_a_vehicle_floats_with_its_own_weight_of_water(server: Server) -> None:
     assert data.qfrc_passive[2] == pytest.approx(MASS * GRAVITY, rel=1e-4)
     level = -track[-1, 3]
     answer = subprocess.run(
-        [WADE, "query", "--vehicle", "husky", "--water-level", str(level), "--addr", server.address],
+        [binary(), "query", "--vehicle", "husky", "--water-level", str(level), "--addr", address(server)],
         capture_output=True, text=True, check=True,
     ).stdout  # fmt: skip
     lift = float(next(line for line in answer.splitlines() if line.startswith("net force")).split()[-1])
     assert lift == pytest.approx(MASS * GRAVITY, rel=5e-3)
     # MuJoCo's own model knows drag and added mass, and no surface
-    own = model(option=f'density="{DENSITY}" viscosity="0.001"', vehicle="husky", address=server.address, level=-50)
+    own = model(option=f'density="{DENSITY}" viscosity="0.001"', vehicle="husky", address=address(server), level=-50)
     assert run(own, 3.0)[1][-1, 3] < -2.0, "there it sinks"
 
 
@@ -227,7 +195,7 @@ def test_a_run_that_is_reset_is_the_first(server: Server) -> None:
 )
 def test_an_mjcf_that_cannot_be_served_is_an_error(config: dict[str, Any], says: str, server: Server) -> None:
     with pytest.raises(ValueError, match=says):
-        model(**({"address": server.address} | config))
+        model(**({"address": address(server)} | config))
 
 
 def test_a_server_that_dies_and_comes_back_ends_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
