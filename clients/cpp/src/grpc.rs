@@ -360,7 +360,8 @@ impl Shared {
     }
 }
 
-/// The forces in a state, and their derivatives where it asks for them: in the stream where it belongs to a session, which has a stream of its own.
+/// The forces in a state, and their derivatives where it asks for them: in the stream where it belongs to a session, which has a
+/// stream of its own.
 async fn answer(
     link: &mut GrpcLink,
     state: &State,

@@ -54,7 +54,6 @@ pub fn xml(settings: &Settings, model: &Model, token: &str) -> String {
     text.push_str(
         "  <DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.001\"/>\n  <ModelVariables>\n",
     );
-    text.push_str("    <Float64 name=\"time\" valueReference=\"0\" causality=\"independent\" variability=\"continuous\" unit=\"s\" description=\"Simulated time\"/>\n");
     for variable in variables(settings) {
         describe(&mut text, variable, settings);
     }
@@ -95,6 +94,7 @@ fn describe(text: &mut String, variable: Variable, settings: &Settings) {
     let (causality, variability) = match (row.causality, row.kind) {
         (Causality::Parameter, _) => ("parameter", "fixed"),
         (Causality::Input, _) => ("input", "continuous"),
+        (Causality::Independent, _) => ("independent", "continuous"),
         (Causality::Output, Kind::Real) => ("output", "continuous"),
         (Causality::Output, _) => ("output", "discrete"),
     };
@@ -117,7 +117,7 @@ fn describe(text: &mut String, variable: Variable, settings: &Settings) {
     if row.kind == Kind::Physics {
         text.push_str(" declaredType=\"Physics\"");
     }
-    if row.causality != Causality::Output {
+    if matches!(row.causality, Causality::Parameter | Causality::Input) {
         let shown = |value: f64| match row.kind {
             Kind::Boolean => (value != 0.0).to_string(),
             _ => value.to_string(),

@@ -173,55 +173,12 @@ macro_rules! of_type {
     };
 }
 
+of_type!(fmi3GetFloat64 fmi3SetFloat64 f64, Real, |value| value, |value| value);
 // a Boolean is read as a byte, whatever a simulator put there
 of_type!(fmi3GetBoolean fmi3SetBoolean u8, Boolean, |value| u8::from(value != 0.0), |value| f64::from(u8::from(value != 0)));
 of_type!(fmi3GetUInt32 fmi3SetUInt32 u32, Count, |value| value as u32, f64::from);
 // numbers of an enumeration are few
 of_type!(fmi3GetInt64 fmi3SetInt64 i64, Physics, |value| value as i64, |value| value as f64);
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFloat64(
-    run: *mut Run,
-    references: *const u32,
-    count: usize,
-    from: *const f64,
-    size: usize,
-) -> Status {
-    // SAFETY: valid for their lengths.
-    let (references, from) = unsafe { (values(references, count), values(from, size)) };
-    with(run, |instance| set(instance, (references, Kind::Real), from, |value| value))
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFloat64(
-    run: *mut Run,
-    references: *const u32,
-    count: usize,
-    to: *mut f64,
-    size: usize,
-) -> Status {
-    // SAFETY: valid for their lengths.
-    let (references, to) = unsafe { (values(references, count), places(to, size)) };
-    with(run, |instance| {
-        let mut rest = to;
-        for reference in references {
-            // the time, which is no variable of ours
-            let count = if *reference == 0 { 1 } else { instance.count(of_kind(*reference, Kind::Real)?)? };
-            let too_few = || Fault::error("fewer values were passed than the variables have");
-            let (own, left) = std::mem::take(&mut rest).split_at_mut_checked(count).ok_or_else(too_few)?;
-            match *reference {
-                0 => own[0] = instance.time(),
-                reference => get(instance, (&[reference], Kind::Real), own, |value| value)?,
-            }
-            rest = left;
-        }
-        if rest.is_empty() {
-            Ok(())
-        } else {
-            Err(Fault::error("more values were passed than the variables have"))
-        }
-    })
-}
 
 /// Functions for types that no variable has, which succeed where nothing is asked.
 macro_rules! of_no_type {

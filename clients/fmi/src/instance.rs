@@ -75,7 +75,6 @@ pub enum Mode {
 #[derive(Debug, Clone)]
 pub struct Kept {
     values: Vec<f64>,
-    time: f64,
     mode: Mode,
     is_stale: bool,
     session: Session,
@@ -88,7 +87,6 @@ pub struct Instance {
     resources: PathBuf,
     layout: Layout,
     values: Vec<f64>,
-    time: f64,
     mode: Mode,
     /// Whether inputs were set after the outputs were computed.
     is_stale: bool,
@@ -108,7 +106,6 @@ impl Instance {
             resources: resources.to_owned(),
             layout,
             values,
-            time: 0.0,
             mode: Mode::Instantiated,
             is_stale: true,
             client: None,
@@ -122,7 +119,7 @@ impl Instance {
 
     /// Simulated time [s].
     pub fn time(&self) -> f64 {
-        self.time
+        self.number(Variable::Time)
     }
 
     /// Goes from one mode to another.
@@ -140,7 +137,7 @@ impl Instance {
             return Err(Fault::error(format!("the start time must be finite, got {start}")));
         }
         self.enter(&[Mode::Instantiated], Mode::Initialization)?;
-        self.time = start;
+        self.put(Variable::Time, &[start]);
         Ok(())
     }
 
@@ -153,7 +150,7 @@ impl Instance {
     /// Goes back to before the begin, with start values.
     pub fn reset(&mut self) {
         (self.layout, self.values) = Layout::new(&self.settings);
-        (self.time, self.mode, self.is_stale, self.client) = (0.0, Mode::Instantiated, true, None);
+        (self.mode, self.is_stale, self.client) = (Mode::Instantiated, true, None);
     }
 
     /// Values of a variable.
@@ -175,7 +172,7 @@ impl Instance {
         let is_open = match row.causality {
             Causality::Parameter => matches!(self.mode, Mode::Instantiated | Mode::Initialization),
             Causality::Input => self.mode != Mode::Terminated,
-            Causality::Output => false,
+            Causality::Output | Causality::Independent => false,
         };
         if !is_open {
             return Err(Fault::error(format!("{} cannot be set in {:?} mode", row.name, self.mode)));
@@ -207,14 +204,14 @@ impl Instance {
                 "a step must have a finite begin and a length above 0, got {from} s and {length} s"
             )));
         }
-        if (from - self.time).abs() > SLACK * length + f64::EPSILON * 4.0 * from.abs() {
+        if (from - self.time()).abs() > SLACK * length + f64::EPSILON * 4.0 * from.abs() {
             return Err(Fault::discard(format!(
                 "the run is at {} s, and the step begins at {from} s: a run goes back by the state that was kept of it",
-                self.time
+                self.time()
             )));
         }
         match self.evaluate(length) {
-            Ok(()) => self.time = from + length,
+            Ok(()) => self.put(Variable::Time, &[from + length]),
             Err(
                 error
                 @ (ClientError::NoServer { .. } | ClientError::Timeout(_) | ClientError::Refused { .. }),
@@ -226,7 +223,7 @@ impl Instance {
                     )));
                 }
                 self.put(Variable::Age, &[age]);
-                self.time = from + length;
+                self.put(Variable::Time, &[from + length]);
                 let message = format!("{error}; the outputs are {age} s old");
                 return Err(Fault { status: Status::Warning, message });
             }
@@ -315,8 +312,8 @@ impl Instance {
                 "the memory of this run lies in a server; a unit that carries its bundle can keep it",
             ));
         }
-        let (values, time, mode, is_stale) = (self.values.clone(), self.time, self.mode, self.is_stale);
-        Ok(Kept { values, time, mode, is_stale, session: self.session().unwrap_or_default() })
+        let (values, mode, is_stale) = (self.values.clone(), self.mode, self.is_stale);
+        Ok(Kept { values, mode, is_stale, session: self.session().unwrap_or_default() })
     }
 
     /// Comes back to what was kept.
@@ -324,7 +321,7 @@ impl Instance {
         self.client().map_err(|error| Fault::error(error.to_string()))?;
         self.remember(Some(kept.session));
         self.values.clone_from(&kept.values);
-        (self.time, self.mode, self.is_stale) = (kept.time, kept.mode, kept.is_stale);
+        (self.mode, self.is_stale) = (kept.mode, kept.is_stale);
         Ok(())
     }
 

@@ -29,6 +29,8 @@ pub enum Causality {
     Input,
     /// The unit.
     Output,
+    /// Nobody: it is the time.
+    Independent,
 }
 
 /// Length of an array along one of its axes.
@@ -87,6 +89,7 @@ const SURFACES: &[Length] = &[Length::Surfaces];
 const OF_SURFACES: &[Length] = &[Length::Surfaces, Length::Fixed(3)];
 
 variables! {
+    Time "time" Real Independent &[], "s" 0.0 "Simulated time";
     ImplicitAddedMass "implicit_added_mass" Boolean Parameter &[], "" 0.0 "The simulator adds added_mass to its own mass matrix: force and moment leave -M_A nu_dot out";
     DryContact "dry_contact" Boolean Parameter &[], "" 0.0 "No water pressure under the contact patches of the tires";
     Physics "physics" Physics Parameter &[], "" 1.0 "How much of the physical base answers";
@@ -133,14 +136,14 @@ impl Variable {
         &ROWS[self as usize]
     }
 
-    /// Its value reference. 0 is the time.
+    /// Its value reference.
     pub fn reference(self) -> u32 {
-        self as u32 + 1
+        self as u32
     }
 
     /// The variable of a value reference.
     pub fn from_reference(reference: u32) -> Option<Self> {
-        Self::ALL.get((reference as usize).checked_sub(1)?).copied()
+        Self::ALL.get(reference as usize).copied()
     }
 
     /// Whether a unit has it.
