@@ -8,7 +8,7 @@
 //! Modules in reading order; each uses only those above it:
 //! values ([`at`], [`frame`], [`wrench`], [`condition`], [`domain`], [`digest`], [`forces`]), the body ([`geometry`], [`vehicle`]),
 //! the inputs of the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]), the network ([`model`]),
-//! with the effects added to it ([`served`]), and its files ([`bundle`]).
+//! with the effects added to it ([`served`]), its files ([`bundle`]), and how a vehicle stands under its loads ([`stability`]).
 
 pub mod at;
 pub mod condition;
@@ -33,6 +33,7 @@ pub mod physics;
 pub mod bundle;
 pub mod model;
 pub mod served;
+pub mod stability;
 
 /// The example of the README compiles and runs.
 #[cfg(doctest)]

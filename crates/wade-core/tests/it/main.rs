@@ -23,6 +23,7 @@ mod physics;
 mod random;
 mod release;
 mod shipped;
+mod stability;
 mod submergence;
 mod symmetry;
 mod wheels;

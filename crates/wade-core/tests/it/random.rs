@@ -19,6 +19,11 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
+    /// Between these two.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
     /// Anywhere on the unit sphere.
     pub fn direction(&mut self) -> Vec3 {
         let z = 2.0 * self.unit() - 1.0;
