@@ -19,6 +19,7 @@ mod serve;
 mod shell;
 mod soak;
 mod soak_server;
+mod stability;
 mod state;
 mod train;
 mod validate;
@@ -61,6 +62,7 @@ enum Command {
     Serve(serve::Serve),
     Query(query::Query),
     Predict(predict::Predict),
+    Stability(stability::StabilityCommand),
     Soak(soak::Soak),
     Campaign(campaign::CampaignCommand),
     Dataset(dataset::Dataset),
@@ -85,6 +87,7 @@ impl Cli {
             Command::Serve(command) => command.run(),
             Command::Query(command) => command.run(),
             Command::Predict(command) => command.run(),
+            Command::Stability(command) => command.run(),
             Command::Soak(command) => command.run(),
             Command::Campaign(command) => command.run(),
             Command::Dataset(command) => command.run(),

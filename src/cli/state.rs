@@ -74,7 +74,7 @@ pub struct StateArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Contact {
+pub enum Contact {
     /// Full Archimedes
     Wetted,
     /// No pressure under the contact patches

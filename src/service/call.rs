@@ -18,6 +18,9 @@ thread_local! {
     pub(super) static EVALUATOR: RefCell<Evaluator> = RefCell::default();
 }
 
+/// States of a batch, a map or a stream that are computed before others get their turn: about a millisecond.
+pub(super) const STATES_PER_TURN: usize = 64;
+
 /// What the handlers share.
 #[derive(Debug, Clone)]
 pub struct Shared {

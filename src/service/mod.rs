@@ -13,6 +13,7 @@ pub mod shm;
 pub(crate) mod shm_owner;
 pub(crate) mod shm_probe;
 pub(crate) mod shm_remains;
+pub mod stability;
 
 use tokio::sync::watch;
 

@@ -30,6 +30,7 @@ mod shipped_weights;
 mod shm;
 mod soak;
 mod soak_transports;
+mod stability;
 mod start_log;
 mod training;
 mod validate;

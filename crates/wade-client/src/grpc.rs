@@ -62,6 +62,14 @@ impl GrpcClient {
         self.runtime.block_on(self.link.evaluate_batch(states))
     }
 
+    /// How the vehicle stands; the request names it.
+    pub fn stability(
+        &mut self,
+        query: proto::GetStabilityRequest,
+    ) -> Result<proto::GetStabilityResponse, ClientError> {
+        self.runtime.block_on(self.link.stability(query))
+    }
+
     /// What the server says of the vehicle.
     pub fn vehicle(&mut self) -> Result<proto::GetVehicleResponse, ClientError> {
         self.runtime.block_on(self.link.vehicle())

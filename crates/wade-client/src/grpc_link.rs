@@ -95,6 +95,16 @@ impl GrpcLink {
         self.answered(response)
     }
 
+    /// How the vehicle stands.
+    pub async fn stability(
+        &mut self,
+        query: proto::GetStabilityRequest,
+    ) -> Result<proto::GetStabilityResponse, ClientError> {
+        let request = self.request(query);
+        let response = self.client.get_stability(request).await;
+        self.answered(response)
+    }
+
     /// What the server says of the vehicle.
     pub async fn vehicle(&mut self) -> Result<proto::GetVehicleResponse, ClientError> {
         let query = proto::GetVehicleRequest { vehicle: self.vehicle.clone(), include_mesh: false };

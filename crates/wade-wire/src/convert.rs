@@ -79,7 +79,7 @@ fn quaternion(q: &proto::Quaternion) -> Result<UnitQuaternion<f64>, InvalidState
     Ok(UnitQuaternion::from_quaternion(q))
 }
 
-fn is_dry(ground_contact: i32) -> Result<bool, InvalidState> {
+pub(crate) fn is_dry(ground_contact: i32) -> Result<bool, InvalidState> {
     let known = proto::GroundContact::try_from(ground_contact);
     known
         .map(|contact| contact == proto::GroundContact::Dry)

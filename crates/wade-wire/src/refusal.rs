@@ -3,6 +3,7 @@
 use tonic::Code;
 use tonic_types::{ErrorDetails, StatusExt};
 
+use super::stability::StabilityFault;
 use super::state::InvalidState;
 use super::tensor_fault::TensorFault;
 
@@ -54,6 +55,9 @@ pub enum Refusal {
     /// A tensor of an inference request is wrong.
     #[error(transparent)]
     Tensor(#[from] TensorFault),
+    /// A request for how a vehicle stands is wrong.
+    #[error(transparent)]
+    Stability(#[from] StabilityFault),
     /// A field of the state is wrong; in a batch, of the state with this index.
     #[error("{invalid}{}", .index.map(|i| format!(" (state {i} of the batch)")).unwrap_or_default())]
     Invalid {
@@ -149,6 +153,7 @@ impl Refusal {
             Self::DeadlineExceeded { .. } => Code::DeadlineExceeded,
             Self::Invalid { .. }
             | Self::Tensor(_)
+            | Self::Stability(_)
             | Self::MissingState
             | Self::EmptyBatch
             | Self::BatchTooLong { .. }
@@ -182,6 +187,7 @@ impl Refusal {
                 ErrorDetails::with_resource_info("repository", name.as_str(), "", message)
             }
             Self::Tensor(fault) => ErrorDetails::with_bad_request_violation(fault.field(), message),
+            Self::Stability(fault) => ErrorDetails::with_bad_request_violation(fault.field(), message),
             Self::Overloaded { .. } | Self::TooManyJobs | Self::NotReady => {
                 ErrorDetails::with_retry_info(Some(RETRY_AFTER))
             }

@@ -38,7 +38,9 @@ impl Method {
         let (request, stream, probe) = (Resource::requests, Resource::streams, Resource::probes);
         match path {
             "/wade.v1.Hydrodynamics/Evaluate" => of(request, names.unary),
-            "/wade.v1.Hydrodynamics/EvaluateBatch" => of(request, names.batch),
+            "/wade.v1.Hydrodynamics/EvaluateBatch" | "/wade.v1.Hydrodynamics/GetStability" => {
+                of(request, names.batch)
+            }
             "/wade.v1.Hydrodynamics/Stream" => of(stream, names.stream),
             "/inference.GRPCInferenceService/ModelInfer" => of(request, names.infer),
             "/inference.GRPCInferenceService/ModelStreamInfer" => of(stream, names.infer),

@@ -8,14 +8,12 @@ use tonic::{Request, Response, Status, Streaming};
 use super::stream::Answers;
 use crate::metrics::Transport;
 use crate::service::admin::{Job, Jobs};
-use crate::service::call::{self, Answered, Call, EVALUATOR, Shared, answer_state};
+use crate::service::call::{self, Answered, Call, EVALUATOR, STATES_PER_TURN, Shared, answer_state};
+use crate::service::stability::stability;
 use wade_core::served::ServedVehicle;
 use wade_wire::proto::admin_server::Admin;
 use wade_wire::proto::hydrodynamics_server::Hydrodynamics;
 use wade_wire::{Refusal, proto};
-
-/// States of a batch or a stream that are computed before others get their turn: about a millisecond.
-pub(super) const STATES_PER_TURN: usize = 64;
 
 /// What the metrics call the calls of one listener.
 #[derive(Debug, Clone, Copy)]
@@ -106,6 +104,19 @@ impl Hydrodynamics for Handlers {
         let request = request.get_ref();
         let vehicle = self.shared.engine.vehicle(&request.vehicle).map_err(Refusal::from)?;
         Ok(Response::new(wade_wire::vehicle(&vehicle, request.include_mesh)))
+    }
+
+    async fn get_stability(
+        &self,
+        request: Request<proto::GetStabilityRequest>,
+    ) -> Result<Response<proto::GetStabilityResponse>, Status> {
+        let call = Call::begin(&self.shared, self.names.batch, &request);
+        let request = request.get_ref();
+        let answer = match self.shared.engine.vehicle(&request.vehicle) {
+            Ok(vehicle) => stability(&call, vehicle, request).await,
+            Err(unknown) => Err(unknown.into()),
+        };
+        call.end(answer)
     }
 
     async fn get_latency(

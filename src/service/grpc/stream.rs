@@ -7,10 +7,9 @@ use std::time::Instant;
 use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
-use super::handlers::STATES_PER_TURN;
 use super::size_limit;
 use crate::metrics::Transport;
-use crate::service::call::{Call, Shared, answer_state};
+use crate::service::call::{Call, STATES_PER_TURN, Shared, answer_state};
 use wade_core::served::Session;
 use wade_wire::Refusal;
 use wade_wire::proto;

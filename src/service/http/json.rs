@@ -80,6 +80,12 @@ pub fn document(document: &impl serde::Serialize) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], text).into_response()
 }
 
+/// The same on one line, for long ones.
+pub fn compact(document: &impl serde::Serialize) -> Response {
+    let text = serde_json::to_vec(document).expect("numbers, text and lists alone");
+    ([(header::CONTENT_TYPE, "application/json")], text).into_response()
+}
+
 /// The JSON of a message of this name whose fields stand in the parameters of a URL, by path: `state.depth_m=0.2`. A
 /// field that repeats is given as often as it has values.
 pub fn from_parameters(name: &str, parameters: &str) -> Result<Vec<u8>, Rejection> {

@@ -1,11 +1,11 @@
-//! Queries, vehicles and latencies as JSON: the messages of `wade.v1.Hydrodynamics`, but the answer to a query, which is
-//! the document of `wade query --json` too.
+//! Queries, vehicles and latencies as JSON: the messages of `wade.v1.Hydrodynamics`, but the answers to a query and of how a vehicle
+//! stands, which are the documents of `wade query --json` and `wade stability --json` too.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
-use axum::body::{Body, to_bytes};
+use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Extension, Path, RawQuery, State};
 use axum::response::Response;
 use axum::routing::get;
@@ -17,6 +17,7 @@ use crate::metrics::{Resource, Transport};
 use crate::service::accounts::{Computing, Connection};
 use crate::service::answer::Answer;
 use crate::service::call::{self, Call, answer_state};
+use crate::service::stability::{Document, stability};
 use wade_wire::{Refusal, proto};
 
 /// Longest body [bytes]: a query with every field takes about one kilobyte.
@@ -26,6 +27,7 @@ const MAX_BODY: usize = 64 << 10;
 pub fn routes() -> Router<Arc<Shared>> {
     Router::new()
         .route("/v1/query", get(by_parameters).post(by_body))
+        .route("/v1/stability", get(stability_by_parameters).post(stability_by_body))
         .route("/v1/vehicles", get(vehicles))
         .route("/v1/vehicles/{name}", get(vehicle))
         .route("/v1/latency", get(latency))
@@ -45,25 +47,24 @@ async fn by_body(
     Extension(connection): Extension<Arc<Connection>>,
     body: Body,
 ) -> Result<Response, Rejection> {
+    let text = whole(&shared, body).await?;
+    let _computing = Computing::begin(&connection);
+    evaluate(&shared, &connection, &text)
+}
+
+/// A body that has arrived in time.
+async fn whole(shared: &Shared, body: Body) -> Result<Bytes, Rejection> {
     let late = |_| Refusal::DeadlineExceeded { answered: None };
     let longest = Duration::from_secs_f64(shared.config.request_s);
     let text = tokio::time::timeout(longest, to_bytes(body, MAX_BODY)).await.map_err(late)?;
     // the other errors are those of a connection that is gone, whom no answer reaches
-    let text = text.map_err(|_| Rejection::TooLong { limit: MAX_BODY })?;
-    let _computing = Computing::begin(&connection);
-    evaluate(&shared, &connection, &text)
+    text.map_err(|_| Rejection::TooLong { limit: MAX_BODY })
 }
 
 /// Answers on this thread, as gRPC does on its own.
 fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Result<Response, Rejection> {
     let call = Call::arriving(&shared.grpc, Transport::http, None);
-    let request: proto::EvaluateRequest = match json::read("wade.v1.EvaluateRequest", text) {
-        Ok(request) => request,
-        Err(rejection) => {
-            shared.grpc.metrics.refuse(Transport::http, "invalid_argument");
-            return Err(rejection);
-        }
-    };
+    let request: proto::EvaluateRequest = read(shared, "wade.v1.EvaluateRequest", text)?;
     let mut names = Vec::new();
     let admitted = shared.accounts.take(connection, Resource::requests, 1);
     let overloaded = |overloaded| Refusal::Overloaded { what: Resource::requests.name(), overloaded };
@@ -74,6 +75,47 @@ fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Resul
     });
     let response = call.record(answer)?;
     Ok(json::document(&Answer::new(&request.vehicle, &names, response)))
+}
+
+/// Reads a message of this name; what is none is counted.
+fn read<M: prost::Message + Default>(shared: &Shared, name: &str, text: &[u8]) -> Result<M, Rejection> {
+    json::read(name, text).inspect_err(|_| shared.grpc.metrics.refuse(Transport::http, "invalid_argument"))
+}
+
+async fn stability_by_parameters(
+    State(shared): State<Arc<Shared>>,
+    Extension(connection): Extension<Arc<Connection>>,
+    RawQuery(parameters): RawQuery,
+) -> Result<Response, Rejection> {
+    let text = json::from_parameters("wade.v1.GetStabilityRequest", &parameters.unwrap_or_default())?;
+    stand(&shared, &connection, &text).await
+}
+
+async fn stability_by_body(
+    State(shared): State<Arc<Shared>>,
+    Extension(connection): Extension<Arc<Connection>>,
+    body: Body,
+) -> Result<Response, Rejection> {
+    let text = whole(&shared, body).await?;
+    let _computing = Computing::begin(&connection);
+    stand(&shared, &connection, &text).await
+}
+
+/// How a vehicle stands, on this thread and between others.
+async fn stand(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Result<Response, Rejection> {
+    let call = Call::arriving(&shared.grpc, Transport::http, None);
+    let request: proto::GetStabilityRequest = read(shared, "wade.v1.GetStabilityRequest", text)?;
+    let admitted = shared.accounts.take(connection, Resource::requests, 1);
+    let overloaded = |overloaded| Refusal::Overloaded { what: Resource::requests.name(), overloaded };
+    let answer =
+        match admitted.map_err(overloaded).map(|place| (place, shared.grpc.engine.vehicle(&request.vehicle)))
+        {
+            Ok((_place, Ok(vehicle))) => stability(&call, vehicle, &request).await,
+            Ok((_, Err(unknown))) => Err(unknown.into()),
+            Err(refusal) => Err(refusal),
+        };
+    let response = call.record(answer)?;
+    Ok(json::compact(&Document::new(&request, &response, false)))
 }
 
 async fn vehicles(State(shared): State<Arc<Shared>>) -> Response {

@@ -52,7 +52,7 @@ pub enum Rejection {
     ForeignSite,
     /// Nothing there.
     #[error(
-        "there is /, /v1/query, /v1/vehicles, /v1/vehicles/NAME, /v1/vehicles/NAME/hull, /v1/latency, /metrics, /livez and /readyz"
+        "there is /, /v1/query, /v1/stability, /v1/vehicles, /v1/vehicles/NAME, /v1/vehicles/NAME/hull, /v1/latency, /metrics, /livez and /readyz"
     )]
     NoSuchPath,
 }

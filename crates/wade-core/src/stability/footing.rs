@@ -87,26 +87,25 @@ impl Footing {
         &self.feet
     }
 
-    /// Normal forces on the feet [N] that together are `normal` and act at `center`, as of equal springs on a rigid ground that can
-    /// push and not pull. Past an edge, where nothing is in balance, those on the edge.
-    pub(super) fn normal_forces(&self, normal: f64, center: &Vector2<f64>, forces: &mut [f64]) {
-        forces.fill(0.0);
-        if normal <= 0.0 || self.feet.is_empty() {
-            return;
+    /// Normal forces on the feet [N] that together are `normal` and act at `center`, or at the place between the feet nearest to it.
+    pub(super) fn normal_forces(&self, normal: f64, center: &Vector2<f64>) -> Vec<f64> {
+        let mut forces = vec![0.0; self.feet.len()];
+        if normal <= 0.0 {
+            return forces;
         }
         let center = self.nearest(center);
-        let mut bearing: Vec<usize> = (0..self.feet.len()).collect();
         let sum = Vector3::new(1.0, center.x, center.y) * normal;
-        loop {
+        let mut bearing: Vec<usize> = (0..self.feet.len()).collect();
+        while !bearing.is_empty() {
             let row = |r: usize, c: usize| {
                 let at = self.feet[bearing[c]].at;
                 [1.0, at.x, at.y][r]
             };
             let places = DMatrix::from_fn(3, bearing.len(), row);
             // of the forces that are in balance those with the least sum of squares are those of equal springs
-            let Ok(least) = places.svd(true, true).solve(&sum, 1e-9) else { return };
+            let Ok(least) = places.svd(true, true).solve(&sum, 1e-9) else { break };
             let lifted = (0..bearing.len()).min_by(|&a, &b| least[a].total_cmp(&least[b]));
-            match lifted.filter(|&foot| least[foot] < -1e-9 * normal && bearing.len() > 1) {
+            match lifted.filter(|&foot| least[foot] < -1e-9 * normal) {
                 Some(foot) => {
                     bearing.remove(foot);
                 }
@@ -115,10 +114,11 @@ impl Footing {
                         .iter()
                         .zip(least.iter())
                         .for_each(|(&foot, &force)| forces[foot] = force.max(0.0));
-                    return;
+                    break;
                 }
             }
         }
+        forces
     }
 
     /// The point of the area between the feet that is nearest to this one.

@@ -63,7 +63,7 @@ pub struct Modes<T> {
 }
 
 /// What is known of how a vehicle stands in one state.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stability {
     /// Probabilities, from the stated deviation of each component of the wrench, taken as normal and independent, and the spread of
     /// the friction.
@@ -74,8 +74,6 @@ pub struct Stability {
     pub margins: Modes<f64>,
     /// Friction below which it slides, `|H| / N` [-]; infinite where it floats.
     pub friction_needed: f64,
-    /// Normal force on each foot [N].
-    pub normal_forces: Vec<f64>,
 }
 
 /// A vehicle on the ground.
@@ -119,19 +117,30 @@ impl Stance {
 
     /// How it stands with these forces of the water, on a bed that is tilted as the body is: `up` is the world's, in the body frame.
     pub fn stability(&self, forces: &Forces, up: &UnitVector3<f64>, friction: &Friction) -> Stability {
-        let weight = -up.into_inner() * self.weight;
-        let (force, moment) = (forces.wrench.force, forces.wrench.moment);
-        let normal = -(force.z + weight.z);
-        let mean = self.push(&(force + weight), &moment);
-        let mut normal_forces = vec![0.0; self.footing.feet().len()];
-        let pressure = mean.shift / normal.max(f64::MIN_POSITIVE) + self.center.xy();
-        self.footing.normal_forces(normal, &pressure, &mut normal_forces);
+        let (mean, normal) = self.mean(forces, up);
         Stability {
-            chances: self.chances(forces, &weight, friction),
+            chances: self.chances(forces, up, friction),
             margins: self.margins(&mean, normal, friction.min),
             friction_needed: if normal > 0.0 { mean.along.norm() / normal } else { f64::INFINITY },
-            normal_forces,
         }
+    }
+
+    /// Normal force on each foot with the mean wrench [N], as of equal springs on a rigid bed that can push and not pull; past an edge,
+    /// where nothing is in balance, those of the feet on it.
+    pub fn normal_forces(&self, forces: &Forces, up: &UnitVector3<f64>) -> Vec<f64> {
+        let (mean, normal) = self.mean(forces, up);
+        let pressure = mean.shift / normal.max(f64::MIN_POSITIVE) + self.center.xy();
+        self.footing.normal_forces(normal, &pressure)
+    }
+
+    fn weight(&self, up: &UnitVector3<f64>) -> Vec3 {
+        -up.into_inner() * self.weight
+    }
+
+    /// The mean push, and the normal force beside it [N].
+    fn mean(&self, forces: &Forces, up: &UnitVector3<f64>) -> (Push, f64) {
+        let force = forces.wrench.force + self.weight(up);
+        (self.push(&force, &forces.wrench.moment), -force.z)
     }
 
     fn push(&self, force: &Vec3, moment: &Vec3) -> Push {
@@ -194,7 +203,8 @@ impl Stance {
         Some([range[0], range[1].max(range[0])])
     }
 
-    fn chances(&self, forces: &Forces, weight: &Vec3, friction: &Friction) -> Modes<f64> {
+    fn chances(&self, forces: &Forces, up: &UnitVector3<f64>, friction: &Friction) -> Modes<f64> {
+        let weight = self.weight(up);
         let (mean, spread) = (forces.wrench, (forces.uncertainty, forces.moment_uncertainty));
         let normal = -(mean.force.z + weight.z);
         // given the others each of these is a limit of the normal force, whose share of the probability is in closed form
