@@ -55,7 +55,7 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
                 "wrench",
             ],
             &["geometry", "vehicle"],
-            &["features", "physics"],
+            &["features", "physics", "stability"],
             &["analytic", "anchor", "effects"],
             &["bundle", "model", "served"],
         ],

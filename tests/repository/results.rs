@@ -46,6 +46,7 @@ fn table(name: &str) -> String {
         "baselines" => gap::baselines(),
         "motion" => gap::motion(),
         "ramps" => gap::ramps(),
+        "floods" => accuracy::floods(),
         "physical effects" => effects::physics(),
         "totals" => effects::totals(),
         "faults" => effects::faults(),

@@ -42,3 +42,6 @@ class Vehicle:
 
     def evaluate_batch(self, numbers: bytes, flags: int, sessions: bytes, surfaces: bool) -> bytes:
         """The answers to N rows of single-precision numbers; `sessions` has a word of 8 bytes for each, or none."""
+
+    def stability(self, request: bytes) -> bytes:
+        """The answer to a `GetStabilityRequest` as it travels."""

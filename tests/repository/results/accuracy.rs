@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{digits, json, markdown, number, root, triple, word};
+use super::{digits, json, markdown, newest, number, root, triple, word};
 
 pub const VEHICLES: [&str; 2] = ["husky", "warthog"];
 
@@ -252,4 +252,24 @@ pub fn physics() -> String {
         markdown(&header, rows),
         markdown(&["vehicle", "check", "holds"], checks)
     )
+}
+
+/// Stability of generated cars beside what others measured and computed.
+pub fn floods() -> String {
+    let rows = json(newest("floods.json"));
+    let row = |row: &Value| {
+        let ours: Vec<String> =
+            row["ours"].as_array().expect("a list").iter().map(|value| digits(number(value))).collect();
+        let source = word(&row["source"]).to_owned();
+        let published = digits(number(&row["published"]));
+        vec![
+            word(&row["car"]).to_owned(),
+            word(&row["quantity"]).to_owned(),
+            published,
+            source,
+            ours.join(", "),
+        ]
+    };
+    let header = ["car", "quantity", "published", "source", "`wade`"];
+    markdown(&header, rows.as_array().expect("a list").iter().map(row).collect())
 }

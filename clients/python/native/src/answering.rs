@@ -37,6 +37,11 @@ impl Default for Answering {
 }
 
 impl Answering {
+    /// What evaluates, without a session.
+    pub fn evaluator(&mut self) -> &mut Evaluator {
+        &mut self.evaluator
+    }
+
     /// The row of one state; session 0 is none.
     pub fn one(
         &mut self,

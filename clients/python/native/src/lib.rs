@@ -9,6 +9,7 @@ mod numbers;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use prost::Message;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
@@ -17,7 +18,7 @@ use pyo3::types::{PyBytes, PyTuple};
 use wade_core::bundle::LibraryError;
 use wade_core::model::kernel::Isa;
 use wade_core::served::ServedVehicle;
-use wade_wire::{Refusal, single};
+use wade_wire::{Refusal, StabilityStates, proto, single};
 
 use answering::{Answering, Invalid};
 use numbers::NUMBERS;
@@ -139,9 +140,45 @@ impl Vehicle {
         rows.map(|rows| PyBytes::new(py, &rows))
             .map_err(|Invalid { invalid, index }| refused(invalid, Some(index)))
     }
+
+    fn stability<'py>(&self, py: Python<'py>, request: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+        let answer = py.detach(|| self.stand(request));
+        answer.map(|answer| PyBytes::new(py, &answer)).map_err(|error| match error {
+            NoStability::Misshapen(error) => PyValueError::new_err(error.to_string()),
+            NoStability::Refused(refusal) => {
+                let details = refusal.details();
+                let field = details.bad_request().and_then(|bad| bad.field_violations.first());
+                let field = field.map(|violation| violation.field.clone()).unwrap_or_default();
+                InvalidState::new_err((field, refusal.to_string(), None::<usize>))
+            }
+        })
+    }
+}
+
+/// Why a request for how a vehicle stands has no answer.
+enum NoStability {
+    Misshapen(prost::DecodeError),
+    Refused(Refusal),
+}
+
+impl From<Refusal> for NoStability {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
 }
 
 impl Vehicle {
+    /// How the vehicle stands.
+    fn stand(&self, request: &[u8]) -> Result<Vec<u8>, NoStability> {
+        let request = proto::GetStabilityRequest::decode(request).map_err(NoStability::Misshapen)?;
+        let states = StabilityStates::check(&request, &self.served)?;
+        let mut response = states.response(&self.served);
+        let mut answering = self.locked();
+        let room = (&*self.served, answering.evaluator());
+        states.push(&mut response, 0..states.len(), room).map_err(Refusal::from)?;
+        Ok(response.encode_to_vec())
+    }
+
     fn locked(&self) -> MutexGuard<'_, Answering> {
         self.answering.lock().unwrap_or_else(PoisonError::into_inner)
     }

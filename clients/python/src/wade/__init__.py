@@ -27,6 +27,7 @@ from .forces import BoxQuantity, Effect, Forces, LeftOut, Quantity
 from .in_process import InProcess
 from .latency import Latency, Percentiles
 from .rpc import GrpcClient
+from .stability import Foot, Ford, Stability, StabilityModes
 from .state import GroundContact, Physics, State
 from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
 
@@ -40,7 +41,9 @@ __all__ = [
     "DeadlineExceeded",
     "Effect",
     "EffectParameter",
+    "Foot",
     "Forces",
+    "Ford",
     "GroundContact",
     "GrpcClient",
     "InProcess",
@@ -56,6 +59,8 @@ __all__ = [
     "ResourceExhausted",
     "ServerUnavailable",
     "ShmClient",
+    "Stability",
+    "StabilityModes",
     "State",
     "Stream",
     "Surface",

@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import messages
 from .client import checked_timeout
 from .errors import DeadlineExceeded, InvalidState, UnknownVehicle, Violation, WadeError
 from .forces import Array, Effect, Forces, named_effect
 from .local import SessionStream, flags, session_numbers
+from .stability import DEFAULT_TIMEOUT_S as MAP_TIMEOUT_S
+from .stability import Ford, Stability
 from .state import SCALARS, TOLD, VECTORS, State
 
 if TYPE_CHECKING:
@@ -84,6 +87,17 @@ class InProcess:
         except self._native.InvalidState as invalid:
             raise InvalidState([Violation(*invalid.args)]) from None
         return known.forces(np.frombuffer(answer, known.rows[surfaces, states.jacobian]), np.ascontiguousarray)
+
+    def stability(self, vehicle: str, ford: Ford, *, timeout_s: float = MAP_TIMEOUT_S) -> Stability:
+        """Whether a vehicle that stands in moving water floats, slides, topples or can be steered."""
+        request = messages.get_stability_request(vehicle, ford)
+        _check(timeout_s)
+        try:
+            answer = self._vehicle(vehicle).native.stability(request.SerializeToString())
+        except self._native.InvalidState as invalid:
+            field, description, _ = invalid.args
+            raise InvalidState([messages.violation(field, description)]) from None
+        return messages.stability_of_bytes(answer, ford)
 
     def stream(self, vehicle: str) -> SessionStream:
         """A stream of states of one vehicle: a run of its own, whose states need no session. As fast as a call."""

@@ -29,12 +29,18 @@ from .errors import (
 )
 from .forces import BoxQuantity, Forces, Quantity, named_effect
 from .latency import Latency, Percentiles
+from .stability import Foot, Ford, Stability, StabilityModes
 from .state import TIME_STEP_AT, TOLD_AT, VECTORS, State
 from .v1 import admin_pb2, hydrodynamics_pb2
 from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
 
-# packed enumerations too: a value below 128 is one byte
-_PACKED = (FieldDescriptor.TYPE_FLOAT, FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_ENUM)
+# packed enumerations and truth values too: a value below 128 is one byte
+_PACKED = (
+    FieldDescriptor.TYPE_FLOAT,
+    FieldDescriptor.TYPE_DOUBLE,
+    FieldDescriptor.TYPE_ENUM,
+    FieldDescriptor.TYPE_BOOL,
+)
 
 
 def _with_arrays_as_bytes(file: FileDescriptor) -> dict[str, type[Message]]:
@@ -158,6 +164,25 @@ def list_vehicles_request() -> Message:
 def get_vehicle_request(vehicle: str, mesh: bool) -> Message:
     """Asks for all about one vehicle."""
     return _new("GetVehicleRequest", vehicle=vehicle, include_mesh=mesh)
+
+
+def get_stability_request(vehicle: str, ford: Ford) -> Message:
+    """Asks how a vehicle stands at each pair of a depth and a speed."""
+    request = _new(
+        "GetStabilityRequest",
+        vehicle=vehicle,
+        depth_m=np.ravel(ford.depth_m).astype("<f4").tobytes(),
+        speed_mps=np.ravel(ford.speed_mps).astype("<f4").tobytes(),
+        heading_rad=ford.heading_rad,
+        density_kgpm3=ford.density_kgpm3,
+        ground_contact=ford.ground_contact,
+        bed=ford.bed,
+        normal_forces=ford.normal_forces,
+    )
+    if ford.friction is not None:
+        request.friction_min, request.friction_max = np.broadcast_to(ford.friction, 2)
+    request.roll_pitch.roll_rad, request.roll_pitch.pitch_rad = ford.roll_pitch_rad
+    return request
 
 
 def get_latency_request() -> Message:
@@ -313,6 +338,38 @@ def _active_effect(effect: Any) -> ActiveEffect:
     )
 
 
+def stability(response: Any, ford: Ford) -> Stability:
+    """How a vehicle stands at each pair of a depth and a speed."""
+    shape = ford.shape
+
+    def modes(modes: Any) -> StabilityModes:
+        return StabilityModes(
+            floats=_floats(modes.floats, *shape),
+            slides=_floats(modes.slides, *shape),
+            topples=_floats(modes.topples, *shape),
+            steers=_floats(modes.steers, *shape) if modes.steers else None,
+        )
+
+    forces = response.normal_force_n
+    return Stability(
+        probability=modes(response.probability),
+        margin=modes(response.margin),
+        friction_needed=_floats(response.friction_needed, *shape),
+        normal_force_n=_floats(forces, *shape, len(response.feet)) if forces else None,
+        feet=tuple(Foot(foot.surface, foot.x_m, foot.y_m) for foot in response.feet),
+        in_domain=np.frombuffer(response.in_domain, np.bool_).reshape(shape),
+        friction=(response.friction_min, response.friction_max),
+        bundle_version=response.bundle_version,
+        provenance=response.provenance,
+        compute_ns=response.compute_ns,
+    )
+
+
+def stability_of_bytes(data: bytes, ford: Ford) -> Stability:
+    """The same of a message as it travels."""
+    return stability(_MESSAGES[f"{_PACKAGE}.GetStabilityResponse"].FromString(data), ford)
+
+
 def latencies(response: Any) -> tuple[Latency, ...]:
     """Percentiles of each transport and vehicle."""
 
@@ -341,7 +398,7 @@ def error(failure: Any, at: str, timeout_s: float) -> WadeError:
         return DeadlineExceeded(timeout_s)
     for detail in _details(failure):
         if isinstance(detail, error_details_pb2.BadRequest):
-            return InvalidState([_violation(v.field, v.description) for v in detail.field_violations])
+            return InvalidState([violation(v.field, v.description) for v in detail.field_violations])
         if isinstance(detail, error_details_pb2.ResourceInfo) and code is grpc.StatusCode.NOT_FOUND:
             return UnknownVehicle(detail.resource_name, message)
         if isinstance(detail, error_details_pb2.RetryInfo) and code is grpc.StatusCode.RESOURCE_EXHAUSTED:
@@ -363,7 +420,7 @@ def _details(failure: Any) -> list[Message]:
     return found
 
 
-def _violation(field: str, description: str) -> Violation:
-    """`state.depth_m` of a single state, `depth_m[3]` of the fourth of a batch."""
+def violation(field: str, description: str) -> Violation:
+    """A field in the words of the server: `state.depth_m` of a single state, `depth_m[3]` of the fourth of a batch."""
     name, _, index = field.removeprefix("state.").rstrip("]").partition("[")
     return Violation(name, description, int(index) if index else None)

@@ -15,6 +15,8 @@ from .client import DEFAULT_TIMEOUT_S, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
 from .latency import Latency
+from .stability import DEFAULT_TIMEOUT_S as MAP_TIMEOUT_S
+from .stability import Ford, Stability
 from .state import State
 from .vehicle import Reloaded, Vehicle
 
@@ -59,6 +61,11 @@ class GrpcClient:
     def vehicle(self, name: str, *, mesh: bool = False, timeout_s: float | None = None) -> Vehicle:
         """Surfaces, dimensions, mass and training domain of a vehicle; the hull's mesh on request."""
         return messages.vehicle(self._call("GetVehicle", messages.get_vehicle_request(name, mesh), timeout_s))
+
+    def stability(self, vehicle: str, ford: Ford, *, timeout_s: float = MAP_TIMEOUT_S) -> Stability:
+        """Whether a vehicle that stands in moving water floats, slides, topples or can be steered."""
+        request = messages.get_stability_request(vehicle, ford)
+        return messages.stability(self._call("GetStability", request, timeout_s), ford)
 
     def latency(self, *, timeout_s: float | None = None) -> tuple[Latency, ...]:
         """How fast the server is by its own clock, for each transport and vehicle that was asked for."""

@@ -13,6 +13,7 @@ mod bundle_files;
 mod closed_forms;
 mod effects_bundle;
 mod effects_served;
+mod floods;
 mod hydrostatics;
 mod jacobian;
 mod kernel;

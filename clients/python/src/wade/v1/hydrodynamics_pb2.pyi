@@ -550,3 +550,77 @@ class Percentiles(_message.Message):
     p99_9_us: float
     max_us: float
     def __init__(self, count: _Optional[int] = ..., p50_us: _Optional[float] = ..., p95_us: _Optional[float] = ..., p99_us: _Optional[float] = ..., p99_9_us: _Optional[float] = ..., max_us: _Optional[float] = ...) -> None: ...
+
+class GetStabilityRequest(_message.Message):
+    __slots__ = ("vehicle", "depth_m", "speed_mps", "heading_rad", "friction_min", "friction_max", "density_kgpm3", "roll_pitch", "ground_contact", "bed", "normal_forces")
+    VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    DEPTH_M_FIELD_NUMBER: _ClassVar[int]
+    SPEED_MPS_FIELD_NUMBER: _ClassVar[int]
+    HEADING_RAD_FIELD_NUMBER: _ClassVar[int]
+    FRICTION_MIN_FIELD_NUMBER: _ClassVar[int]
+    FRICTION_MAX_FIELD_NUMBER: _ClassVar[int]
+    DENSITY_KGPM3_FIELD_NUMBER: _ClassVar[int]
+    ROLL_PITCH_FIELD_NUMBER: _ClassVar[int]
+    GROUND_CONTACT_FIELD_NUMBER: _ClassVar[int]
+    BED_FIELD_NUMBER: _ClassVar[int]
+    NORMAL_FORCES_FIELD_NUMBER: _ClassVar[int]
+    vehicle: str
+    depth_m: _containers.RepeatedScalarFieldContainer[float]
+    speed_mps: _containers.RepeatedScalarFieldContainer[float]
+    heading_rad: float
+    friction_min: float
+    friction_max: float
+    density_kgpm3: float
+    roll_pitch: RollPitch
+    ground_contact: GroundContact
+    bed: float
+    normal_forces: bool
+    def __init__(self, vehicle: _Optional[str] = ..., depth_m: _Optional[_Iterable[float]] = ..., speed_mps: _Optional[_Iterable[float]] = ..., heading_rad: _Optional[float] = ..., friction_min: _Optional[float] = ..., friction_max: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., bed: _Optional[float] = ..., normal_forces: bool = ...) -> None: ...
+
+class StabilityModes(_message.Message):
+    __slots__ = ("floats", "slides", "topples", "steers")
+    FLOATS_FIELD_NUMBER: _ClassVar[int]
+    SLIDES_FIELD_NUMBER: _ClassVar[int]
+    TOPPLES_FIELD_NUMBER: _ClassVar[int]
+    STEERS_FIELD_NUMBER: _ClassVar[int]
+    floats: _containers.RepeatedScalarFieldContainer[float]
+    slides: _containers.RepeatedScalarFieldContainer[float]
+    topples: _containers.RepeatedScalarFieldContainer[float]
+    steers: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, floats: _Optional[_Iterable[float]] = ..., slides: _Optional[_Iterable[float]] = ..., topples: _Optional[_Iterable[float]] = ..., steers: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class GetStabilityResponse(_message.Message):
+    __slots__ = ("probability", "margin", "friction_needed", "normal_force_n", "feet", "in_domain", "friction_min", "friction_max", "bundle_version", "provenance", "compute_ns")
+    PROBABILITY_FIELD_NUMBER: _ClassVar[int]
+    MARGIN_FIELD_NUMBER: _ClassVar[int]
+    FRICTION_NEEDED_FIELD_NUMBER: _ClassVar[int]
+    NORMAL_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    FEET_FIELD_NUMBER: _ClassVar[int]
+    IN_DOMAIN_FIELD_NUMBER: _ClassVar[int]
+    FRICTION_MIN_FIELD_NUMBER: _ClassVar[int]
+    FRICTION_MAX_FIELD_NUMBER: _ClassVar[int]
+    BUNDLE_VERSION_FIELD_NUMBER: _ClassVar[int]
+    PROVENANCE_FIELD_NUMBER: _ClassVar[int]
+    COMPUTE_NS_FIELD_NUMBER: _ClassVar[int]
+    probability: StabilityModes
+    margin: StabilityModes
+    friction_needed: _containers.RepeatedScalarFieldContainer[float]
+    normal_force_n: _containers.RepeatedScalarFieldContainer[float]
+    feet: _containers.RepeatedCompositeFieldContainer[Foot]
+    in_domain: _containers.RepeatedScalarFieldContainer[bool]
+    friction_min: float
+    friction_max: float
+    bundle_version: int
+    provenance: str
+    compute_ns: int
+    def __init__(self, probability: _Optional[_Union[StabilityModes, _Mapping]] = ..., margin: _Optional[_Union[StabilityModes, _Mapping]] = ..., friction_needed: _Optional[_Iterable[float]] = ..., normal_force_n: _Optional[_Iterable[float]] = ..., feet: _Optional[_Iterable[_Union[Foot, _Mapping]]] = ..., in_domain: _Optional[_Iterable[bool]] = ..., friction_min: _Optional[float] = ..., friction_max: _Optional[float] = ..., bundle_version: _Optional[int] = ..., provenance: _Optional[str] = ..., compute_ns: _Optional[int] = ...) -> None: ...
+
+class Foot(_message.Message):
+    __slots__ = ("surface", "x_m", "y_m")
+    SURFACE_FIELD_NUMBER: _ClassVar[int]
+    X_M_FIELD_NUMBER: _ClassVar[int]
+    Y_M_FIELD_NUMBER: _ClassVar[int]
+    surface: str
+    x_m: float
+    y_m: float
+    def __init__(self, surface: _Optional[str] = ..., x_m: _Optional[float] = ..., y_m: _Optional[float] = ...) -> None: ...

@@ -59,6 +59,11 @@ class HydrodynamicsStub(object):
                 request_serializer=wade_dot_v1_dot_hydrodynamics__pb2.GetVehicleRequest.SerializeToString,
                 response_deserializer=wade_dot_v1_dot_hydrodynamics__pb2.GetVehicleResponse.FromString,
                 _registered_method=True)
+        self.GetStability = channel.unary_unary(
+                '/wade.v1.Hydrodynamics/GetStability',
+                request_serializer=wade_dot_v1_dot_hydrodynamics__pb2.GetStabilityRequest.SerializeToString,
+                response_deserializer=wade_dot_v1_dot_hydrodynamics__pb2.GetStabilityResponse.FromString,
+                _registered_method=True)
         self.GetLatency = channel.unary_unary(
                 '/wade.v1.Hydrodynamics/GetLatency',
                 request_serializer=wade_dot_v1_dot_hydrodynamics__pb2.GetLatencyRequest.SerializeToString,
@@ -104,6 +109,13 @@ class HydrodynamicsServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetStability(self, request, context):
+        """Whether a vehicle that stands in moving water floats, slides, topples or can be steered: for each pair of a depth and a speed.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def GetLatency(self, request, context):
         """Percentiles of the time from a request's arrival to its answer, per transport and vehicle.
         """
@@ -138,6 +150,11 @@ def add_HydrodynamicsServicer_to_server(servicer, server):
                     servicer.GetVehicle,
                     request_deserializer=wade_dot_v1_dot_hydrodynamics__pb2.GetVehicleRequest.FromString,
                     response_serializer=wade_dot_v1_dot_hydrodynamics__pb2.GetVehicleResponse.SerializeToString,
+            ),
+            'GetStability': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetStability,
+                    request_deserializer=wade_dot_v1_dot_hydrodynamics__pb2.GetStabilityRequest.FromString,
+                    response_serializer=wade_dot_v1_dot_hydrodynamics__pb2.GetStabilityResponse.SerializeToString,
             ),
             'GetLatency': grpc.unary_unary_rpc_method_handler(
                     servicer.GetLatency,
@@ -280,6 +297,33 @@ class Hydrodynamics(object):
             '/wade.v1.Hydrodynamics/GetVehicle',
             wade_dot_v1_dot_hydrodynamics__pb2.GetVehicleRequest.SerializeToString,
             wade_dot_v1_dot_hydrodynamics__pb2.GetVehicleResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetStability(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/wade.v1.Hydrodynamics/GetStability',
+            wade_dot_v1_dot_hydrodynamics__pb2.GetStabilityRequest.SerializeToString,
+            wade_dot_v1_dot_hydrodynamics__pb2.GetStabilityResponse.FromString,
             options,
             channel_credentials,
             insecure,
