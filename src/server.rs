@@ -95,6 +95,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         metrics: Arc::clone(&metrics),
         reloader: Arc::clone(&reloader),
         window_s: config.latency_window_s,
+        taps: Arc::default(),
     };
     let health = Arc::new(Health::new(&config.ready, Arc::clone(&metrics)));
     let accounts = Accounts::new(&config.limits(), Arc::clone(&metrics));

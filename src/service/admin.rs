@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::engine::Engine;
 use crate::metrics::Metrics;
-use wade_core::bundle::{self, BundleError, Fault, Library, LibraryError};
+use wade_core::bundle::{self, BundleError, Fault, Kept, Library, LibraryError};
 use wade_core::model::kernel::Isa;
 use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
@@ -81,6 +81,17 @@ impl Reloader {
 
     fn read(&self, library: &Library, vehicle: &str) -> Result<ServedVehicle, LibraryError> {
         Ok(library.served(vehicle, self.isa)?.with_physics(self.physics))
+    }
+
+    /// The versions of a vehicle on disk: the one in place, and the others.
+    pub fn versions(&self, vehicle: &str) -> Result<(Kept, Vec<Kept>), LibraryError> {
+        Library::open(self.named.as_deref())?.versions(vehicle)
+    }
+
+    /// One of them, to be looked at beside the one that is served.
+    pub fn version(&self, vehicle: &str, version: u32) -> Result<ServedVehicle, LibraryError> {
+        let library = Library::open(self.named.as_deref())?;
+        Ok(library.served_version(vehicle, version, self.isa)?.with_physics(self.physics))
     }
 
     /// Reads every bundle of the folder; one that is not sound stops the start, one without weights is left out.

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use tonic::{Request, Response, Status};
 
 use super::admin::Reloader;
+use super::taps::Taps;
 use crate::engine::Engine;
 use crate::metrics::{self, Metrics, Transport};
 use wade_core::served::ServedVehicle;
@@ -32,6 +33,8 @@ pub struct Shared {
     pub reloader: Arc<Reloader>,
     /// Length of the latency window [s].
     pub window_s: f64,
+    /// Streams that can be looked at.
+    pub taps: Arc<Taps>,
 }
 
 /// What the metrics need to know of an answer.

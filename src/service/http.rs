@@ -8,6 +8,8 @@ mod json;
 mod page;
 mod query;
 mod rejection;
+mod streams;
+mod versions;
 
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
@@ -128,7 +130,8 @@ fn probes() -> Router<Arc<Shared>> {
 
 fn browsed(shared: Arc<Shared>) -> Router {
     let guard = axum::middleware::from_fn_with_state(Arc::clone(&shared), guard::check);
-    let routes = page::routes().merge(query::routes()).merge(hull::routes()).layer(guard);
+    let queries = query::routes().merge(streams::routes()).merge(versions::routes());
+    let routes = page::routes().merge(queries).merge(hull::routes()).layer(guard);
     routes.fallback(|| std::future::ready(Rejection::NoSuchPath)).with_state(shared)
 }
 

@@ -3,6 +3,7 @@
 pub mod accounts;
 pub mod admin;
 pub mod answer;
+mod batch;
 pub mod call;
 pub mod grpc;
 pub mod health;
@@ -14,6 +15,7 @@ pub(crate) mod shm_owner;
 pub(crate) mod shm_probe;
 pub(crate) mod shm_remains;
 pub mod stability;
+pub mod taps;
 
 use tokio::sync::watch;
 

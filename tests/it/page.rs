@@ -8,6 +8,8 @@ use std::process::{Command, Output};
 
 use crate::common::{Served, http};
 use serde_json::json;
+use wade_client::Method;
+use wade_wire::State;
 
 /// Settings that a picture needs without a graphics card, and time for the page to ask and to draw.
 const BROWSER: [&str; 9] = [
@@ -138,14 +140,21 @@ fn the_colors_hold_the_surfaces_share_of_the_effects() {
 
 /// The picture of a page of this size as rows of red, green and blue.
 fn picture(url: &str, name: &str, width: usize, height: usize) -> Option<Vec<Vec<[u8; 3]>>> {
+    picture_with(&[], url, name, [width, height])
+}
+
+/// The same with more settings of the browser.
+fn picture_with(
+    more: &[String],
+    url: &str,
+    name: &str,
+    [width, height]: [usize; 2],
+) -> Option<Vec<Vec<[u8; 3]>>> {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../page");
     std::fs::create_dir_all(&folder).expect("a folder");
     let path = folder.join(name);
-    browse(&[
-        format!("--screenshot={}", path.display()),
-        format!("--window-size={width},{height}"),
-        url.to_owned(),
-    ])?;
+    let size = format!("--window-size={width},{height}");
+    browse(&[more, &[format!("--screenshot={}", path.display()), size, url.to_owned()]].concat())?;
     let file = std::io::BufReader::new(std::fs::File::open(&path).expect("a picture"));
     let mut reader = png::Decoder::new(file).read_info().expect("PNG");
     let mut data = vec![0; reader.output_buffer_size().expect("a size")];
@@ -187,6 +196,105 @@ fn the_picture_shows_the_hull_and_follows_the_state() {
     let Some(narrow) = picture(&url, "warthog-800.png", 800, 1300) else { return };
     let colors: BTreeSet<[u8; 3]> = middle(&narrow, [0.2, 0.8], [0.15, 0.4]).into_iter().collect();
     assert!(colors.len() > 300, "{}", colors.len());
+}
+
+#[test]
+fn the_map_of_stability_shows_what_the_server_answers() {
+    let served = Served::start();
+    let address = address(&served);
+    let url = format!("http://{address}/#vehicle=warthog&view=stability&direction=90&speed=1.2&depth=0.3");
+    // the page waits for the answer, and a browser whose time is over does not end
+    let patience = "--virtual-time-budget=60000".to_owned();
+    let Some(output) = browse(&[patience.clone(), "--dump-dom".into(), url.clone()]) else { return };
+    let page = String::from_utf8(output.stdout).expect("text");
+    assert!(page.contains("99856 states"), "{}", text_of(&page, "map-state"));
+    let place = text_of(&page, "map-place");
+    let numbers: Vec<f64> = place
+        .replace(" m/s", "")
+        .replace(" m", "")
+        .split(", ")
+        .map(|number| number.parse().expect("a number"))
+        .collect();
+    // the nearest state of the map is within half a step of what was named
+    assert!((numbers[0] - 0.3).abs() < 0.002 && (numbers[1] - 1.2).abs() < 0.02, "{place}");
+    let table = &page[page.find("id=\"map-at\"").expect("a table")..];
+    for mode in ["floats", "slides", "topples", "steers", "friction needed"] {
+        assert!(table.contains(mode), "{mode}");
+    }
+    // at rest in still air nothing is lost, deep in fast water everything
+    let Some(map) = picture_with(&[patience], &url, "stability-1280.png", [1280, 900]) else { return };
+    let colors = |x: [f64; 2], y: [f64; 2]| -> BTreeSet<[u8; 3]> { middle(&map, x, y).into_iter().collect() };
+    let is_dark = |[r, g, b]: &[u8; 3]| *r < 100 && *g < 40 && *b < 120;
+    let is_bright = |[r, g, b]: &[u8; 3]| *r > 230 && *g > 200 && *b < 80;
+    assert!(colors([0.06, 0.1], [0.55, 0.62]).iter().all(is_dark), "shallow and slow");
+    assert!(colors([0.5, 0.64], [0.1, 0.3]).iter().all(is_bright), "deep and fast");
+}
+
+#[test]
+fn a_drive_is_drawn_over_time_and_a_client_is_followed() {
+    let served = Served::start();
+    let address = address(&served);
+    let dump = |hash: &str| {
+        let url = format!("http://{address}/#{hash}");
+        let output = browse(&["--dump-dom".into(), "--window-size=1280,1400".into(), url])?;
+        Some(String::from_utf8(output.stdout).expect("text"))
+    };
+    let Some(page) = dump("vehicle=warthog&view=drive&example=1") else { return };
+    assert!(page.contains("generated example: 480 rows"), "{}", text_of(&page, "drive-note"));
+    assert!(page.contains("depth [m] over time: depth from 0 to"), "a chart says what it shows");
+    let mut client = served.tcp("husky", Method::Stream);
+    let (stop, stopped) = std::sync::mpsc::channel::<()>();
+    let asking = std::thread::spawn(move || {
+        let state = State { velocity: [0.7, 0.0, 0.0], time_step: 0.01, ..State::still(0.16) };
+        while stopped
+            .recv_timeout(std::time::Duration::from_millis(10))
+            .is_err_and(|error| error == std::sync::mpsc::RecvTimeoutError::Timeout)
+        {
+            client.evaluate(&state).expect("answered");
+        }
+    });
+    let id = loop {
+        let list = http::get(address, "/v1/streams").json();
+        if let Some(id) = list["streams"][0]["id"].as_u64() {
+            break id;
+        }
+    };
+    let page = dump(&format!("vehicle=warthog&view=drive&stream={id}"));
+    drop(stop);
+    asking.join().expect("no panic");
+    let page = page.expect("the browser is there");
+    assert!(text_of(&page, "drive-note").starts_with("live: "), "{}", text_of(&page, "drive-note"));
+    assert!(page.contains("depth from 0.16 to 0.16"), "the depth that the client states");
+    let gone = http::get(address, &format!("/v1/streams/{id}"));
+    assert!(gone.status == 404 || gone.status == 200, "{gone:?}");
+}
+
+#[test]
+fn another_version_is_compared_with_the_one_that_is_served() {
+    let vehicles = crate::common::copy_of_vehicles();
+    let bundle = vehicles.path().join("husky");
+    let effects = crate::common::every_effect("husky");
+    let version = wade_core::bundle::apply(&bundle, effects).expect("applied");
+    let served = Served::with(|config| config.vehicles = vehicles.path().into());
+    let address = address(&served);
+    let list = http::get(address, "/v1/vehicles/husky/versions").json();
+    assert_eq!(list["versions"][0]["version"], version - 1);
+    assert_eq!(list["versions"][1]["served"], true);
+    let state = json!({"vehicle": "husky", "depth_m": [0.15], "velocity_mps": [0.8, 0, 0]});
+    let of = |version: u32| {
+        http::post(address, &format!("/v1/batch?version={version}"), &state.to_string()).json()["force"][0]
+            .clone()
+    };
+    assert_ne!(of(version), of(version - 1), "effects act");
+    assert_eq!(of(version), http::post(address, "/v1/batch", &state.to_string()).json()["force"][0]);
+    let missing = http::post(address, "/v1/batch?version=77", &state.to_string());
+    assert!(missing.status == 404 && missing.body.contains("versions"), "{missing:?}");
+    let url =
+        format!("http://{address}/#vehicle=husky&speed=0.8&direction=0&depth=0.15&compare={}", version - 1);
+    let Some(output) = browse(&["--dump-dom".into(), url]) else { return };
+    let page = String::from_utf8(output.stdout).expect("text");
+    let before = of(version - 1)[0].as_f64().expect("a number");
+    assert_eq!(text_of(&page, "other-force-x"), format!("{before:.2}"));
 }
 
 /// What a browser finds wrong with the layout of a page that was written to a file, told in its title.

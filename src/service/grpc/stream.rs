@@ -10,6 +10,7 @@ use tonic::{Code, Status, Streaming};
 use super::size_limit;
 use crate::metrics::Transport;
 use crate::service::call::{Call, STATES_PER_TURN, Shared, answer_state};
+use crate::service::taps::{Seen, Tapped};
 use wade_core::served::Session;
 use wade_wire::Refusal;
 use wade_wire::proto;
@@ -25,6 +26,8 @@ pub struct Answers {
     deadline: Option<Instant>,
     answers_this_turn: usize,
     ended: bool,
+    /// Where the page may look in.
+    tapped: Tapped,
 }
 
 impl Answers {
@@ -34,6 +37,7 @@ impl Answers {
         transport: Transport,
         deadline: Option<Instant>,
     ) -> Self {
+        let tapped = shared.taps.open(transport);
         Self {
             requests,
             shared,
@@ -43,6 +47,7 @@ impl Answers {
             deadline,
             answers_this_turn: 0,
             ended: false,
+            tapped,
         }
     }
 
@@ -56,7 +61,17 @@ impl Answers {
         let answer = call.check_deadline(None).and_then(|()| vehicle());
         let session = &mut self.session;
         let answer = answer.and_then(|vehicle| answer_state(&vehicle, request.state.as_ref(), Some(session)));
-        call.end(answer).map(tonic::Response::into_inner)
+        let answer = call.end(answer)?.into_inner();
+        if let Some(state) = request.state {
+            let (vehicle, seen) = (&self.vehicle, &answer);
+            self.tapped.offer(|| Seen {
+                at: Instant::now(),
+                vehicle: vehicle.clone(),
+                state,
+                answer: seen.clone(),
+            });
+        }
+        Ok(answer)
     }
 }
 

@@ -12,10 +12,17 @@ use super::Shared;
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Path, type and text of each file.
-const FILES: [(&str, &str, &str); 9] = [
+const FILES: [(&str, &str, &str); 16] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/page/style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("/page/main.js", SCRIPT, include_str!("page/main.js")),
+    ("/page/drive.js", SCRIPT, include_str!("page/drive.js")),
+    ("/page/table.js", SCRIPT, include_str!("page/table.js")),
+    ("/page/chart.js", SCRIPT, include_str!("page/chart.js")),
+    ("/page/ticks.js", SCRIPT, include_str!("page/ticks.js")),
+    ("/page/stability.js", SCRIPT, include_str!("page/stability.js")),
+    ("/page/live.js", SCRIPT, include_str!("page/live.js")),
+    ("/page/theme.js", SCRIPT, include_str!("page/theme.js")),
     ("/page/controls.js", SCRIPT, include_str!("page/controls.js")),
     ("/page/tables.js", SCRIPT, include_str!("page/tables.js")),
     ("/page/scale.js", SCRIPT, include_str!("page/scale.js")),

@@ -47,18 +47,18 @@ async fn by_body(
     Extension(connection): Extension<Arc<Connection>>,
     body: Body,
 ) -> Result<Response, Rejection> {
-    let text = whole(&shared, body).await?;
+    let text = whole(&shared, body, MAX_BODY).await?;
     let _computing = Computing::begin(&connection);
     evaluate(&shared, &connection, &text)
 }
 
 /// A body that has arrived in time.
-async fn whole(shared: &Shared, body: Body) -> Result<Bytes, Rejection> {
+pub(super) async fn whole(shared: &Shared, body: Body, longest: usize) -> Result<Bytes, Rejection> {
     let late = |_| Refusal::DeadlineExceeded { answered: None };
-    let longest = Duration::from_secs_f64(shared.config.request_s);
-    let text = tokio::time::timeout(longest, to_bytes(body, MAX_BODY)).await.map_err(late)?;
+    let patience = Duration::from_secs_f64(shared.config.request_s);
+    let text = tokio::time::timeout(patience, to_bytes(body, longest)).await.map_err(late)?;
     // the other errors are those of a connection that is gone, whom no answer reaches
-    text.map_err(|_| Rejection::TooLong { limit: MAX_BODY })
+    text.map_err(|_| Rejection::TooLong { limit: longest })
 }
 
 /// Answers on this thread, as gRPC does on its own.
@@ -78,7 +78,11 @@ fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Resul
 }
 
 /// Reads a message of this name; what is none is counted.
-fn read<M: prost::Message + Default>(shared: &Shared, name: &str, text: &[u8]) -> Result<M, Rejection> {
+pub(super) fn read<M: prost::Message + Default>(
+    shared: &Shared,
+    name: &str,
+    text: &[u8],
+) -> Result<M, Rejection> {
     json::read(name, text).inspect_err(|_| shared.grpc.metrics.refuse(Transport::http, "invalid_argument"))
 }
 
@@ -96,7 +100,7 @@ async fn stability_by_body(
     Extension(connection): Extension<Arc<Connection>>,
     body: Body,
 ) -> Result<Response, Rejection> {
-    let text = whole(&shared, body).await?;
+    let text = whole(&shared, body, MAX_BODY).await?;
     let _computing = Computing::begin(&connection);
     stand(&shared, &connection, &text).await
 }

@@ -22,9 +22,7 @@ pub enum Rejection {
         reason: String,
     },
     /// The body is longer than a query can be.
-    #[error(
-        "the body is longer than {limit} bytes, which no query needs; batches go over gRPC or shared memory"
-    )]
+    #[error("the body is longer than {limit} bytes; longer batches go over gRPC or shared memory")]
     TooLong {
         /// The limit [bytes].
         limit: usize,
@@ -39,6 +37,20 @@ pub enum Rejection {
         /// The limit.
         limit: usize,
     },
+    /// No stream of this number is open.
+    #[error("stream {id} is not open; /v1/streams lists those that are")]
+    NoSuchStream {
+        /// Its number.
+        id: u64,
+    },
+    /// The version cannot be read.
+    #[error("version {version}: {reason}; /v1/vehicles/NAME/versions lists those that there are")]
+    NoSuchVersion {
+        /// Its number.
+        version: u32,
+        /// Why not.
+        reason: String,
+    },
     /// Called by a name that is not known to be this machine's.
     #[error(
         "this server is not known as \"{host}\": call it by its address or as localhost, or add the name to http.hosts"
@@ -52,7 +64,7 @@ pub enum Rejection {
     ForeignSite,
     /// Nothing there.
     #[error(
-        "there is /, /v1/query, /v1/stability, /v1/vehicles, /v1/vehicles/NAME, /v1/vehicles/NAME/hull, /v1/latency, /metrics, /livez and /readyz"
+        "there is /, /v1/query, /v1/batch, /v1/stability, /v1/vehicles, /v1/vehicles/NAME, /v1/vehicles/NAME/hull, /v1/vehicles/NAME/versions, /v1/streams, /v1/streams/ID, /v1/latency, /metrics, /livez and /readyz"
     )]
     NoSuchPath,
 }
@@ -69,7 +81,7 @@ impl Rejection {
             Self::TooLong { .. } => Code::ResourceExhausted,
             Self::HullTooLarge { .. } => Code::FailedPrecondition,
             Self::ForeignHost { .. } | Self::ForeignSite => Code::PermissionDenied,
-            Self::NoSuchPath => Code::NotFound,
+            Self::NoSuchStream { .. } | Self::NoSuchVersion { .. } | Self::NoSuchPath => Code::NotFound,
         }
     }
 

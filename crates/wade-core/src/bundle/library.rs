@@ -215,6 +215,17 @@ impl Library {
         Ok(ServedVehicle::new(model, effects).with_origin(source.origin()))
     }
 
+    /// The same of one of its [versions](Library::versions).
+    pub fn served_version(&self, name: &str, version: u32, isa: Isa) -> Result<ServedVehicle, LibraryError> {
+        let (current, others) = self.versions(name)?;
+        let place = current.source.path();
+        let found = std::iter::once(current).chain(others).find(|kept| kept.version == version);
+        let none = || BundleError { path: place, fault: Fault::NotKept { asked: Some(version) } };
+        let source = found.ok_or_else(none)?.source;
+        let (model, effects) = source.parts(isa)?;
+        Ok(ServedVehicle::new(model, effects).with_origin(source.origin()))
+    }
+
     /// The hash of a bundle's own list of hashes.
     pub fn digest(&self, name: &str) -> Result<String, LibraryError> {
         Ok(sha256(&self.source(name)?.file(SUMS_FILE)?))

@@ -166,7 +166,7 @@ impl Stance {
         let held = -(push.yaw + y * push.along.x);
         let side_front = (held + rear * push.along.y) / base;
         let side = [side_front, -push.along.y - side_front];
-        let need = |axle: usize| (share[axle] * push.along.x).hypot(side[axle]);
+        let need = |axle: usize| Vector2::new(share[axle] * push.along.x, side[axle]).norm();
         Some([(push.shift.x / base, share[0], need(0)), (-push.shift.x / base, share[1], need(1))])
     }
 

@@ -4,7 +4,10 @@ const RAD = Math.PI / 180;
 
 /** The provenance of a vehicle without trained weights. */
 export const PHYSICS = "physics";
-const FIRST = { vehicle: "", speed: 0, direction: 0, depth: 0, roll: 0, pitch: 0, density: 1000, dry: 0, color: "force" };
+const FIRST = {
+  vehicle: "", speed: 0, direction: 0, depth: 0, roll: 0, pitch: 0, density: 1000, dry: 0, color: "force", view: "state", compare: 0,
+  friction_min: 0.32, friction_max: 0.9, example: 0, stream: 0,
+};
 
 /** What can be set by a slider, for a vehicle as the server describes it. Bands are where the weights were trained. */
 export function sliders(vehicle) {
@@ -63,13 +66,41 @@ export function request(state) {
   };
 }
 
+/** The same as a batch of one, wade.v1.EvaluateBatchRequest. */
+export function batchOf({ vehicle, state }) {
+  const vector = (v) => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
+  const { roll_rad: roll, pitch_rad: pitch } = state.roll_pitch;
+  return {
+    vehicle,
+    velocity_mps: vector(state.velocity_mps),
+    current_mps: vector(state.current_mps),
+    angular_velocity_radps: vector(state.angular_velocity_radps),
+    acceleration_mps2: vector(state.acceleration_mps2),
+    angular_acceleration_radps2: vector(state.angular_acceleration_radps2),
+    gravity_direction: [Math.sin(pitch), -Math.cos(pitch) * Math.sin(roll), -Math.cos(pitch) * Math.cos(roll)],
+    depth_m: state.depth_m === undefined ? [] : [state.depth_m],
+    water_level_m: state.water_level_m === undefined ? [] : [state.water_level_m],
+    density_kgpm3: [state.density_kgpm3],
+    ground_contact: state.ground_contact ?? "GROUND_CONTACT_WETTED",
+  };
+}
+
+/** The state of the sliders that comes nearest to a velocity through the water, a depth and an attitude [rad]. */
+export function settingOf({ velocity: [x, y], depth, roll, pitch, density, dry }) {
+  const round = (value, decimals) => +value.toFixed(decimals);
+  return {
+    speed: round(Math.hypot(x, y), 3), direction: round(Math.atan2(y, x) / RAD, 1), depth: round(depth, 4), roll: round(roll / RAD, 2),
+    pitch: round(pitch / RAD, 2), density: round(density, 1), dry: Number(dry),
+  };
+}
+
 export const attitude = (state) => [state.roll * RAD, state.pitch * RAD];
 
 /** Builds the sliders; `changed` is told the key and the value. Returns what shows a state in them. */
 export function buildControls(parent, specs, changed) {
   const rows = specs.map((spec) => row(spec, changed));
   parent.replaceChildren(...rows.map((entry) => entry.element));
-  return (state) => rows.forEach((entry) => entry.show(state[entry.key]));
+  return (state, disabled) => rows.forEach((entry) => entry.show(state[entry.key], disabled));
 }
 
 function row({ key, label, unit, min, max, step, bands }, changed) {
@@ -84,8 +115,10 @@ function row({ key, label, unit, min, max, step, bands }, changed) {
   const element = Object.assign(document.createElement("div"), { className: "control" });
   const text = (content) => Object.assign(document.createElement("span"), { textContent: content });
   element.append(text(label), track, number, text(unit));
-  const show = (value) => {
+  const show = (value, disabled) => {
+    slider.disabled = number.disabled = disabled;
     slider.value = value;
+    slider.setAttribute("aria-valuetext", `${value} ${unit}`);
     // what somebody is typing is theirs
     if (document.activeElement !== number) number.value = value;
   };

@@ -1,23 +1,29 @@
 // The page: asks the server whenever the state changes, never twice at a time, and shows what it says.
 
-import { attitude, buildControls, firstState, fromAddress, request, sliders, toAddress } from "./controls.js";
+import { attitude, batchOf, buildControls, firstState, fromAddress, request, settingOf, sliders, toAddress } from "./controls.js";
+import { Drive } from "./drive.js";
+import { Live, streams } from "./live.js";
 import { add, scale, transform, worldFromBody } from "./matrix.js";
 import { DRY, QUANTITIES, colorOf, colorOfIndex, gradient, roundUp, short, ticks, topOf } from "./scale.js";
-import { Scene } from "./scene.js";
+import { CAMERAS, Scene } from "./scene.js";
 import { surfaceAt } from "./shapes.js";
-import { markSurface, showCurl, showFlags, showLatency, showRemarks, showSurfaces, showWrench } from "./tables.js";
+import { StabilityMap } from "./stability.js";
+import { example } from "./table.js";
+import { markSurface, showCurl, showFlags, showLatency, showOther, showRemarks, showSurfaces, showWrench, speak } from "./tables.js";
+import { rgb, watchTheme } from "./theme.js";
 
-const NET = [0.12, 0.12, 0.14];
 const FORCE = [0.85, 0.3, 0.05];
 const VELOCITY = [0.16, 0.55, 0.5];
 const AXIS = [0.42, 0.42, 0.44];
+/** The vehicle's own sliders as the source of the state. */
+const SLIDERS = "sliders";
 const LATENCY_EVERY_MS = 2000;
 const RETRY_AFTER_MS = 1000;
 
 const element = (id) => document.getElementById(id);
 const canvas = element("canvas");
 
-let [scene, vehicle, hull, state, answer, surfaces] = [];
+let [scene, vehicle, hull, state, answer, surfaces, other, began] = [];
 let showControls = () => {};
 let [asking, stale, pointed] = [false, false, undefined];
 
@@ -28,6 +34,16 @@ async function get(path, options) {
   if (!response.ok) throw Object.assign(new Error(body.error.message), { refused: true, code: response.status });
   return body;
 }
+
+const post = (path, body) =>
+  get(path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+
+const drive = new Drive(post, () => showRow());
+const live = new Live(get, (look) => showLive(look), (reason) => {
+  trouble(reason);
+  follow(SLIDERS);
+});
+const map = new StabilityMap(post, (speed, depth) => set({ speed: +speed.toFixed(3), depth: +depth.toFixed(4), view: "state" }));
 
 function trouble(text) {
   element("trouble").hidden = !text;
@@ -41,11 +57,13 @@ async function ask() {
   }
   asking = true;
   stale = false;
-  const body = request(state);
+  const row = state.view === "drive" ? drive.row() : undefined;
+  const body = row ? { vehicle: state.vehicle, state: row } : request(state);
   try {
-    const fresh = await get("/v1/query", { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
-    if (body.vehicle !== state.vehicle) return;
+    const fresh = await post("/v1/query", body);
+    if (body.vehicle !== state.vehicle || live.id) return;
     if (fresh.bundle_version !== vehicle.summary.bundle_version) await loadVehicle(state.vehicle);
+    other = state.compare ? await post(`/v1/batch?version=${state.compare}`, batchOf(body)) : undefined;
     answer = fresh;
     trouble();
     show(body);
@@ -88,6 +106,8 @@ function show(body) {
     return Object.assign(document.createElement("span"), { textContent: tick + unit });
   }));
   showWrench(answer, vehicle);
+  showOther(other, answer);
+  speak(answer);
   showFlags(answer);
   showRemarks(answer);
   showSurfaces(surfaces, answer, point);
@@ -104,7 +124,7 @@ function newtonsPerMeter() {
 
 function arrows(world) {
   const perMeter = newtonsPerMeter();
-  element("arrows").textContent = `arrows: 0.1 m is ${short(0.1 * perMeter)} N; black: net force; gray hull: dry` +
+  element("arrows").textContent = `arrows: 0.1 m is ${short(0.1 * perMeter)} N; large: net force; gray hull: dry` +
     (answer.effects.length ? "; colors and arrows with the surfaces' share of the effects" : "");
   const place = (point) => transform(world, point).slice(0, 3);
   const turn = (vector) => transform(world, vector).map((x, k) => x - world[12 + k]).slice(0, 3);
@@ -112,7 +132,7 @@ function arrows(world) {
   const { x, y, z } = answer.wrench.force_n;
   const { x: cx, y: cy, z: cz } = answer.wrench.about_m;
   const forces = surfaces.map((surface) => arrow(surface.point, surface.force, FORCE, 0.75));
-  forces.push(arrow([cx, cy, cz], [x, y, z], NET, 1.2));
+  forces.push({ ...arrow([cx, cy, cz], [x, y, z], rgb("text"), 1.2), net: true });
   const [speed, heading] = [state.speed, (state.direction * Math.PI) / 180];
   const ahead = [Math.cos(heading), Math.sin(heading), 0];
   if (speed > 0) {
@@ -136,13 +156,14 @@ function axes() {
 function look() {
   const world = worldFromBody(...attitude(state));
   const upwards = world[10];
-  return { world, water: (vehicle.z0_m + state.depth) * upwards, ground: vehicle.z0_m, arrows: arrows(world), colors: surfaces.map((surface, index) => lit(surface.color, index)) };
+  return { world, water: (vehicle.z0_m + state.depth) * upwards, ground: vehicle.z0_m, arrows: arrows(world), colors: surfaces.map((surface, index) => lit(surface.color, index)),
+    background: rgb("soft"), dry: DRY, everywhere: Boolean(QUANTITIES[state.color]?.apart) };
 }
 
 const lit = (color, index) => (index === pointed ? color.map((x) => 0.45 * x + 0.55) : color);
 
 function draw() {
-  if (!scene || !answer) return;
+  if (!scene || !answer || !state || canvas.clientWidth === 0) return;
   const shown = look();
   scene.draw(shown);
   showLabels(shown);
@@ -152,8 +173,8 @@ function draw() {
 function showLabels({ world, arrows }) {
   const place = (point) => transform(world, point).slice(0, 3);
   const labels = axes().map(({ from, vector, text }) => [place(add(from, scale(vector, 1.25))), text]);
-  const tip = (color) => arrows.find((arrow) => arrow.color === color);
-  const [net, velocity] = [tip(NET), tip(VELOCITY)];
+  const net = arrows.find((arrow) => arrow.net);
+  const velocity = arrows.find((arrow) => arrow.color === VELOCITY);
   if (net) labels.push([add(net.from, scale(net.vector, 1.06)), "net force"]);
   if (velocity) labels.push([add(velocity.from, scale(velocity.vector, 1.15)), `velocity ${short(state.speed)} m/s`]);
   const spans = labels.map(([point, text]) => {
@@ -196,8 +217,25 @@ function watchMouse() {
     scene.zoom(event.deltaY);
     draw();
   }, { passive: false });
-  canvas.addEventListener("dblclick", () => {
-    scene.reset();
+  const look = (camera) => {
+    scene.look(camera);
+    draw();
+  };
+  canvas.addEventListener("dblclick", () => look("corner"));
+  element("cameras").replaceChildren(...Object.keys(CAMERAS).map((camera, at) => {
+    const button = Object.assign(document.createElement("button"), { textContent: camera, title: `${camera} (${at + 1})` });
+    button.addEventListener("click", () => look(camera));
+    return button;
+  }));
+  const turns = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, 12], ArrowDown: [0, -12] };
+  const zooms = { "+": -120, "=": -120, "-": 120 };
+  canvas.addEventListener("keydown", (event) => {
+    const camera = event.key === "Home" ? "corner" : Object.keys(CAMERAS)[+event.key - 1];
+    if (turns[event.key]) scene.turn(...turns[event.key]);
+    else if (zooms[event.key]) scene.zoom(zooms[event.key]);
+    else if (camera) scene.look(camera);
+    else return;
+    event.preventDefault();
     draw();
   });
   canvas.addEventListener("webglcontextlost", () => trouble("The browser took the picture's memory back: load the page again."));
@@ -212,23 +250,125 @@ function under(x, y) {
 }
 
 function set(change) {
+  const views = change.view !== undefined && change.view !== state.view;
   state = { ...state, ...change };
   history.replaceState(null, "", toAddress(state));
   showState();
-  ask();
+  if (views) showView();
+  if (state.view === "stability") showMap();
+  else if (!live.id) ask();
 }
 
 function showState() {
-  showControls(state);
+  showControls(state, Boolean(live.id));
   element("vehicle").value = state.vehicle;
   element("color").value = state.color;
   element("dry").checked = Boolean(state.dry);
+  element("dry").disabled = Boolean(live.id);
+  for (const id of ["compare", "drive-compare"]) element(id).value = String(state.compare);
+  element("map-direction").value = state.direction;
+  element("friction-min").value = state.friction_min;
+  element("friction-max").value = state.friction_max;
+}
+
+/** Shows the parts of the page that belong to the view. */
+function showView() {
+  for (const part of document.querySelectorAll("[data-for]")) part.hidden = !part.dataset.for.split(" ").includes(state.view);
+  for (const tab of document.querySelectorAll("[data-view]")) {
+    tab.setAttribute("aria-selected", String(tab.dataset.view === state.view));
+    tab.tabIndex = tab.dataset.view === state.view ? 0 : -1;
+  }
+  drive.draw();
+  draw();
+}
+
+function showMap() {
+  const [speed] = sliders(vehicle);
+  const { direction, density, dry, friction_min: min, friction_max: max } = state;
+  map.show({
+    vehicle: state.vehicle, direction, density, dry, friction: [min, Math.max(min, max)], speed: speed.max,
+    depth: +(0.75 * vehicle.height_m).toFixed(2), place: [state.speed, state.depth],
+  });
+}
+
+/** The row of a drive that the cursor is at. */
+function showRow() {
+  const row = drive.row();
+  if (!row) return;
+  const { velocity_mps: v, current_mps: c, roll_pitch: { roll_rad: roll, pitch_rad: pitch } } = row;
+  const depth = row.depth_m ?? row.water_level_m - vehicle.z0_m;
+  set(settingOf({ velocity: [v.x - c.x, v.y - c.y], depth, roll, pitch, density: row.density_kgpm3, dry: false }));
+}
+
+/** What a client asked and was answered. */
+async function showLive(look) {
+  if (look.vehicle !== state.vehicle || look.answer.bundle_version !== vehicle.summary.bundle_version) {
+    state = { ...state, vehicle: look.vehicle };
+    await loadVehicle(look.vehicle);
+  }
+  other = undefined;
+  answer = look.answer;
+  state = { ...state, ...settingOf(look.state) };
+  showState();
+  element("live").textContent = `stream ${look.id}, answered ${Math.round(1000 * look.age_s)} ms ago`;
+  began ??= performance.now();
+  if (look.age_s < 0.5) drive.record((performance.now() - began) * 1e-3 - look.age_s, look);
+  show(request(state));
+}
+
+/** Takes the state from a stream, or from the sliders. */
+function follow(source) {
+  began = undefined;
+  drive.clear();
+  live.follow(source === SLIDERS ? undefined : source);
+  state = { ...state, stream: live.id ? +live.id : 0 };
+  history.replaceState(null, "", toAddress(state));
+  element("live").hidden = !live.id;
+  for (const id of ["source", "drive-source"]) element(id).value = source;
+  showState();
+  if (!live.id && vehicle) ask();
+}
+
+/** Lists the streams that are open in both choices of a source. */
+async function listStreams() {
+  const open = await streams(get);
+  for (const id of ["source", "drive-source"]) {
+    fill(element(id), [[SLIDERS, "this page"], ...open]);
+    element(id).value = live.id ?? SLIDERS;
+  }
+}
+
+/** Evaluates a table, whose `name` stands before what is wrong with it. */
+async function loadDrive(name, text) {
+  follow(SLIDERS);
+  try {
+    await drive.load(text, name, state.vehicle, state.compare);
+    trouble();
+  } catch (error) {
+    drive.note(`${name}: ${error.message}`);
+  }
+}
+
+async function loadFile(file) {
+  if (file) await loadDrive(file.name, await file.text());
+}
+
+async function loadExample() {
+  set({ example: 1, stream: 0 });
+  await loadDrive("generated example", example(vehicle));
 }
 
 /** What the server says of a vehicle, and its hull. */
 async function loadVehicle(name) {
   vehicle = await get(`/v1/vehicles/${encodeURIComponent(name)}`);
   showControls = buildControls(element("controls"), sliders(vehicle), (key, value) => set({ [key]: value }));
+  const { versions } = await get(`/v1/vehicles/${encodeURIComponent(name)}/versions`);
+  const others = versions.filter(({ served }) => !served).reverse();
+  for (const id of ["compare", "drive-compare"]) {
+    fill(element(id), [["0", others.length > 0 ? "nothing" : "no other version"], ...others.map(({ version, effects }) => [
+      String(version), `version ${version}${effects.length > 0 ? ` with ${effects.join(", ")}` : ""}`])]);
+  }
+  if (!others.some(({ version }) => version === state?.compare)) state = { ...state, compare: 0 };
   hull = undefined;
   if (scene) {
     try {
@@ -241,17 +381,38 @@ async function loadVehicle(name) {
 
 async function choose(name, change) {
   answer = undefined;
+  drive.clear();
+  state = { ...state, ...change };
   await loadVehicle(name);
-  set({ ...firstState(vehicle), color: state?.color ?? "force", ...change });
+  const { color = "force", view = "state", compare = 0 } = state;
+  set({ ...firstState(vehicle), color, ...change, view, compare });
 }
 
 async function pollLatency() {
   try {
-    if (!document.hidden) showLatency(await get("/v1/latency"));
+    if (!document.hidden) {
+      showLatency(await get("/v1/latency"));
+      if (!document.activeElement?.id.endsWith("source")) await listStreams();
+    }
   } catch {
     // the next query says that the server is gone
   }
   setTimeout(pollLatency, LATENCY_EVERY_MS);
+}
+
+/** Tabs by click, and by arrow keys from one to the next. */
+function watchTabs() {
+  const tabs = [...document.querySelectorAll("[data-view]")];
+  tabs.forEach((tab, at) => {
+    tab.addEventListener("click", () => set({ view: tab.dataset.view }));
+    tab.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      const next = tabs[(at + step + tabs.length) % tabs.length];
+      next.focus();
+      next.click();
+    });
+  });
 }
 
 function fill(select, entries) {
@@ -259,6 +420,11 @@ function fill(select, entries) {
 }
 
 async function start() {
+  watchTheme(element("theme"), () => {
+    draw();
+    drive.draw();
+    map.draw();
+  });
   try {
     scene = new Scene(canvas);
     watchMouse();
@@ -270,10 +436,30 @@ async function start() {
   fill(element("vehicle"), vehicles.map(({ name }) => [name, name]));
   element("vehicle").addEventListener("change", (event) => choose(event.target.value).catch((error) => trouble(error.message)));
   element("color").addEventListener("change", (event) => set({ color: event.target.value }));
+  for (const id of ["compare", "drive-compare"]) element(id).addEventListener("change", (event) => {
+    set({ compare: +event.target.value });
+    if (state.example) loadExample();
+    else loadFile(element("drive-file").files[0]);
+  });
+  for (const id of ["source", "drive-source"]) element(id).addEventListener("change", (event) => follow(event.target.value));
+  element("drive-file").addEventListener("change", (event) => {
+    set({ example: 0 });
+    loadFile(event.target.files[0]);
+  });
+  element("drive-example").addEventListener("click", loadExample);
+  element("map-direction").addEventListener("change", (event) => set({ direction: +event.target.value }));
+  element("friction-min").addEventListener("change", (event) => set({ friction_min: +event.target.value }));
+  element("friction-max").addEventListener("change", (event) => set({ friction_max: +event.target.value }));
+  watchTabs();
   element("dry").addEventListener("change", (event) => set({ dry: Number(event.target.checked) }));
   const named = fromAddress(location.hash);
   const known = vehicles.some(({ name }) => name === named.vehicle);
-  await choose(known ? named.vehicle : vehicles[0].name, { ...named, vehicle: known ? named.vehicle : vehicles[0].name });
+  const name = known ? named.vehicle : vehicles[0].name;
+  await choose(name, { ...named, vehicle: name });
+  showView();
+  await listStreams();
+  if (state.stream) follow(String(state.stream));
+  else if (state.example) await loadExample();
   pollLatency();
 }
 

@@ -3,8 +3,8 @@
 /** What no water touches. */
 export const DRY = [0.7, 0.72, 0.75];
 
-// nine points of viridis (Smith and van der Walt, CC0) from light to dark, and a diverging scale for what has a sign
-const SEQUENTIAL = ["#fde725", "#addc30", "#5ec962", "#28ae80", "#21918c", "#2c728e", "#3b528b", "#472d7b", "#440154"];
+// nine points of viridis (Smith and van der Walt, CC0), bright where there is much, and a diverging scale for what has a sign
+const SEQUENTIAL = ["#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725"];
 const DIVERGING = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b"];
 
 const size = (v) => Math.hypot(...v);
@@ -23,6 +23,9 @@ export const QUANTITIES = {
 const stops = (quantity) => (quantity.signed ? DIVERGING : SEQUENTIAL);
 
 export const gradient = (quantity) => `linear-gradient(to right, ${stops(quantity).join(",")})`;
+
+/** A probability. */
+export const PROBABILITY = { label: "probability", unit: "", top: 1 };
 
 /** The smallest of these steps times a power of ten that is not below the value. */
 export function roundUp(value) {

@@ -7,6 +7,14 @@ const MAX_SURFACES = 64;
 const FIELD_OF_VIEW = 0.5;
 const FIRST_VIEW = { azimuth: 0.75, elevation: 0.42, distance: 3.1 };
 
+/** Where the vehicle is seen from. */
+export const CAMERAS = {
+  corner: FIRST_VIEW,
+  front: { azimuth: 0, elevation: 0.08, distance: 3.1 },
+  left: { azimuth: Math.PI / 2, elevation: 0.08, distance: 3.1 },
+  above: { azimuth: -Math.PI / 2, elevation: 1.5, distance: 3.1 },
+};
+
 const HULL = [`#version 300 es
 in vec3 position; in vec3 normal; in float surface;
 uniform mat4 world, view; uniform vec3 colors[${MAX_SURFACES}];
@@ -18,12 +26,13 @@ void main() {
 }`, `#version 300 es
 precision highp float;
 in vec3 color, n; in float height;
-uniform float water; uniform vec3 light;
+uniform float water, everywhere; uniform vec3 light, dry;
 out vec4 fragment;
 void main() {
   float shade = 0.74 + 0.26 * dot(normalize(n), light);
   float line = 1.0 - smoothstep(0.8, 1.8, abs(height - water) / max(fwidth(height), 1e-6));
-  fragment = vec4(mix(color * shade, vec3(0.04, 0.16, 0.36), line), 1.0);
+  vec3 shown = height <= water ? color : mix(dry, color, everywhere);
+  fragment = vec4(mix(shown * shade, vec3(0.04, 0.16, 0.36), line), 1.0);
 }`];
 
 const PLAIN = [`#version 300 es
@@ -121,8 +130,8 @@ export class Scene {
     this.camera.distance = Math.min(Math.max(this.camera.distance * Math.exp(0.001 * amount), 1.2), 9);
   }
 
-  reset() {
-    this.camera = { ...FIRST_VIEW };
+  look(camera) {
+    this.camera = { ...CAMERAS[camera] };
   }
 
   /** Where a point of the world is in the picture [CSS pixels], or undefined behind the eye. */
@@ -145,7 +154,8 @@ export class Scene {
 
   /**
    * Draws. `look` has the attitude (`world`), the height of the water in the world, z of the ground in the body, a color
-   * for each surface, and arrows: `from`, `vector` in the world [m], `color`.
+   * for each surface, whether these hold above the water too (`everywhere`), the colors of `background` and of what is `dry`, and
+   * arrows: `from`, `vector` in the world [m], `color`.
    */
   draw(look) {
     const gl = this.gl;
@@ -153,7 +163,7 @@ export class Scene {
     const [width, height] = [this.canvas.clientWidth * ratio, this.canvas.clientHeight * ratio].map(Math.round);
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
     gl.viewport(0, 0, width, height);
-    gl.clearColor(0.965, 0.973, 0.98, 1);
+    gl.clearColor(...look.background, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.enable(gl.BLEND);
@@ -192,10 +202,12 @@ export class Scene {
     this.plainly(this.shapes.grid, this.gl.LINES, at, [0.45, 0.43, 0.4, 0.45], { fade: this.half });
   }
 
-  drawHull({ world, water, colors }) {
+  drawHull({ world, water, colors, dry, everywhere }) {
     const gl = this.gl;
     const uniform = this.begin(this.hull, world);
     gl.uniform1f(uniform("water"), water);
+    gl.uniform1f(uniform("everywhere"), Number(everywhere));
+    gl.uniform3fv(uniform("dry"), dry);
     const all = new Float32Array(3 * MAX_SURFACES);
     all.set(colors.flat().slice(0, 3 * MAX_SURFACES));
     gl.uniform3fv(uniform("colors"), all);

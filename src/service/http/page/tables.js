@@ -51,6 +51,36 @@ export function showWrench(answer, vehicle) {
     `${Math.round((100 * force.z) / weight)} % of the weight (${weight.toFixed(0)} N). Computed in ${(answer.compute_ns * 1e-3).toFixed(0)} µs.`;
 }
 
+/** The net wrench of another version below that of the answer, with the difference; hidden where there is none. */
+export function showOther(other, answer) {
+  document.querySelectorAll(".compared").forEach((line) => { line.hidden = !other; });
+  if (!other) return;
+  for (const [name, unit] of [["force", "N"], ["moment", "N m"]]) {
+    element(`other-${name}`).textContent = `version ${other.version}, ${name} [${unit}]`;
+    element(`other-difference-${name}`).textContent = "minus the one served";
+    ["x", "y", "z"].forEach((axis, k) => {
+      const [theirs, ours] = [other[name][0][k], answer.wrench[name][k]];
+      element(`other-${name}-${axis}`).textContent = fixed(theirs);
+      element(`other-difference-${name}-${axis}`).textContent = fixed(theirs - ours);
+    });
+  }
+}
+
+/** The net force for a screen reader, when it has not changed for a while. */
+let spoken;
+export function speak(answer) {
+  clearTimeout(spoken);
+  const [x, y, z] = answer.wrench.force.map(short);
+  const text = `Net force ${x}, ${y}, ${z} newtons; ${domainOf(answer)}.`;
+  spoken = setTimeout(() => { element("summary").textContent = text; }, 800);
+}
+
+/** Where the state is to the training data. */
+function domainOf(answer) {
+  if (!answer.in_domain) return "outside the training domain";
+  return answer.provenance === PHYSICS ? "physical base alone, without training data" : "inside the training domain";
+}
+
 export function showFlags(answer) {
   element("bundle").textContent = `bundle version ${answer.bundle_version}, weights: ${answer.provenance}`;
   const excess = ({ quantity, excess }) => {
@@ -59,8 +89,8 @@ export function showFlags(answer) {
   };
   const flag = (text, className) => cell("span", text, `flag ${className}`);
   const outside = answer.outside.map(excess).join(", ");
-  const inside = answer.provenance === PHYSICS ? "physical base alone, without training data" : "inside the training domain";
-  const flags = [answer.in_domain ? flag(inside, answer.provenance === PHYSICS ? "" : "pass") : flag(`outside the training domain: ${outside}`, "notice")];
+  const kind = answer.provenance === PHYSICS ? "" : "pass";
+  const flags = [answer.in_domain ? flag(domainOf(answer), kind) : flag(`${domainOf(answer)}: ${outside}`, "notice")];
   if (answer.effects.length > 0) flags.push(flag(`${answer.effects.length} effects added`, ""));
   const far = answer.effects_outside.map(excess).join(", ");
   if (far) flags.push(flag(`outside what the effects were seen in: ${far}`, "notice"));
