@@ -393,23 +393,32 @@ fn the_page_and_every_report_fit_a_telephone_and_a_window() {
     wade(&["campaign", "report", "campaigns/husky", "--html", &campaign]);
     let read = |path: &str| std::fs::read_to_string(path).expect(path);
     let served = Served::start();
-    let url = format!("http://{}/#vehicle=husky&speed=0.8&direction=0&depth=0.18", address(&served));
-    let Some(output) = browse(&["--dump-dom".into(), "--window-size=500,900".into(), url]) else { return };
     let style = read(&root.join("src/service/http/page/style.css").display().to_string());
-    // what the page has become, with its look and without its program
-    let page = String::from_utf8(output.stdout).expect("text");
-    let page = page
-        .replace("<link rel=\"stylesheet\" href=\"/page/style.css\">", &format!("<style>{style}</style>"));
-    let page = page.replace("<script type=\"module\" src=\"/page/main.js\"></script>", "");
-    assert!(page.contains("<style>") && page.contains("wheel_fl"), "{page}");
-    for (name, text) in [
-        ("page", page),
+    let style = format!("<style>{style}</style>");
+    let mut pages = Vec::new();
+    for (name, hash) in [
+        ("page", "speed=0.8&direction=0&depth=0.18"),
+        ("page, drive", "view=drive&example=1"),
+        ("page, stability", "view=stability"),
+    ] {
+        let url = format!("http://{}/#vehicle=husky&{hash}", address(&served));
+        let (size, patience) = ("--window-size=500,900".into(), "--virtual-time-budget=60000".into());
+        let Some(output) = browse(&["--dump-dom".into(), size, patience, url]) else { return };
+        // what the page has become, with its look and without its program
+        let page = String::from_utf8(output.stdout).expect("text");
+        let page = page.replace("<link rel=\"stylesheet\" href=\"/page/style.css\">", &style);
+        let page = page.replace("<script type=\"module\" src=\"/page/main.js\"></script>", "");
+        assert!(page.contains("<style>") && page.contains("<option value=\"husky\""), "{page}");
+        pages.push((name, page));
+    }
+    let reports = [
         ("soak", read(&format!("{soak}/100hz/soak.html"))),
         ("steps", read(&format!("{soak}/steps.html"))),
         ("gap", read(&format!("{gap}/index.html"))),
         ("dataset", read(&data)),
         ("campaign", read(&campaign)),
-    ] {
+    ];
+    for (name, text) in pages.into_iter().chain(reports) {
         assert!(!text.contains(">-0.0<") && !text.contains(">-0<"), "{name}: a tick of -0");
         for width in WIDTHS {
             let Some(beyond) = beyond(&text, name, width) else { return };

@@ -65,7 +65,8 @@ export class Drive {
     if (outside > 0) notes.push(`${outside} outside the training domain`);
     if (table.ignored.length > 0) notes.push(`not used: ${table.ignored.join(", ")}`);
     this.note(notes.join("; "));
-    this.go(0);
+    // where the water is deepest
+    this.go(this.data.depth.reduce((best, depth, row, all) => (depth > all[best] ? row : best), 0));
   }
 
   /** Adds what a live source said; the first sample begins a record. */

@@ -54,12 +54,11 @@ export class StabilityMap {
         friction_min: friction[0], friction_max: friction[1],
         ground_contact: dry ? "GROUND_CONTACT_DRY" : "GROUND_CONTACT_WETTED",
       };
-      const start = performance.now();
       try {
         const answer = await this.post("/v1/stability", request);
         if (run !== this.run) return;
         this.answer = { ...answer, risk: risk(answer) };
-        state.textContent = `${size * size} states in ${((performance.now() - start) * 1e-3).toFixed(1)} s, version ${answer.version}; friction ${short(answer.friction.min)} to ${short(answer.friction.max)}`;
+        state.textContent = `${size * size} states in ${(answer.compute_ns * 1e-9).toFixed(1)} s, version ${answer.version}; friction ${short(answer.friction.min)} to ${short(answer.friction.max)}`;
       } catch (error) {
         if (run === this.run) state.textContent = error.message;
         return;
