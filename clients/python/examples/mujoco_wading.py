@@ -13,16 +13,23 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-import mujoco
 import numpy as np
 
 import wade
+
+if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    # MuJoCo chooses how to draw when it is imported, and without a display would choose one
+    os.environ.setdefault("MUJOCO_GL", "egl")
+
+import mujoco
 
 VEHICLE = "warthog"
 #: The vehicle file's contact plane, below the body's origin [m].
@@ -274,7 +281,7 @@ def heave(client: wade.Client, depth_m: float, *, explicit: bool = False, timest
 
 
 class Pictures:
-    """Looks at a drive now and then, from the side. Needs a display or MUJOCO_GL=egl or osmesa."""
+    """Looks at a drive now and then, from the side. Without a display it draws by EGL, or by what MUJOCO_GL names."""
 
     def __init__(self, times_s: tuple[float, ...]):
         self._times_s, self.taken = list(times_s), list[Any]()

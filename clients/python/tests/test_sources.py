@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import os
 import re
 import subprocess
@@ -38,7 +39,7 @@ def test_a_state_has_the_fields_of_the_message_for_batches() -> None:
     assert arrays == {*SCALARS, *VECTORS, *TOLD}
     single = {field.name for field in hydrodynamics_pb2.State.DESCRIPTOR.fields}
     # an attitude is the direction of gravity here, and a session has a number over shared memory alone
-    fields = {*wade.State.__dataclass_fields__}
+    fields = {field.name for field in dataclasses.fields(wade.State)}
     assert fields == single - {"world_from_body", "roll_pitch"} | {"session"}
 
 

@@ -9,7 +9,7 @@ fields are named as on the wire, with their unit. Errors are `WadeError`s.
 from typing import TYPE_CHECKING, Any
 
 from .address import connect
-from .attitude import gravity_from_quaternion, gravity_from_roll_pitch
+from .attitude import gravity_from_quaternion, gravity_from_roll_pitch, heading_from_quaternion
 from .channel import Tls
 from .client import Client, Stream
 from .errors import (
@@ -30,6 +30,8 @@ from .rpc import GrpcClient
 from .stability import Foot, Ford, Stability, StabilityModes
 from .state import GroundContact, Physics, State
 from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
+from .version import VERSION as __version__
+from .world import state_in_world, wrench_in_world
 
 if TYPE_CHECKING:
     from .shm import ShmClient
@@ -69,9 +71,13 @@ __all__ = [
     "Vehicle",
     "Violation",
     "WadeError",
+    "__version__",
     "connect",
     "gravity_from_quaternion",
     "gravity_from_roll_pitch",
+    "heading_from_quaternion",
+    "state_in_world",
+    "wrench_in_world",
 ]
 
 

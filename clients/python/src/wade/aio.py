@@ -9,7 +9,7 @@ import grpc
 
 from . import messages
 from .channel import DEFAULT_ADDRESS, Tls, open_channel, target
-from .client import DEFAULT_TIMEOUT_S, checked_timeout
+from .client import DEFAULT_TIMEOUT_S, check_query, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
 from .latency import Latency
@@ -34,12 +34,14 @@ class GrpcClient:
 
     async def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces on one vehicle in one state."""
+        check_query(vehicle, state)
         return messages.forces(await self._call("Evaluate", messages.evaluate_request(vehicle, state), timeout_s))
 
     async def evaluate_batch(
         self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
     ) -> Forces:
         """The forces in N states of one vehicle, as many as the server's `grpc.max_batch` allows."""
+        check_query(vehicle, states)
         request, length = messages.evaluate_batch_request(vehicle, states, surfaces)
         return messages.batch_forces(await self._call("EvaluateBatch", request, timeout_s), length)
 

@@ -22,3 +22,21 @@ def gravity_from_quaternion(world_from_body: ArrayLike) -> NDArray[np.float64]:
     w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
     up = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
     return -np.stack(up, axis=-1)
+
+
+def heading_from_quaternion(world_from_body: ArrayLike) -> NDArray[np.float64]:
+    """Angle from the world's x to the body's x in the horizontal plane [rad], one number or `[N]`."""
+    w, x, y, z = np.moveaxis(np.asarray(world_from_body, float), -1, 0)
+    return np.asarray(np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z))
+
+
+def rotation(world_from_body: ArrayLike) -> NDArray[np.float64]:
+    """The matrix that takes body to world vectors, `[3, 3]` or `[N, 3, 3]`. The quaternion is normalized first."""
+    quaternion = np.asarray(world_from_body, float)
+    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
+    rows = [
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

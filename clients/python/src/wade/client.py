@@ -20,6 +20,13 @@ def checked_timeout(timeout_s: float) -> float:
     return float(timeout_s)
 
 
+def check_query(vehicle: object, state: object) -> None:
+    """Names the arguments of `evaluate(vehicle, state)` where they are something else."""
+    if not (isinstance(vehicle, str) and isinstance(state, State)):
+        found = f"{type(vehicle).__name__}, {type(state).__name__}"
+        raise TypeError(f"evaluate(vehicle, state) takes the name of a vehicle and a State, got ({found})")
+
+
 class Stream(Protocol):
     """One answer a state, in order, for one vehicle: a run, in which effects remember and time moves by `time_step_s`.
 

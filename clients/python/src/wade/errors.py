@@ -12,12 +12,15 @@ class WadeError(Exception):
 
 @dataclass(frozen=True)
 class Violation:
-    """A field that is wrong, by the name that `State` gives it."""
+    """A field that is wrong, by the name that `State` gives it.
+
+    Attributes:
+        description: A sentence that names the field, and in a batch the state.
+        index: Which state of a batch; None for a single state or where the whole array is meant.
+    """
 
     field: str
-    #: A sentence that names the field, and in a batch the state.
     description: str
-    #: Which state of a batch; None for a single state or where the whole array is meant.
     index: int | None = None
 
 

@@ -8,6 +8,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from .brief import brief
+
 Array = NDArray[np.float32]
 
 
@@ -80,77 +82,98 @@ class BoxQuantity(IntEnum):
     DENSITY = 4
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, repr=False)
 class Forces:
     """What the water does to the vehicle, body frame, in single precision; arrays may be read-only.
 
     Shapes are those of a single state with K surfaces, in the order of `Vehicle.surfaces`, and E effects; in the answer
     to a batch each array has N rows of them. The bits are the same whatever the transport, alone or in a batch.
+
+    Attributes:
+        force_n: Net force [N], `[3]`.
+        moment_nm: Net moment about `about_m` [N m], `[3]`.
+        about_m: Reference point of the moments, the center of mass [m]: `[3]`, for a batch too.
+        uncertainty_n: One standard deviation of the net force [N], `[3]`.
+        moment_uncertainty_nm: One standard deviation of the net moment [N m], `[3]`.
+        surface_force_n: Force of the model on each surface [N], `[K, 3]`; K is 0 where the surfaces were left
+            out.
+        surface_point_m: Point at which it acts [m], `[K, 3]`.
+        surface_couple_nm: Moment of its load about that point [N m], `[K, 3]`; K is 0 of a bundle without the
+            physical base.
+        wetted_fraction: Share of each surface under water, `[K]`.
+        outside: How far each `Quantity` lies outside the training domain, in its unit: negative below, positive
+            above, 0 within.
+        effects: The effects that were added to the model: a number that this client does not know is of a newer
+            server.
+        effect_force_n: Force of each effect [N], `[E, 3]`: with those of the surfaces they sum to `force_n`.
+        effect_moment_nm: Moment of each effect about `about_m` [N m], `[E, 3]`.
+        effect_left_out: Why an effect has no load: a `LeftOut`, or 0 where it has one; `[E]`.
+        effect_surface_force_n: Share of the effects' forces that acts on each surface [N], `[K, 3]`: a part of
+            `effect_force_n`, not to be added to it. K is 0 where there are no effects.
+        effects_outside: How far each `BoxQuantity` lies outside the box in which the effects were seen; above
+            it they are as at its edge.
+        added_mass: Added mass and inertia about `about_m` [kg, kg m, kg m2], `[6, 6]`, forces first. The wrench
+            is `-M_A nu_dot`, with the rates of the body components of the velocity of the center of mass and of
+            the angular velocity. None of a bundle without the physical base or such an effect.
+        jacobian: Derivatives of the wrench about `about_m`, force first, `[6, 11]`: by the velocity over ground
+            [m/s] in columns 0 to 2, the angular velocity [rad/s] in 3 to 5, the water level [m] in 6, the
+            attitude [rad] in 7 to 9 and the density [kg/m3] in 10, each with the others held. The attitude is a
+            small turn of the body about its axes, which leaves the body components of the motion and the water
+            level as they are. None where `State.jacobian` did not ask for them.
+        damping: Linear damping by waves about `about_m` [kg/s, kg m/s, kg m2/s], `[6, 6]`: the wrench is `-B
+            nu`. Zero in a run of states, whose memory has it. None of a bundle without the physical base, as
+            what follows.
+        water_level_m: Height of the still water above the body's origin along up, as used [m].
+        bed_clearance_m: Distance from the ground-contact plane down to the bed, as used [m].
+        bed: Share of the motion through the water that is motion over the bed, as used.
+        shaft_power_w: Power that the shafts of the wheels put in [W]. None of a server that does not state it,
+            too.
+        session_begins: True where a run of states begins with this one: effects remember nothing yet. In the
+            middle of a run it says that the server has forgotten it.
+        bundle_version: Version of the bundle that answered.
+        provenance: Where the weights come from, such as "analytic"; over shared memory the first 64 bytes of
+            it.
+        compute_ns: The server's own time [ns], for the whole batch.
     """
 
-    #: Net force [N], `[3]`.
     force_n: Array
-    #: Net moment about `about_m` [N m], `[3]`.
     moment_nm: Array
-    #: Reference point of the moments, the center of mass [m]: `[3]`, for a batch too.
     about_m: Array
-    #: One standard deviation of the net force [N], `[3]`.
     uncertainty_n: Array
-    #: One standard deviation of the net moment [N m], `[3]`.
     moment_uncertainty_nm: Array
-    #: Force of the model on each surface [N], `[K, 3]`; K is 0 where the surfaces were left out.
     surface_force_n: Array
-    #: Point at which it acts [m], `[K, 3]`.
     surface_point_m: Array
-    #: Moment of its load about that point [N m], `[K, 3]`; K is 0 of a bundle without the physical base.
     surface_couple_nm: Array
-    #: Share of each surface under water, `[K]`.
     wetted_fraction: Array
-    #: How far each `Quantity` lies outside the training domain, in its unit: negative below, positive above, 0 within.
     outside: Array
-    #: The effects that were added to the model: a number that this client does not know is of a newer server.
     effects: tuple[Effect | int, ...]
-    #: Force of each effect [N], `[E, 3]`: with those of the surfaces they sum to `force_n`.
     effect_force_n: Array
-    #: Moment of each effect about `about_m` [N m], `[E, 3]`.
     effect_moment_nm: Array
-    #: Why an effect has no load: a `LeftOut`, or 0 where it has one; `[E]`.
     effect_left_out: NDArray[np.uint8]
-    #: Share of the effects' forces that acts on each surface [N], `[K, 3]`: a part of `effect_force_n`, not to be added
-    #: to it. K is 0 where there are no effects.
     effect_surface_force_n: Array
-    #: How far each `BoxQuantity` lies outside the box in which the effects were seen; above it they are as at its edge.
     effects_outside: Array
-    #: Added mass and inertia about `about_m` [kg, kg m, kg m2], `[6, 6]`, forces first. The wrench is `-M_A nu_dot`,
-    #: with the rates of the body components of the velocity of the center of mass and of the angular velocity. None
-    #: of a bundle without the physical base or such an effect.
     added_mass: Array | None
-    #: Derivatives of the wrench about `about_m`, force first, `[6, 11]`: by the velocity over ground [m/s] in columns 0
-    #: to 2, the angular velocity [rad/s] in 3 to 5, the water level [m] in 6, the attitude [rad] in 7 to 9 and the
-    #: density [kg/m3] in 10, each with the others held. The attitude is a small turn of the body about its axes, which
-    #: leaves the body components of the motion and the water level as they are. None where `State.jacobian` did not ask
-    #: for them.
     jacobian: Array | None
-    #: Linear damping by waves about `about_m` [kg/s, kg m/s, kg m2/s], `[6, 6]`: the wrench is `-B nu`. Zero in a run
-    #: of states, whose memory has it. None of a bundle without the physical base, as what follows.
     damping: Array | None
-    #: Height of the still water above the body's origin along up, as used [m].
     water_level_m: Array | None
-    #: Distance from the ground-contact plane down to the bed, as used [m].
     bed_clearance_m: Array | None
-    #: Share of the motion through the water that is motion over the bed, as used.
     bed: Array | None
-    #: Power that the shafts of the wheels put in [W]. None of a server that does not state it, too.
     shaft_power_w: Array | None
-    #: True where a run of states begins with this one: effects remember nothing yet. In the middle of a run it says
-    #: that the server has forgotten it.
     session_begins: NDArray[np.bool_] | np.bool_
-    #: Version of the bundle that answered.
     bundle_version: int
-    #: Where the weights come from, such as "analytic"; over shared memory the first 64 bytes of it.
     provenance: str
-    #: The server's own time [ns], for the whole batch.
     compute_ns: int
+
+    def __repr__(self) -> str:
+        """The net wrench and how far it can be trusted; every field is an attribute."""
+        rows = self.force_n.shape[:-1]
+        shown = [f"[{rows[0]}]"] if rows else []
+        names = ("force_n", "uncertainty_n", "moment_nm")
+        shown += [f"{name}={brief(getattr(self, name))}" for name in names]
+        shown.append(f"in_domain={brief(self.in_domain)}")
+        if self.effects:
+            shown.append(f"effects={len(self.effects)}")
+        return f"Forces({', '.join(shown)}, bundle_version={self.bundle_version})"
 
     @property
     def in_domain(self) -> NDArray[np.bool_] | np.bool_:

@@ -13,19 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import messages
-from .client import checked_timeout
+from .client import check_query, checked_timeout
 from .errors import DeadlineExceeded, InvalidState, UnknownVehicle, Violation, WadeError
 from .forces import Array, Effect, Forces, named_effect
 from .local import SessionStream, flags, session_numbers
 from .stability import DEFAULT_TIMEOUT_S as MAP_TIMEOUT_S
 from .stability import Ford, Stability
 from .state import SCALARS, TOLD, VECTORS, State
+from .version import VERSION
 
 if TYPE_CHECKING:
     import wade_native
 
-#: Version of the compiled module that this client is written for.
-_VERSION = "0.2.0"
 _INSTALL = "in a checkout of wade, with Rust: pip install ./clients/python/native"
 
 #: How many numbers each field has in a state, in the order of `State.floats`.
@@ -52,6 +51,7 @@ class InProcess:
 
     def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces on one vehicle in one state."""
+        check_query(vehicle, state)
         return self._evaluate(vehicle, state, state.sessions(None), timeout_s)
 
     def _evaluate(self, vehicle: str, state: State, session: int, timeout_s: float | None) -> Forces:
@@ -67,6 +67,7 @@ class InProcess:
         self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
     ) -> Forces:
         """The forces in N states of one vehicle, any number of them."""
+        check_query(vehicle, states)
         _check(timeout_s)
         rows = states.rows()
         length = states.length(rows)
@@ -218,6 +219,6 @@ def _native() -> Any:
         import wade_native
     except ImportError as error:
         raise ImportError(f"wade.InProcess needs the compiled module wade_native ({error}); {_INSTALL}") from None
-    if wade_native.VERSION != _VERSION:
-        raise ImportError(f"wade_native is of version {wade_native.VERSION}, this client needs {_VERSION}; {_INSTALL}")
+    if wade_native.VERSION != VERSION:
+        raise ImportError(f"wade_native is of version {wade_native.VERSION}, this client needs {VERSION}; {_INSTALL}")
     return wade_native

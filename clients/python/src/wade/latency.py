@@ -19,13 +19,17 @@ class Percentiles:
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """One transport and vehicle."""
+    """One transport and vehicle.
 
-    #: grpc_unary, grpc_batch, grpc_stream (TCP), uds_unary, uds_batch, uds_stream (Unix socket), shm or shm_batch.
+    Attributes:
+        transport: grpc_unary, grpc_batch, grpc_stream (TCP), uds_unary, uds_batch, uds_stream (Unix socket),
+            shm or shm_batch.
+        window: Of the last full window.
+        window_s: Length of a window [s].
+    """
+
     transport: str
     vehicle: str
     since_start: Percentiles
-    #: Of the last full window.
     window: Percentiles
-    #: Length of a window [s].
     window_s: float

@@ -18,7 +18,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from . import shm_layout as layout
-from .client import DEFAULT_TIMEOUT_S, checked_timeout
+from .client import DEFAULT_TIMEOUT_S, check_query, checked_timeout
 from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
 from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
 from .local import SessionStream, flags, session_numbers
@@ -57,6 +57,7 @@ class ShmClient:
 
     def evaluate(self, vehicle: str, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces on one vehicle in one state."""
+        check_query(vehicle, state)
         return self._evaluate(vehicle, state, state.sessions(None), timeout_s)
 
     def _evaluate(self, vehicle: str, state: State, session: int, timeout_s: float | None) -> Forces:
@@ -78,6 +79,7 @@ class ShmClient:
         self, vehicle: str, states: State, *, surfaces: bool = True, timeout_s: float | None = None
     ) -> Forces:
         """The forces in N states of one vehicle, which travel 256 at a time, and alone with derivatives."""
+        check_query(vehicle, states)
         timeout_s, end = self._end(timeout_s)
         rows, flagged = states.rows(), flags(states)
         length = states.length(rows)

@@ -16,23 +16,31 @@ DEFAULT_TIMEOUT_S = 60.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Ford:
-    """Moving water on a plane bed, for each pair of a depth and a speed: 100,000 pairs at most."""
+    """Moving water on a plane bed, for each pair of a depth and a speed: 100,000 pairs at most.
 
-    #: Water surface above the bed: a number or `[D]`.
+    Attributes:
+        depth_m: Water surface above the bed: a number or `[D]`.
+        speed_mps: Speed of the vehicle through the water, zero or more: a number or `[S]`.
+        heading_rad: Where the water comes from as seen from the vehicle: 0 ahead, pi/2 from the left, pi from
+            behind.
+        friction: Friction of the wheels on the bed, or two between which each is as likely; None: 0.32 to 0.90,
+            wet roads.
+        density_kgpm3: Density of the water [kg/m3].
+        roll_pitch_rad: Slope of the bed, and so of the vehicle.
+        ground_contact: Whether water reaches under the tires.
+        bed: Share of the motion through the water that is motion over the bed: 0 parked in a current to 1
+            driving.
+        normal_forces: Whether the normal force on each foot is answered too.
+    """
+
     depth_m: ArrayLike
-    #: Speed of the vehicle through the water, zero or more: a number or `[S]`.
     speed_mps: ArrayLike
-    #: Where the water comes from as seen from the vehicle: 0 ahead, pi/2 from the left, pi from behind.
     heading_rad: float = 0.0
-    #: Friction of the wheels on the bed, or two between which each is as likely; None: 0.32 to 0.90, wet roads.
     friction: float | tuple[float, float] | None = None
     density_kgpm3: float = 1000.0
-    #: Slope of the bed, and so of the vehicle.
     roll_pitch_rad: tuple[float, float] = (0.0, 0.0)
     ground_contact: GroundContact = GroundContact.WETTED
-    #: Share of the motion through the water that is motion over the bed: 0 parked in a current to 1 driving.
     bed: float = 0.0
-    #: Whether the normal force on each foot is answered too.
     normal_forces: bool = False
 
     @property
@@ -43,25 +51,32 @@ class Ford:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StabilityModes:
-    """One array a way in which a vehicle loses its hold, of the shape of the depths and then that of the speeds."""
+    """One array a way in which a vehicle loses its hold, of the shape of the depths and then that of the speeds.
 
-    #: The water bears the whole weight.
+    Attributes:
+        floats: The water bears the whole weight.
+        slides: The force along the bed is more than friction holds, or it floats.
+        topples: It tips over an edge of the area between its wheels.
+        steers: Each axle bears weight and needs no more than its own grip; None of a vehicle without wheels or
+            tracks.
+    """
+
     floats: NDArray[np.float32]
-    #: The force along the bed is more than friction holds, or it floats.
     slides: NDArray[np.float32]
-    #: It tips over an edge of the area between its wheels.
     topples: NDArray[np.float32]
-    #: Each axle bears weight and needs no more than its own grip; None of a vehicle without wheels or tracks.
     steers: NDArray[np.float32] | None
 
 
 @dataclass(frozen=True, slots=True)
 class Foot:
-    """A place on which a vehicle stands."""
+    """A place on which a vehicle stands.
 
-    #: Name of the surface.
+    Attributes:
+        surface: Name of the surface.
+        x_m: Body frame [m].
+    """
+
     surface: str
-    #: Body frame [m].
     x_m: float
     y_m: float
 
@@ -71,21 +86,27 @@ class Stability:
     """How a vehicle stands for each pair of a depth and a speed.
 
     Every array has the shape of the depths and then that of the speeds: `()` of two numbers, `[D, S]` of two arrays.
+
+    Attributes:
+        probability: Probabilities, from the stated deviation of the wrench and the spread of friction.
+        margin: 1 dry on level ground, 0 at the limit and negative beyond, with the mean wrench and the least
+            friction.
+        friction_needed: Friction below which it slides; infinite where it floats.
+        normal_force_n: Normal force on each of `feet` [N], with one more axis; None unless asked for.
+        feet: Wheels, ends of tracks, or corners of a hull without either.
+        in_domain: Whether the state lies inside the training domain.
+        friction: Least and greatest friction, as used.
+        bundle_version: Version of the bundle that answered.
+        provenance: Where the weights come from.
+        compute_ns: The server's own time [ns].
     """
 
-    #: Probabilities, from the stated deviation of the wrench and the spread of friction.
     probability: StabilityModes
-    #: 1 dry on level ground, 0 at the limit and negative beyond, with the mean wrench and the least friction.
     margin: StabilityModes
-    #: Friction below which it slides; infinite where it floats.
     friction_needed: NDArray[np.float32]
-    #: Normal force on each of `feet` [N], with one more axis; None unless asked for.
     normal_force_n: NDArray[np.float32] | None
-    #: Wheels, ends of tracks, or corners of a hull without either.
     feet: tuple[Foot, ...]
-    #: Whether the state lies inside the training domain.
     in_domain: NDArray[np.bool_]
-    #: Least and greatest friction, as used.
     friction: tuple[float, float]
     bundle_version: int
     provenance: str

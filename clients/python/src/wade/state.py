@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .attitude import gravity_from_quaternion, gravity_from_roll_pitch, heading_from_quaternion
+from .brief import brief
 from .errors import InvalidState, Violation
 
 
@@ -66,7 +68,7 @@ TIME_STEP_AT = TOLD_AT + sum(TOLD.values())
 _UNTOLD = (math.nan,) * sum(TOLD.values())
 
 
-@dataclass(slots=True, kw_only=True, eq=False)
+@dataclass(slots=True, kw_only=True, eq=False, repr=False)
 class State:
     """One state, or N of them for a batch. Body frame: x forward, y left, z up; SI units.
 
@@ -74,54 +76,92 @@ class State:
     state a vector is any sequence of three numbers. In a batch that one is `[N]`, a vector is `[N, 3]` or, where all
     have the same, `[3]`, and any other number `[N]` or one number; NaN in a row states no level, clearance or bed. What
     is left out has the server's default.
+
+    Attributes:
+        depth_m: Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where
+            it is below.
+        velocity_mps: Velocity over ground [m/s]; through the water where there is no current.
+        current_mps: Velocity of the water over ground [m/s].
+        angular_velocity_radps: Angular velocity [rad/s].
+        acceleration_mps2: Acceleration [m/s2].
+        angular_acceleration_radps2: Angular acceleration [rad/s2].
+        density_kgpm3: Density of the water [kg/m3].
+        gravity_direction: Unit vector along gravity (down). At most one of this, `roll_pitch_rad` and
+            `world_from_body` is given.
+        roll_pitch_rad: Roll and pitch, `[2]` or `[N, 2]`, which set `gravity_direction`: positive roll lowers the
+            right side, positive pitch the nose.
+        world_from_body: Quaternion (w, x, y, z) that takes body to world vectors, `[4]` or `[N, 4]`: sets
+            `gravity_direction`, and `heading_rad` where that is left out.
+        ground_contact: One for the whole batch.
+        heading_rad: Angle from the world's x to the body's x [rad]. None: effects that are fixed in the world
+            are left out.
+        depth_rate_mps: Rate at which the water rises at the body origin [m/s]. None: in a run of states that of
+            the depth, else effects that need it are left out.
+        wheel_speed_radps: Speed of each wheel or track of the vehicle by axle from the front, left before right
+            [rad/s]: of four wheels front left, front right, rear left, rear right; of a track that of its drive
+            sprocket. `[W]` or `[N, W]` for W wheels. None: effects that need them are left out.
+        water_level_m: Signed height of the still-water plane above the body origin along up [m], in the place
+            of `depth_m`.
+        bed_clearance_m: Distance from the ground-contact plane down to the bed [m]. None: on the bed until the
+            vehicle floats.
+        bed: Share of the motion through the water that is motion over the bed, 0 parked to 1 driving. None:
+            from velocities.
+        physics: How much of the physical base answers. One for the whole batch. None: as the server is set, by
+            default all of it.
+        time_step_s: Time since the state before it in the run [s]. 0: what effects remember stays as it is.
+        implicit_added_mass: The caller adds `Forces.added_mass` to a mass matrix of his own: the forces leave
+            `-M_A nu_dot` out and keep the rest. One for the whole batch.
+        jacobian: Answer with `Forces.jacobian`; refused of a vehicle without the physical base. One for the
+            whole batch.
+        session: Over shared memory, the number of a run of states that follow each other, for effects that
+            remember (waves, flooding): one an environment, `[N]` in a batch. A run in batches is another than
+            that of the same number in single calls. 0: none. A stream is a run without a number; over gRPC
+            there is no other.
     """
 
-    #: Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
     depth_m: ArrayLike | None = None
-    #: Velocity over ground [m/s]; through the water where there is no current.
     velocity_mps: ArrayLike = _REST
-    #: Velocity of the water over ground [m/s].
     current_mps: ArrayLike = _REST
-    #: Angular velocity [rad/s].
     angular_velocity_radps: ArrayLike = _REST
-    #: Acceleration [m/s2].
     acceleration_mps2: ArrayLike = _REST
-    #: Angular acceleration [rad/s2].
     angular_acceleration_radps2: ArrayLike = _REST
-    #: Density of the water [kg/m3].
     density_kgpm3: ArrayLike = _FRESH_WATER
-    #: Unit vector along gravity (down); see `gravity_from_roll_pitch` and `gravity_from_quaternion`.
     gravity_direction: ArrayLike = _LEVEL
-    #: One for the whole batch.
     ground_contact: GroundContact = GroundContact.WETTED
-    #: Angle from the world's x to the body's x [rad]. None: effects that are fixed in the world are left out.
     heading_rad: ArrayLike | None = None
-    #: Rate at which the water rises at the body origin [m/s]. None: in a run of states that of the depth, else effects
-    #: that need it are left out.
     depth_rate_mps: ArrayLike | None = None
-    #: Speed of each wheel or track of the vehicle by axle from the front, left before right [rad/s]: of four wheels
-    #: front left, front right, rear left, rear right; of a track that of its drive sprocket. `[W]` or `[N, W]` for W
-    #: wheels. None: effects that need them are left out.
     wheel_speed_radps: ArrayLike | None = None
-    #: Signed height of the still-water plane above the body origin along up [m], in the place of `depth_m`.
     water_level_m: ArrayLike | None = None
-    #: Distance from the ground-contact plane down to the bed [m]. None: on the bed until the vehicle floats.
     bed_clearance_m: ArrayLike | None = None
-    #: Share of the motion through the water that is motion over the bed, 0 parked to 1 driving. None: from velocities.
     bed: ArrayLike | None = None
-    #: How much of the physical base answers. One for the whole batch. None: as the server is set, by default all of it.
     physics: Physics | None = None
-    #: Time since the state before it in the run [s]. 0: what effects remember stays as it is.
     time_step_s: ArrayLike = _NO_TIME
-    #: The caller adds `Forces.added_mass` to a mass matrix of his own: the forces leave `-M_A nu_dot` out and keep the
-    #: rest. One for the whole batch.
     implicit_added_mass: bool = False
-    #: Answer with `Forces.jacobian`; refused of a vehicle without the physical base. One for the whole batch.
     jacobian: bool = False
-    #: Over shared memory, the number of a run of states that follow each other, for effects that remember (waves,
-    #: flooding): one an environment, `[N]` in a batch. A run in batches is another than that of the same number in
-    #: single calls. 0: none. A stream is a run without a number; over gRPC there is no other.
     session: ArrayLike = 0
+    roll_pitch_rad: InitVar[ArrayLike | None] = None
+    world_from_body: InitVar[ArrayLike | None] = None
+
+    def __post_init__(self, roll_pitch_rad: ArrayLike | None, world_from_body: ArrayLike | None) -> None:
+        given = {"roll_pitch_rad": roll_pitch_rad, "world_from_body": world_from_body}
+        if not self.is_default("gravity_direction"):
+            given["gravity_direction"] = self.gravity_direction
+        attitudes = [name for name, value in given.items() if value is not None]
+        if len(attitudes) > 1:
+            raise _wrong(attitudes[1], f"and {attitudes[0]} are both given: give one of the two")
+        if roll_pitch_rad is not None:
+            angles = _of_length("roll_pitch_rad", roll_pitch_rad, 2)
+            self.gravity_direction = gravity_from_roll_pitch(angles[..., 0], angles[..., 1])
+        if world_from_body is not None:
+            quaternion = _of_length("world_from_body", world_from_body, 4)
+            self.gravity_direction = gravity_from_quaternion(quaternion)
+            if self.heading_rad is None:
+                self.heading_rad = heading_from_quaternion(quaternion)
+
+    def __repr__(self) -> str:
+        """The fields that were given."""
+        given = (name for name in self.__slots__ if not self.is_default(name))
+        return f"State({', '.join(f'{name}={brief(getattr(self, name))}' for name in given)})"
 
     def is_default(self, name: str) -> bool:
         """True where a field was left out, so that it need not travel."""
@@ -233,6 +273,17 @@ def _wheels(shape: tuple[int, ...]) -> int:
         expected = f"[N, W] or [W] with W from 1 to {MAX_WHEELS}"
         raise _wrong("wheel_speed_radps", f"must have one value a wheel, {expected}, got shape {shape}")
     return wheels
+
+
+def _of_length(name: str, value: ArrayLike, count: int) -> NDArray[np.float64]:
+    """A vector of so many numbers, or rows of them."""
+    try:
+        array = np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise _wrong(name, f"must be numbers, got {_describe(value)}") from None
+    if array.ndim not in (1, 2) or array.shape[-1] != count:
+        raise _wrong(name, f"must have shape [{count}] or [N, {count}], got {_describe(value)}")
+    return array
 
 
 def _array(name: str, value: ArrayLike) -> NDArray[np.float32]:
