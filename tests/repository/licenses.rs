@@ -158,8 +158,8 @@ fn packages_outside_cargo_have_the_same_license_and_version() {
     assert_eq!(native["project"]["license"].as_str(), Some(OURS));
     let dynamic = native["project"]["dynamic"].as_array().expect("a list");
     assert!(dynamic.iter().any(|field| field.as_str() == Some("version")), "it has Cargo's version");
-    let required = text("clients/python/src/wade/in_process.py");
-    assert!(required.contains(&format!("_VERSION = \"{version}\"\n")), "in_process.py needs another version");
+    let required = text("clients/python/src/wade/version.py");
+    assert!(required.contains(&format!("\nVERSION = \"{version}\"\n")), "version.py has another version");
     let unreal: Value = serde_json::from_str(&text("clients/unreal/Wade/Wade.uplugin")).expect("JSON");
     assert_eq!(unreal["VersionName"], version);
     let citation = text("CITATION.cff");
