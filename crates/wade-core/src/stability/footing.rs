@@ -1,12 +1,15 @@
 //! What a vehicle stands on: the places that bear its weight, the edges over which it can topple, and its axles.
 
-use nalgebra::{DMatrix, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::frame::Vec3;
 use crate::vehicle::Vehicle;
 
 /// How high over the ground-contact plane a wheel may end and still bear weight [m]: what a tire gives way under its load.
 const GIVE: f64 = 0.01;
+
+/// What makes the equations of feet in one line solvable, as a share of their size: it moves the forces by about as much.
+const SOFT: f64 = 1e-11;
 
 /// Length below which an edge or a wheelbase is none [m].
 const NO_LENGTH: f64 = 1e-6;
@@ -94,26 +97,20 @@ impl Footing {
             return forces;
         }
         let center = self.nearest(center);
+        let row = |foot: usize| Vector3::new(1.0, self.feet[foot].at.x, self.feet[foot].at.y);
         let sum = Vector3::new(1.0, center.x, center.y) * normal;
         let mut bearing: Vec<usize> = (0..self.feet.len()).collect();
         while !bearing.is_empty() {
-            let row = |r: usize, c: usize| {
-                let at = self.feet[bearing[c]].at;
-                [1.0, at.x, at.y][r]
-            };
-            let places = DMatrix::from_fn(3, bearing.len(), row);
             // of the forces that are in balance those with the least sum of squares are those of equal springs
-            let Ok(least) = places.svd(true, true).solve(&sum, 1e-9) else { break };
-            let lifted = (0..bearing.len()).min_by(|&a, &b| least[a].total_cmp(&least[b]));
-            match lifted.filter(|&foot| least[foot] < -1e-9 * normal) {
-                Some(foot) => {
-                    bearing.remove(foot);
-                }
+            let squares: Matrix3<f64> = bearing.iter().map(|&foot| row(foot) * row(foot).transpose()).sum();
+            let stiff = squares + Matrix3::identity() * (SOFT * squares.trace());
+            let Some(multipliers) = stiff.try_inverse().map(|inverse| inverse * sum) else { break };
+            let force = |foot: usize| row(foot).dot(&multipliers);
+            let lifted = bearing.iter().copied().min_by(|&a, &b| force(a).total_cmp(&force(b)));
+            match lifted.filter(|&foot| force(foot) < -1e-9 * normal) {
+                Some(foot) => bearing.retain(|&other| other != foot),
                 None => {
-                    bearing
-                        .iter()
-                        .zip(least.iter())
-                        .for_each(|(&foot, &force)| forces[foot] = force.max(0.0));
+                    bearing.iter().for_each(|&foot| forces[foot] = force(foot).max(0.0));
                     break;
                 }
             }
