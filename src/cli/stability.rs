@@ -24,10 +24,10 @@ pub struct StabilityCommand {
     #[arg(long)]
     vehicle: String,
     /// Water surface above the bed [m], or MIN:MAX:COUNT
-    #[arg(long, value_parser = range, allow_hyphen_values = true)]
+    #[arg(long, value_name = "D", value_parser = range, allow_hyphen_values = true)]
     depth: Range,
     /// Speed through the water [m/s], or MIN:MAX:COUNT
-    #[arg(long, value_parser = range)]
+    #[arg(long, value_name = "S", value_parser = range)]
     speed: Range,
     /// Where the water comes from: 0 ahead, 1.571 left, 3.142 behind [rad]
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
