@@ -19,7 +19,8 @@ use wade_core::vehicle::{SurfaceKind, Vehicle};
 
 use crate::bodies::{body, radiation};
 
-/// Outer dimensions of a car [m] and its mass [kg], as its maker states them.
+/// Outer dimensions of a car [m] and its mass [kg]: usual figures of the model, not those of the tested car, which the papers do not all
+/// state.
 struct Car {
     name: &'static str,
     length: f64,
