@@ -3,11 +3,11 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use wade::service::stability::Document;
 use wade_client::{Address, ClientError, GrpcClient, Method};
-use wade_wire::{Evaluator, Refusal, StabilityStates, proto};
+use wade_wire::{Evaluator, Refusal, proto};
 
 use super::state::Contact;
 use super::{Vehicles, emit};
@@ -154,11 +154,7 @@ impl StabilityCommand {
             let code = refusal.code();
             ClientError::Refused { code, message: refusal.to_string() }
         };
-        let states = StabilityStates::check(request, &vehicle).map_err(refused)?;
-        let mut response = states.response(&vehicle);
-        let room = (&vehicle, &mut Evaluator::default());
-        states.push(&mut response, 0..states.len(), room).map_err(|invalid| anyhow!("{invalid}"))?;
-        Ok(response)
+        Ok(wade_wire::stability(request, &vehicle, &mut Evaluator::default()).map_err(refused)?)
     }
 }
 

@@ -8,7 +8,7 @@ use crate::common::http::{get, post};
 use crate::common::{Served, VEHICLES, served_vehicle};
 use serde_json::{Value, json};
 use wade_client::{ClientError, GrpcClient, Method};
-use wade_wire::{Evaluator, MAX_STATES, StabilityStates, proto};
+use wade_wire::{Evaluator, MAX_STATES, proto};
 
 fn request(vehicle: &str, depths: usize, speeds: usize) -> proto::GetStabilityRequest {
     let to = |last: f32, count: usize| (0..count).map(|i| last * (i as f32 / (count - 1) as f32)).collect();
@@ -24,10 +24,7 @@ fn request(vehicle: &str, depths: usize, speeds: usize) -> proto::GetStabilityRe
 
 fn library(request: &proto::GetStabilityRequest) -> proto::GetStabilityResponse {
     let vehicle = served_vehicle(&request.vehicle);
-    let states = StabilityStates::check(request, &vehicle).expect("sound");
-    let mut response = states.response(&vehicle);
-    let room = (&vehicle, &mut Evaluator::default());
-    states.push(&mut response, 0..states.len(), room).expect("sound");
+    let response = wade_wire::stability(request, &vehicle, &mut Evaluator::default()).expect("sound");
     proto::GetStabilityResponse { compute_ns: 0, ..response }
 }
 

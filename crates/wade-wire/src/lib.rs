@@ -18,6 +18,6 @@ pub use convert::{
 pub use evaluator::{Evaluated, Evaluator, nanoseconds_since};
 pub use refusal::{Overloaded, Refusal, UnknownVehicle};
 pub use sessions::Sessions;
-pub use stability::{MAX_STATES, StabilityFault, StabilityStates};
+pub use stability::{MAX_STATES, StabilityFault, StabilityStates, stability};
 pub use state::{CheckedState, Field, InvalidState, Problem, State, UNIT_TOLERANCE, limit};
 pub use tensor_fault::TensorFault;

@@ -213,6 +213,18 @@ impl<'r> StabilityStates<'r> {
     }
 }
 
+/// Answers a whole request on this thread.
+pub fn stability(
+    request: &proto::GetStabilityRequest,
+    vehicle: &ServedVehicle,
+    evaluator: &mut Evaluator,
+) -> Result<proto::GetStabilityResponse, Refusal> {
+    let states = StabilityStates::check(request, vehicle)?;
+    let mut response = states.response(vehicle);
+    states.push(&mut response, 0..states.len(), (vehicle, evaluator))?;
+    Ok(response)
+}
+
 fn add(rows: &mut proto::StabilityModes, modes: &Modes<f64>) {
     rows.floats.push(modes.floats as f32);
     rows.slides.push(modes.slides as f32);

@@ -14,7 +14,7 @@ use super::Shared;
 use super::json;
 use super::rejection::Rejection;
 use crate::metrics::{Resource, Transport};
-use crate::service::accounts::{Computing, Connection};
+use crate::service::accounts::{Computing, Connection, Place};
 use crate::service::answer::Answer;
 use crate::service::call::{self, Call, answer_state};
 use crate::service::stability::{Document, stability};
@@ -61,14 +61,18 @@ pub(super) async fn whole(shared: &Shared, body: Body, longest: usize) -> Result
     text.map_err(|_| Rejection::TooLong { limit: longest })
 }
 
+/// A place for a request, held while it is computed.
+pub(super) fn admit(shared: &Shared, connection: &Arc<Connection>) -> Result<Place, Refusal> {
+    let overloaded = |overloaded| Refusal::Overloaded { what: Resource::requests.name(), overloaded };
+    shared.accounts.take(connection, Resource::requests, 1).map_err(overloaded)
+}
+
 /// Answers on this thread, as gRPC does on its own.
 fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Result<Response, Rejection> {
     let call = Call::arriving(&shared.grpc, Transport::http, None);
     let request: proto::EvaluateRequest = read(shared, "wade.v1.EvaluateRequest", text)?;
     let mut names = Vec::new();
-    let admitted = shared.accounts.take(connection, Resource::requests, 1);
-    let overloaded = |overloaded| Refusal::Overloaded { what: Resource::requests.name(), overloaded };
-    let answer = admitted.map_err(overloaded).and_then(|_place| {
+    let answer = admit(shared, connection).and_then(|_place| {
         let vehicle = shared.grpc.engine.vehicle(&request.vehicle)?;
         names = vehicle.model().vehicle().surfaces.iter().map(|surface| surface.name.clone()).collect();
         answer_state(&vehicle, request.state.as_ref(), None)
@@ -109,15 +113,11 @@ async fn stability_by_body(
 async fn stand(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Result<Response, Rejection> {
     let call = Call::arriving(&shared.grpc, Transport::http, None);
     let request: proto::GetStabilityRequest = read(shared, "wade.v1.GetStabilityRequest", text)?;
-    let admitted = shared.accounts.take(connection, Resource::requests, 1);
-    let overloaded = |overloaded| Refusal::Overloaded { what: Resource::requests.name(), overloaded };
-    let answer =
-        match admitted.map_err(overloaded).map(|place| (place, shared.grpc.engine.vehicle(&request.vehicle)))
-        {
-            Ok((_place, Ok(vehicle))) => stability(&call, vehicle, &request).await,
-            Ok((_, Err(unknown))) => Err(unknown.into()),
-            Err(refusal) => Err(refusal),
-        };
+    let answer = async {
+        let _place = admit(shared, connection)?;
+        stability(&call, shared.grpc.engine.vehicle(&request.vehicle)?, &request).await
+    };
+    let answer = answer.await;
     let response = call.record(answer)?;
     Ok(json::compact(&Document::new(&request, &response, false)))
 }

@@ -18,7 +18,7 @@ use pyo3::types::{PyBytes, PyTuple};
 use wade_core::bundle::LibraryError;
 use wade_core::model::kernel::Isa;
 use wade_core::served::ServedVehicle;
-use wade_wire::{Refusal, StabilityStates, proto, single};
+use wade_wire::{Refusal, proto, single};
 
 use answering::{Answering, Invalid};
 use numbers::NUMBERS;
@@ -171,11 +171,7 @@ impl Vehicle {
     /// How the vehicle stands.
     fn stand(&self, request: &[u8]) -> Result<Vec<u8>, NoStability> {
         let request = proto::GetStabilityRequest::decode(request).map_err(NoStability::Misshapen)?;
-        let states = StabilityStates::check(&request, &self.served)?;
-        let mut response = states.response(&self.served);
-        let mut answering = self.locked();
-        let room = (&*self.served, answering.evaluator());
-        states.push(&mut response, 0..states.len(), room).map_err(Refusal::from)?;
+        let response = wade_wire::stability(&request, &self.served, self.locked().evaluator())?;
         Ok(response.encode_to_vec())
     }
 

@@ -18,16 +18,13 @@ def gravity_from_quaternion(world_from_body: ArrayLike) -> NDArray[np.float64]:
 
     It is the negated last row of the rotation's matrix. The quaternion is normalized first.
     """
-    quaternion = np.asarray(world_from_body, float)
-    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
-    up = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
-    return -np.stack(up, axis=-1)
+    return -rotation(world_from_body)[..., 2, :]
 
 
 def heading_from_quaternion(world_from_body: ArrayLike) -> NDArray[np.float64]:
     """Angle from the world's x to the body's x in the horizontal plane [rad], one number or `[N]`."""
-    w, x, y, z = np.moveaxis(np.asarray(world_from_body, float), -1, 0)
-    return np.asarray(np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z))
+    matrix = rotation(world_from_body)
+    return np.asarray(np.arctan2(matrix[..., 1, 0], matrix[..., 0, 0]))
 
 
 def rotation(world_from_body: ArrayLike) -> NDArray[np.float64]:

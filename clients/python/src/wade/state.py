@@ -143,6 +143,8 @@ class State:
     world_from_body: InitVar[ArrayLike | None] = None
 
     def __post_init__(self, roll_pitch_rad: ArrayLike | None, world_from_body: ArrayLike | None) -> None:
+        if roll_pitch_rad is None and world_from_body is None:
+            return
         given = {"roll_pitch_rad": roll_pitch_rad, "world_from_body": world_from_body}
         if not self.is_default("gravity_direction"):
             given["gravity_direction"] = self.gravity_direction

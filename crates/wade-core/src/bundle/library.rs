@@ -114,6 +114,12 @@ pub fn canonical(bundle: &Path) -> PathBuf {
     bundle.canonicalize().ok().or_else(folder).unwrap_or_else(|| bundle.to_owned())
 }
 
+/// What a server serves, which knows where it is from.
+fn served(source: &Source, isa: Isa) -> Result<ServedVehicle, LibraryError> {
+    let (model, effects) = source.parts(isa)?;
+    Ok(ServedVehicle::new(model, effects).with_origin(source.origin()))
+}
+
 impl Library {
     /// The folder that was named, or the first that exists of the usual places. A folder that is there and cannot be read is
     /// an error, and so is one that was named and is not there.
@@ -210,9 +216,7 @@ impl Library {
 
     /// What a server serves, which knows where it is from.
     pub fn served(&self, name: &str, isa: Isa) -> Result<ServedVehicle, LibraryError> {
-        let source = self.source(name)?;
-        let (model, effects) = source.parts(isa)?;
-        Ok(ServedVehicle::new(model, effects).with_origin(source.origin()))
+        served(&self.source(name)?, isa)
     }
 
     /// The same of one of its [versions](Library::versions).
@@ -221,9 +225,7 @@ impl Library {
         let place = current.source.path();
         let found = std::iter::once(current).chain(others).find(|kept| kept.version == version);
         let none = || BundleError { path: place, fault: Fault::NotKept { asked: Some(version) } };
-        let source = found.ok_or_else(none)?.source;
-        let (model, effects) = source.parts(isa)?;
-        Ok(ServedVehicle::new(model, effects).with_origin(source.origin()))
+        served(&found.ok_or_else(none)?.source, isa)
     }
 
     /// The hash of a bundle's own list of hashes.

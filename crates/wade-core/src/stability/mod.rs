@@ -172,35 +172,16 @@ impl Stance {
 
     /// Normal forces between which the vehicle does not topple, among those with which it stands.
     fn upright(&self, push: &Push) -> [f64; 2] {
-        let mut range = [0.0, f64::INFINITY];
         if self.footing.edges.len() < 3 {
             return [f64::INFINITY; 2];
         }
-        for (hold, per_normal) in self.hold(push) {
-            let limit = -hold / per_normal;
-            match per_normal {
-                per_normal if per_normal > 0.0 => range[0] = range[0].max(limit),
-                per_normal if per_normal < 0.0 => range[1] = range[1].min(limit),
-                _ if hold < 0.0 => range[0] = f64::INFINITY,
-                _ => (),
-            }
-        }
-        [range[0], range[1].max(range[0])]
+        enough(self.hold(push).map(|(hold, per_normal)| (hold, per_normal, 0.0)))
     }
 
     /// Normal forces between which neither axle needs more than its grip.
     fn steered(&self, push: &Push, friction: f64) -> Option<[f64; 2]> {
-        let mut range = [0.0, f64::INFINITY];
-        for (load, per_normal, need) in self.axle_loads(push)? {
-            let limit = (need / friction - load) / per_normal;
-            match per_normal {
-                per_normal if per_normal > 0.0 => range[0] = range[0].max(limit),
-                per_normal if per_normal < 0.0 => range[1] = range[1].min(limit),
-                _ if load < need / friction => range[0] = f64::INFINITY,
-                _ => (),
-            }
-        }
-        Some([range[0], range[1].max(range[0])])
+        let axles = self.axle_loads(push)?.into_iter();
+        Some(enough(axles.map(|(load, per_normal, need)| (load, per_normal, need / friction))))
     }
 
     fn chances(&self, forces: &Forces, up: &UnitVector3<f64>, friction: &Friction) -> Modes<f64> {
@@ -247,4 +228,19 @@ impl Stance {
             steers: self.axle_loads(push).map(|axles| axles.map(axle).into_iter().fold(f64::INFINITY, least)),
         }
     }
+}
+
+/// Normal forces `N` from zero, from the first to the second, with which every `a + b N` is what is needed or more; empty at infinity.
+fn enough(needs: impl Iterator<Item = (f64, f64, f64)>) -> [f64; 2] {
+    let mut range = [0.0, f64::INFINITY];
+    for (a, b, need) in needs {
+        let limit = (need - a) / b;
+        match b {
+            b if b > 0.0 => range[0] = f64::max(range[0], limit),
+            b if b < 0.0 => range[1] = f64::min(range[1], limit),
+            _ if a < need => range[0] = f64::INFINITY,
+            _ => (),
+        }
+    }
+    [range[0], f64::max(range[1], range[0])]
 }

@@ -1,5 +1,7 @@
 // The state that is asked for: sliders, the address of the page, and the query made of them.
 
+import { gravity } from "./matrix.js";
+
 const RAD = Math.PI / 180;
 
 /** The provenance of a vehicle without trained weights. */
@@ -77,7 +79,7 @@ export function batchOf({ vehicle, state }) {
     angular_velocity_radps: vector(state.angular_velocity_radps),
     acceleration_mps2: vector(state.acceleration_mps2),
     angular_acceleration_radps2: vector(state.angular_acceleration_radps2),
-    gravity_direction: [Math.sin(pitch), -Math.cos(pitch) * Math.sin(roll), -Math.cos(pitch) * Math.cos(roll)],
+    gravity_direction: gravity(roll, pitch),
     depth_m: state.depth_m === undefined ? [] : [state.depth_m],
     water_level_m: state.water_level_m === undefined ? [] : [state.water_level_m],
     density_kgpm3: [state.density_kgpm3],

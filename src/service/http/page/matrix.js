@@ -58,6 +58,9 @@ export function worldFromBody(roll, pitch) {
   return columns([cp, 0, -sp], [sp * sr, cr, cp * sr], [sp * cr, -sr, cp * cr], [0, 0, 0]);
 }
 
+/** Unit vector along gravity (down) in the body. */
+export const gravity = (roll, pitch) => [Math.sin(pitch), -Math.cos(pitch) * Math.sin(roll), -Math.cos(pitch) * Math.cos(roll)];
+
 /** An affine map that takes the unit z axis to `vector`, widened by `width`. */
 export function along(origin, vector, width) {
   const z = unit(vector);

@@ -26,13 +26,43 @@ function risk(answer) {
   return lists[0].map((row, i) => row.map((_, j) => Math.max(...lists.map((list) => list[i][j]))));
 }
 
+/**
+ * The line along which a probability is reached: a piece in each square of four states (marching squares), as its two ends in shares
+ * of the greatest speed and depth.
+ */
+function contour(rows, level) {
+  const [n, m] = [rows.length - 1, rows[0].length - 1];
+  const ends = [];
+  for (let i = 0; i < n; i++) {
+    for (let j = 0; j < m; j++) {
+      const corners = [[i, j], [i, j + 1], [i + 1, j + 1], [i + 1, j]];
+      const values = corners.map(([a, b]) => rows[a][b] - level);
+      const cuts = [];
+      for (let k = 0; k < 4; k++) {
+        const [a, b] = [values[k], values[(k + 1) % 4]];
+        if (a < 0 !== b < 0) {
+          const share = a / (a - b);
+          const [from, to] = [corners[k], corners[(k + 1) % 4]];
+          cuts.push([(from[1] + share * (to[1] - from[1])) / m, (from[0] + share * (to[0] - from[0])) / n]);
+        }
+      }
+      // an even number, since the line leaves every square that it enters
+      ends.push(...cuts);
+    }
+  }
+  return ends;
+}
+
 export class StabilityMap {
   /** `post` asks the server, `choose` gets the state under the cursor as speed and depth. */
   constructor(post, choose) {
     Object.assign(this, { post, choose, canvas: element("map"), run: 0 });
     const select = element("map-mode");
     select.replaceChildren(...Object.entries(MODES).map(([value, { label }]) => new Option(label, value)));
-    select.addEventListener("change", () => this.draw());
+    select.addEventListener("change", () => {
+      this.drawn = undefined;
+      this.draw();
+    });
     element("map-gradient").style.background = gradient(PROBABILITY);
     element("map-ticks").replaceChildren(...ticks(PROBABILITY, 1).map((textContent) => Object.assign(document.createElement("span"), { textContent })));
     this.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => this.move(...this.placeOf(offsetX, offsetY)));
@@ -63,7 +93,7 @@ export class StabilityMap {
         if (run === this.run) state.textContent = error.message;
         return;
       }
-      this.image = undefined;
+      this.drawn = undefined;
       this.draw();
     }
   }
@@ -108,7 +138,7 @@ export class StabilityMap {
 
   draw() {
     if (!this.answer || !this.canvas.clientWidth) return;
-    const rows = this.shown();
+    const { rows, picture, lines } = (this.drawn ??= this.made());
     const { context, width: all, height: tall } = prepared(this.canvas);
     const { width, height } = this.sides();
     if (!rows) {
@@ -116,11 +146,17 @@ export class StabilityMap {
       context.fillText("a vehicle without wheels or tracks cannot be steered", LEFT, tall / 2);
     } else {
       context.imageSmoothingEnabled = true;
-      context.drawImage(this.picture(rows), LEFT, TOP, width, height);
-      for (const level of LINES) this.contour(context, rows, level, [width, height]);
+      context.drawImage(picture, LEFT, TOP, width, height);
+      lines.forEach((cuts, at) => this.stroke(context, cuts, LINES[at], [width, height]));
     }
     this.axes(context, [all, tall], [width, height]);
     this.read();
+  }
+
+  /** What does not change while the point that is read moves. */
+  made() {
+    const rows = this.shown();
+    return rows ? { rows, picture: this.picture(rows), lines: LINES.map((level) => contour(rows, level)) } : {};
   }
 
   /** A pixel a state, the deepest above. */
@@ -137,33 +173,13 @@ export class StabilityMap {
     return canvas;
   }
 
-  /** The line along which a probability is reached: a piece in each square of four states (marching squares). */
-  contour(context, rows, level, [width, height]) {
-    const [n, m] = [rows.length - 1, rows[0].length - 1];
-    const point = (i, j) => [LEFT + (width * j) / m, TOP + height * (1 - i / n)];
+  /** A line of the map: dashed where the probability is small. */
+  stroke(context, cuts, level, [width, height]) {
     context.strokeStyle = "#fff";
     context.lineWidth = 1.4;
     context.setLineDash(level < 0.1 ? [5, 4] : []);
     context.beginPath();
-    for (let i = 0; i < n; i++) {
-      for (let j = 0; j < m; j++) {
-        const corners = [[i, j], [i, j + 1], [i + 1, j + 1], [i + 1, j]];
-        const values = corners.map(([a, b]) => rows[a][b] - level);
-        const cuts = [];
-        for (let k = 0; k < 4; k++) {
-          const [a, b] = [values[k], values[(k + 1) % 4]];
-          if (a < 0 !== b < 0) {
-            const share = a / (a - b);
-            const [from, to] = [corners[k], corners[(k + 1) % 4]];
-            cuts.push(point(from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])));
-          }
-        }
-        for (let k = 0; k + 1 < cuts.length; k += 2) {
-          context.moveTo(...cuts[k]);
-          context.lineTo(...cuts[k + 1]);
-        }
-      }
-    }
+    cuts.forEach(([speed, depth], at) => context[at % 2 === 0 ? "moveTo" : "lineTo"](LEFT + width * speed, TOP + height * (1 - depth)));
     context.stroke();
     context.setLineDash([]);
   }

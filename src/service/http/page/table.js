@@ -1,5 +1,7 @@
 // A table of states: the columns of a trial, SI units and radians by name, and the batches made of it.
 
+import { gravity } from "./matrix.js";
+
 const NUMBERS = [
   "t", "vx", "vy", "vz", "cx", "cy", "cz", "wx", "wy", "wz", "roll", "pitch", "yaw", "depth", "water_level", "bed_clearance", "bed",
   "ax", "ay", "az", "alx", "aly", "alz", "rho", "fx", "fy", "fz", "mx", "my", "mz",
@@ -54,8 +56,6 @@ function withAccelerations(columns) {
   if (!columns.alx) [columns.alx, columns.aly, columns.alz] = w.map(derivative);
   return columns;
 }
-
-const gravity = (roll, pitch) => [Math.sin(pitch), -Math.cos(pitch) * Math.sin(roll), -Math.cos(pitch) * Math.cos(roll)];
 
 /** The message wade.v1.EvaluateBatchRequest of some rows. */
 function batch(vehicle, { columns }, from, to) {
