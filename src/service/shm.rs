@@ -25,7 +25,7 @@ use crate::metrics::{Metrics, Recorder, Transport};
 use wade_core::served::ServedVehicle;
 use wade_wire::shm::layout::{
     Answer, BatchAnswer, BatchQuery, JacobianAnswer, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS,
-    Status, wake_name,
+    Status, VehicleAnswer, wake_name,
 };
 use wade_wire::shm::{
     Exchange, MAX_CLIENTS, NAMESPACE, ShmError, Wait, events, in_place, node, open, served as shm_served,
@@ -203,6 +203,7 @@ struct Ports {
     vehicle: String,
     single: Port<Query, Answer>,
     jacobian: Port<Query, JacobianAnswer>,
+    description: Port<Query, VehicleAnswer>,
     batch: Port<BatchQuery, BatchAnswer>,
     single_recorder: Arc<Recorder>,
     batch_recorder: Arc<Recorder>,
@@ -298,6 +299,7 @@ impl ShmServer {
         let single = Port::open(&self.node, &names.evaluate(&vehicle), clients + own)?;
         let batch = Port::open(&self.node, &names.evaluate_batch(&vehicle), clients)?;
         let jacobian = Port::open(&self.node, &names.evaluate_jacobian(&vehicle), clients)?;
+        let description = Port::open(&self.node, &names.vehicle(&vehicle), clients)?;
         for name in names.of_vehicle(&vehicle) {
             self.files.add(&name, MessagingPattern::RequestResponse);
         }
@@ -305,6 +307,7 @@ impl ShmServer {
         self.ports.push(Ports {
             single,
             jacobian,
+            description,
             batch,
             single_recorder: metrics.recorder(Transport::shm, &vehicle),
             batch_recorder: metrics.recorder(Transport::shm_batch, &vehicle),
@@ -392,8 +395,13 @@ impl ShmServer {
     fn answer_round(&mut self) -> bool {
         let mut any = false;
         for (number, ports) in self.ports.iter_mut().enumerate() {
-            any |= ports.single.take() | ports.jacobian.take() | ports.batch.take();
-            if let Ok(vehicle) = self.responder.engine.vehicle(&ports.vehicle) {
+            any |=
+                ports.single.take() | ports.jacobian.take() | ports.batch.take() | ports.description.take();
+            let served = self.responder.engine.vehicle(&ports.vehicle).ok();
+            for (_, request) in ports.description.waiting.drain(..) {
+                self.responder.describe(served.as_deref(), &request);
+            }
+            if let Some(vehicle) = served {
                 let at = At { vehicle: &vehicle, ports: number };
                 for (arrived, request) in ports.single.waiting.drain(..) {
                     self.responder.answer(at, arrived, &request, &ports.single_recorder);
@@ -493,6 +501,21 @@ impl Responder {
     /// Whether the server's own client asks.
     fn is_own(&self, client: UniqueClientId) -> bool {
         *self.own.lock().unwrap_or_else(PoisonError::into_inner) == Some(client)
+    }
+
+    /// Says what a vehicle is, or that it is not served any more.
+    fn describe(&mut self, vehicle: Option<&ServedVehicle>, request: &Request<Query, VehicleAnswer>) {
+        let query = copy(request.payload());
+        let Some(mut slot) = loaned(request.loan_uninit()) else { return };
+        let answer = in_place(slot.payload_mut());
+        answer.fill(vehicle);
+        (answer.sequence, answer.flags) = (query.sequence, self.flags);
+        let status = answer.status;
+        // SAFETY: it has been written, but for bytes that do not count, which are numbers too.
+        if sent(unsafe { slot.assume_init() }.send()) {
+            wake(&self.done, &mut self.sleepers, query.wake_key);
+        }
+        tracing::debug!(target: "wade::request", transport = "shm", description = true, status);
     }
 
     /// Says that the vehicle is not served any more.

@@ -8,7 +8,7 @@ use crate::common::{PATIENCE, Served, namespace, vehicles};
 use iceoryx2::node::NodeBuilder;
 use iceoryx2::prelude::ipc;
 use tempfile::TempDir;
-use wade_client::{ClientError, ShmClient};
+use wade_client::{ClientError, Method, ShmClient};
 use wade_wire::shm::Wait;
 use wade_wire::shm::layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_HEADING,
@@ -91,6 +91,22 @@ fn a_vehicle_that_is_not_served_is_an_error() {
     let served = Served::start();
     let error = served.shm("nautilus", Wait::Block).evaluate(&state()).expect_err("not served");
     assert!(matches!(error, ClientError::UnknownVehicle { .. }), "{error:?}");
+}
+
+#[test]
+fn a_vehicle_is_described_as_over_grpc() {
+    let served = Served::start();
+    for vehicle in ["husky", "warthog"] {
+        let expected = served.tcp(vehicle, Method::Unary).vehicle().expect("served");
+        for wait in [Wait::Block, Wait::Spin] {
+            let mut client = served.shm(vehicle, wait);
+            assert_eq!(client.vehicle().expect("described"), expected);
+            // on the ports that are open, and beside queries
+            client.evaluate(&state()).expect("forces");
+            assert_eq!(client.vehicle().expect("described again"), expected);
+        }
+        assert!(expected.surfaces.iter().any(|surface| surface.name == "wheel_fl"));
+    }
 }
 
 /// A client that writes what it likes, by the layout alone.

@@ -400,9 +400,12 @@ wade_status wade_evaluate_batch(wade_client *client,
                                 wade_forces *forces,
                                 wade_batch *batch);
 
-// Asks a server over gRPC, at most as long as the timeout, what it serves under a name. `address` as in `wade_options`, but not
-// shared memory, which does not carry it.
-wade_status wade_get_vehicle(const char *address, const char *vehicle, uint64_t timeout_ns, wade_vehicle *out);
+// Asks a server, at most as long as the timeout, what it serves under a name: names of surfaces, sizes, mass, domain. `address` as
+// in `wade_options`.
+wade_status wade_get_vehicle(const char *address,
+                             const char *vehicle,
+                             uint64_t timeout_ns,
+                             wade_vehicle *out);
 
 // Unit vector along gravity of a body with this roll and pitch [rad]: positive roll lowers the right side, positive pitch the
 // nose (REP-103).

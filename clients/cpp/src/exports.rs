@@ -219,8 +219,8 @@ pub unsafe extern "C" fn wade_evaluate_batch(
     })
 }
 
-/// Asks a server over gRPC, at most as long as the timeout, what it serves under a name. `address` as in `wade_options`, but not
-/// shared memory, which does not carry it.
+/// Asks a server, at most as long as the timeout, what it serves under a name: names of surfaces, sizes, mass, domain. `address` as
+/// in `wade_options`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_get_vehicle(
     address: *const c_char,
@@ -231,12 +231,9 @@ pub unsafe extern "C" fn wade_get_vehicle(
     guarded(|| {
         // SAFETY: the texts are null or have their ends; `out` is null or valid.
         let given = unsafe { (text(address).and_then(parsed), text(vehicle), out.as_mut()) };
-        let (Some(url), Some(vehicle), Some(out)) = (given.0.and_then(|at| at.url()), given.1, given.2)
-        else {
-            return WadeStatus::InvalidArgument;
-        };
+        let (Some(address), Some(vehicle), Some(out)) = given else { return WadeStatus::InvalidArgument };
         // connecting and asking have half of it each
-        match vehicle::get(url, vehicle.to_owned(), Duration::from_nanos(timeout_ns / 2)) {
+        match vehicle::get(address, vehicle.to_owned(), Duration::from_nanos(timeout_ns / 2)) {
             Ok(vehicle) => {
                 *out = *vehicle;
                 WadeStatus::Ok

@@ -3,22 +3,22 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use wade_client::{ClientError, GrpcClient, Method};
+use wade_client::{Address, ClientError, GrpcClient, Method, ShmClient};
 use wade_core::effects::Effect;
 use wade_wire::proto;
+use wade_wire::shm::Wait;
 
 use crate::abi::{WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE, WadeRange, WadeSurface, WadeVehicle};
 use crate::convert::write_text;
 use crate::worker::Worker;
 
-/// Asks the server at a URL, on a thread of its own: whoever calls is not to get a signal.
-pub fn get(url: String, vehicle: String, timeout: Duration) -> Result<Box<WadeVehicle>, ClientError> {
+/// Asks the server at an address, on a thread of its own: whoever calls is not to get a signal.
+pub fn get(address: Address, vehicle: String, timeout: Duration) -> Result<Box<WadeVehicle>, ClientError> {
     let (answer, answered) = channel();
-    let failed = |reason: &str| ClientError::NoServer { at: url.clone(), reason: reason.to_owned() };
-    let at = url.clone();
+    let failed = |reason: &str| ClientError::NoServer { at: address.to_string(), reason: reason.to_owned() };
+    let at = address.clone();
     let ask = move || {
-        let client = GrpcClient::tcp(&at, &vehicle, Method::Unary, timeout);
-        let response = client.and_then(|mut client| client.vehicle());
+        let response = described(&at, &vehicle, timeout);
         // nobody waits any more where it took too long
         let _ = answer.send(response.map(|response| Box::new(WadeVehicle::from(&response))));
     };
@@ -26,6 +26,18 @@ pub fn get(url: String, vehicle: String, timeout: Duration) -> Result<Box<WadeVe
     let asked = answered.recv().unwrap_or_else(|_| Err(failed("the thread that asked broke down")));
     worker.end();
     asked
+}
+
+fn described(
+    address: &Address,
+    vehicle: &str,
+    timeout: Duration,
+) -> Result<proto::GetVehicleResponse, ClientError> {
+    if let Address::Shm(namespace) = address {
+        return ShmClient::new(vehicle, Wait::Block, timeout).in_namespace(namespace).vehicle();
+    }
+    let url = address.url().unwrap_or_default();
+    GrpcClient::tcp(&url, vehicle, Method::Unary, timeout)?.vehicle()
 }
 
 fn vector(vector: &Option<proto::Vector3>) -> [f32; 3] {

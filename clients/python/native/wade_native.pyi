@@ -43,5 +43,8 @@ class Vehicle:
     def evaluate_batch(self, numbers: bytes, flags: int, sessions: bytes, surfaces: bool) -> bytes:
         """The answers to N rows of single-precision numbers; `sessions` has a word of 8 bytes for each, or none."""
 
+    def description(self) -> bytes:
+        """A `GetVehicleResponse` as it travels, without the mesh."""
+
     def stability(self, request: bytes) -> bytes:
         """The answer to a `GetStabilityRequest` as it travels."""

@@ -73,7 +73,7 @@ def rust_fields(struct: str) -> list[tuple[str, str]]:
 def rust_type(dtype: np.dtype[Any]) -> str:
     """How Rust writes a field of this type."""
     names = {"<u8": "u64", "<u4": "u32", "<f4": "f32", "|u1": "u8", "|S64": "[u8; PROVENANCE_LEN]"}
-    reserved = ("RESERVED_LEN", "RESERVED_LEFT")
+    reserved = ("RESERVED_LEN", "RESERVED_LEFT", "DESCRIPTION_LEN")
     rooms = ("MAX_SURFACES", "MAX_BATCH", "MAX_EFFECTS", "MAX_QUANTITIES", "MAX_WHEELS", "DERIVATIVES", *reserved)
     lengths = {getattr(shm_layout, room): room for room in rooms}
     structs = {shm_layout.QUERY: "Query", shm_layout.ANSWER: "Answer", shm_layout.BATCH_HEADER: "BatchHeader"}
@@ -96,6 +96,7 @@ def rust_type(dtype: np.dtype[Any]) -> str:
         ("BatchHeader", shm_layout.BATCH_HEADER),
         ("BatchQuery", shm_layout.BATCH_QUERY),
         ("BatchAnswer", shm_layout.BATCH_ANSWER),
+        ("VehicleAnswer", shm_layout.VEHICLE_ANSWER),
     ],
 )
 def test_the_layout_is_the_servers(struct: str, dtype: np.dtype[Any]) -> None:
@@ -161,13 +162,16 @@ def rust_numbers(pattern: str, text: str) -> dict[str, int]:
 
 
 def test_the_codes_and_limits_are_the_servers() -> None:
-    constants = rust_numbers(r"pub const (\w+): \w+ = (\d+);", LAYOUT)
+    constants = rust_numbers(r"pub const (\w+): \w+ = ([\d_]+);", LAYOUT)
     assert {name: getattr(shm_layout, name) for name in constants} == constants
     text = (CRATES / "wade-core" / "src" / "vehicle" / "mod.rs").read_text()
     assert rust_numbers(r"pub const (MAX_SURFACES): \w+ = (\d+);", text) == {"MAX_SURFACES": shm_layout.MAX_SURFACES}
     status = rust_numbers(r"    (\w+) = (\d+),", LAYOUT)
-    ours = (shm_layout.STATUS_OK, shm_layout.STATUS_INVALID_STATE, shm_layout.STATUS_NOT_SERVED)
-    assert (status["Ok"], status["InvalidState"], status["NotServed"]) == ours
+    ours = {
+        name: getattr(shm_layout, f"STATUS_{name.upper()}")
+        for name in ("OK", "INVALID_STATE", "NOT_SERVED", "TOO_LONG")
+    }
+    assert [status[name] for name in ("Ok", "InvalidState", "NotServed", "TooLong")] == [*ours.values()]
     fields = re.search(r"pub enum Field \{(.*?)\n    \}", WIRE, re.DOTALL)
     assert fields
     named = re.findall(r"^ +\w+ = (\d+) => \"(\w+)\",$", fields.group(1), re.MULTILINE)
@@ -185,6 +189,7 @@ def test_the_names_are_the_servers() -> None:
         shm_layout.evaluate_name("", "{vehicle}"),
         shm_layout.evaluate_batch_name("", "{vehicle}"),
         shm_layout.evaluate_jacobian_name("", "{vehicle}"),
+        shm_layout.vehicle_name("", "{vehicle}"),
         shm_layout.served_name(""),
         shm_layout.wake_name(""),
         shm_layout.done_name(""),

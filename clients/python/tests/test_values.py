@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,16 @@ def test_the_generated_stub_gets_the_same_with_fields_left_out(server: Server) -
         forces = client.evaluate("husky", wade.State(depth_m=0.1), timeout_s=20)
     np.testing.assert_array_equal(forces.surface_force_n.ravel(), np.array(answer.surface_force_n, np.float32))
     assert forces.moment_nm[1] == answer.wrench.moment_nm.y
+
+
+def test_every_client_describes_a_vehicle(client: Any, server: Server) -> None:
+    with wade.GrpcClient(server.address, timeout_s=20.0) as rpc:
+        expected = rpc.vehicle("husky")
+    vehicle = client.vehicle("husky")
+    np.testing.assert_equal(asdict(vehicle), asdict(expected))
+    assert vehicle.surfaces[-1].name == "wheel_rr" and vehicle.surfaces[-1].kind == "wheel"
+    with pytest.raises(wade.UnknownVehicle, match="husky"):
+        client.vehicle("nautilus")
 
 
 def test_a_vehicle_is_described_as_in_its_bundle(server: Server) -> None:

@@ -7,12 +7,12 @@ use tonic::Code;
 use super::shm_link::{Lost, ShmLink, not_served};
 use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply};
 use wade_core::effects::{Effect, LeftOut};
-use wade_wire::State;
 use wade_wire::shm::layout::{
     Answer, BatchAnswer, EffectAnswer, HAS_ADDED_MASS, HAS_DAMPING, JacobianAnswer, MAX_BATCH, Names, Query,
     Status, SurfaceAnswer,
 };
 use wade_wire::shm::{self, Wait};
+use wade_wire::{State, proto};
 
 /// A client of one vehicle, owned by one thread.
 #[derive(Debug)]
@@ -64,6 +64,25 @@ impl ShmClient {
         })?;
         self.check(&page.answer, state)?;
         Ok(page)
+    }
+
+    /// What the server says of the vehicle.
+    pub fn vehicle(&mut self) -> Result<proto::GetVehicleResponse, ClientError> {
+        let (names, vehicle, timeout) = (self.names.clone(), self.vehicle.clone(), self.timeout);
+        let deadline = Instant::now() + timeout;
+        let answered =
+            self.link()?.describe(&names, &vehicle, deadline, |answer| (answer.status, answer.decoded()));
+        let refused = |code, message: String| Err(ClientError::Refused { code, message });
+        match answered.inspect_err(|_| self.link = None)? {
+            None => Err(ClientError::Timeout(timeout)),
+            Some((status, description)) if status == Status::Ok as u32 => description
+                .or_else(|error| refused(Code::DataLoss, format!("the description cannot be read: {error}"))),
+            Some((status, _)) if status == Status::TooLong as u32 => {
+                let message = "the description has no room in shared memory; gRPC gives it";
+                refused(Code::ResourceExhausted, message.into())
+            }
+            Some((status, _)) => Err(self.refused(status)),
+        }
     }
 
     /// Passes an answer that has forces.

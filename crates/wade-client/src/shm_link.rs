@@ -19,7 +19,7 @@ use tonic::Code;
 use super::ClientError;
 use wade_wire::shm::layout::{
     Answer, BatchAnswer, BatchHeader, BatchQuery, JacobianAnswer, Names, Query, SERVER_POLLS, VERSION,
-    wake_name,
+    VehicleAnswer, wake_name,
 };
 use wade_wire::shm::served::{self, Served};
 use wade_wire::shm::{self, OpenError, ShmError, Wait, room};
@@ -148,23 +148,33 @@ impl ShmLink {
 
     /// Opens the port for derivatives, where it is not open yet. Takes milliseconds.
     pub fn open_jacobian(&mut self, names: &Names, vehicle: &str) -> Result<(), ClientError> {
-        if self.jacobian.is_some() {
-            return Ok(());
+        if self.jacobian.is_none() {
+            let at = names.evaluate_jacobian(vehicle);
+            self.jacobian = Some(later_port(&self.node, at, vehicle, "derivatives")?);
         }
-        let at = names.evaluate_jacobian(vehicle);
-        let service =
-            shm::open::<_, Query, JacobianAnswer>(&self.node, &at).map_err(|error| match error {
-                OpenError::Failed(error) => ClientError::NoServer { at, reason: error.to_string() },
-                OpenError::Absent | OpenError::OtherTypes => ClientError::Refused {
-                    code: Code::Unimplemented,
-                    message: format!(
-                        "the server has no derivatives over shared memory: it is of an earlier version ({at})"
-                    ),
-                },
-            })?;
-        let port = service.client_builder().create().map_err(|error| no_place(vehicle, &error))?;
-        self.jacobian = Some(port);
         Ok(())
+    }
+
+    /// What the server says of the vehicle; none where it does not answer until the deadline. Opens a port for this one
+    /// question, which takes milliseconds.
+    pub fn describe<T>(
+        &mut self,
+        names: &Names,
+        vehicle: &str,
+        deadline: Instant,
+        take: impl FnOnce(&VehicleAnswer) -> T,
+    ) -> Result<Option<T>, ClientError> {
+        let at = names.vehicle(vehicle);
+        let lost =
+            |lost: Lost| ClientError::NoServer { at: names.vehicle(vehicle), reason: lost.to_string() };
+        let port: Client<Ipc, Query, (), VehicleAnswer, ()> =
+            later_port(&self.node, at, vehicle, "descriptions")?;
+        let (sequence, wake_key) = (self.next_sequence(), self.wake_key());
+        let pending = port.send_copy(Query { sequence, wake_key, owner: self.owner, ..Query::UNSET });
+        let pending = pending.map_err(|error| lost(Lost::Send(error)))?;
+        self.notify();
+        let asked = connected(pending).map_err(lost)?;
+        self.until(deadline, &asked, |answer| (answer.flags, take(answer))).map_err(lost)
     }
 
     /// Asks for the forces in one state with their derivatives, once [`Self::open_jacobian`] has opened the port.
@@ -273,6 +283,25 @@ fn no_place(vehicle: &str, error: &dyn std::fmt::Display) -> ClientError {
         code: Code::ResourceExhausted,
         message: format!("no place for another client of {vehicle}: {error}; the limit is shm.max_clients"),
     }
+}
+
+/// A port to a service that servers of the first day do not have.
+fn later_port<A: ZeroCopySend + std::fmt::Debug + 'static>(
+    node: &Node<Ipc>,
+    at: String,
+    vehicle: &str,
+    what: &str,
+) -> Result<Client<Ipc, Query, (), A, ()>, ClientError> {
+    let service = shm::open::<_, Query, A>(node, &at).map_err(|error| match error {
+        OpenError::Failed(error) => ClientError::NoServer { at, reason: error.to_string() },
+        OpenError::Absent | OpenError::OtherTypes => ClientError::Refused {
+            code: Code::Unimplemented,
+            message: format!(
+                "the server has no {what} over shared memory: it is of an earlier version ({at})"
+            ),
+        },
+    })?;
+    service.client_builder().create().map_err(|error| no_place(vehicle, &error))
 }
 
 fn connected<Q, A>(pending: PendingResponse<Ipc, Q, (), A, ()>) -> Result<Asked<Q, A>, Lost>

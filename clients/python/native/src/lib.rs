@@ -99,6 +99,10 @@ impl Vehicle {
         columns::effects(&self.served).iter().map(|effect| effect.effect().code()).collect()
     }
 
+    fn description<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &wade_wire::vehicle(&self.served, false).encode_to_vec())
+    }
+
     fn columns<'py>(
         &self,
         py: Python<'py>,

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from .forces import Forces
 from .state import State
+from .vehicle import Vehicle
 
 #: Longest wait for an answer unless the caller says otherwise [s].
 DEFAULT_TIMEOUT_S = 1.0
@@ -59,6 +60,9 @@ class Client(Protocol):
 
     def vehicles(self, *, timeout_s: float | None = None) -> list[str]:
         """Names of the vehicles that are served."""
+
+    def vehicle(self, name: str, *, timeout_s: float | None = None) -> Vehicle:
+        """Surfaces and their names, dimensions, mass and training domain of a vehicle."""
 
     def close(self) -> None:
         """Lets go of the server. A call after it connects anew."""

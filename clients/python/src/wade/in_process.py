@@ -20,6 +20,7 @@ from .local import SessionStream, flags, session_numbers
 from .stability import DEFAULT_TIMEOUT_S as MAP_TIMEOUT_S
 from .stability import Ford, Stability
 from .state import SCALARS, TOLD, VECTORS, State
+from .vehicle import Vehicle
 from .version import VERSION
 
 if TYPE_CHECKING:
@@ -112,6 +113,11 @@ class InProcess:
         except self._native.UnreadableVehicle as error:
             raise WadeError(str(error)) from None
         return names
+
+    def vehicle(self, name: str, *, timeout_s: float | None = None) -> Vehicle:
+        """Surfaces, dimensions, mass and training domain of a vehicle, without its mesh."""
+        _check(timeout_s)
+        return messages.vehicle_of_bytes(self._vehicle(name).native.description())
 
     def close(self) -> None:
         """Drops the vehicles and their sessions. A call after it reads them again."""

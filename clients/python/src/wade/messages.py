@@ -365,6 +365,11 @@ def stability(response: Any, ford: Ford) -> Stability:
     )
 
 
+def vehicle_of_bytes(data: bytes) -> Vehicle:
+    """The same as `vehicle` of a message as it travels."""
+    return vehicle(_MESSAGES[f"{_PACKAGE}.GetVehicleResponse"].FromString(data))
+
+
 def stability_of_bytes(data: bytes, ford: Ford) -> Stability:
     """The same of a message as it travels."""
     return stability(_MESSAGES[f"{_PACKAGE}.GetStabilityResponse"].FromString(data), ford)

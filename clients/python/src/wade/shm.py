@@ -17,13 +17,15 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from . import messages
 from . import shm_layout as layout
 from .client import DEFAULT_TIMEOUT_S, check_query, checked_timeout
-from .errors import DeadlineExceeded, InvalidState, Refused, ServerUnavailable, Violation
+from .errors import DeadlineExceeded, InvalidState, Refused, ResourceExhausted, ServerUnavailable, Violation
 from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
 from .local import SessionStream, flags, session_numbers
-from .shm_link import BATCH, JACOBIAN, SINGLE, Link, Lost, Service, memory, vehicles
+from .shm_link import BATCH, JACOBIAN, SINGLE, VEHICLE, Link, Lost, Service, memory, vehicles
 from .state import TOLD_AT, State
+from .vehicle import Vehicle
 
 _T = TypeVar("_T")
 
@@ -122,6 +124,18 @@ class ShmClient:
         self._end(timeout_s)
         return vehicles(self.namespace)
 
+    def vehicle(self, name: str, *, timeout_s: float | None = None) -> Vehicle:
+        """Surfaces, dimensions, mass and training domain of a vehicle, without its mesh."""
+        timeout_s, end = self._end(timeout_s)
+
+        def write(address: int, wake_key: int) -> None:
+            query = np.frombuffer(memory(address, layout.QUERY.itemsize), layout.QUERY)
+            query[...] = layout.UNSET_QUERY
+            query["sequence"], query["wake_key"], query["owner"] = self._sequence, wake_key, self._owner
+
+        with self._lock:
+            return messages.vehicle_of_bytes(self._exchange(name, VEHICLE, write, _read_description, end, timeout_s))
+
     def close(self) -> None:
         """Gives up the ports. A call after it opens new ones."""
         with self._lock:
@@ -195,6 +209,14 @@ def _query(who: tuple[int, int, int, int], floats: list[float], owner: int) -> b
 def _read(address: int, dtype: np.dtype[Any]) -> np.void:
     page: np.void = np.frombuffer(ctypes.string_at(address, dtype.itemsize), dtype)[0]
     return page
+
+
+def _read_description(address: int) -> bytes:
+    answer = np.frombuffer(memory(address, layout.VEHICLE_ANSWER.itemsize), layout.VEHICLE_ANSWER)[0]
+    if answer["status"] == layout.STATUS_TOO_LONG:
+        raise ResourceExhausted("the description has no room in shared memory; gRPC gives it", None)
+    description: bytes = answer["description"][: int(answer["len"])].tobytes()
+    return description
 
 
 def _write_batch(

@@ -21,6 +21,7 @@ MAX_QUANTITIES = 16
 MAX_WHEELS = 8
 PROVENANCE_LEN = 64
 RESERVED_LEN = 128
+DESCRIPTION_LEN = 65_376
 RESERVED_LEFT = 120
 
 #: Attributes of the service of `served_name`: the version of the layout, and lists of the vehicles that are served.
@@ -59,6 +60,7 @@ HAS_SHAFT_POWER = 32
 STATUS_OK = 0
 STATUS_INVALID_STATE = 1
 STATUS_NOT_SERVED = 3
+STATUS_TOO_LONG = 4
 
 _RESERVED: tuple[str, str, int] = ("reserved", "u1", RESERVED_LEN)
 
@@ -212,6 +214,19 @@ def fields(dtype: np.dtype[Any]) -> dict[str, tuple[np.dtype[Any], int]]:
     return {name: (field[0], field[1]) for name, field in dtype.fields.items()}
 
 
+#: What a server says of a vehicle: the bytes of a `GetVehicleResponse`.
+VEHICLE_ANSWER = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("flags", "<u8"),
+        ("status", "<u4"),
+        ("len", "<u4"),
+        _RESERVED,
+        ("description", "u1", DESCRIPTION_LEN),
+    ]
+)
+
+
 def _pack_format(dtype: np.dtype[Any]) -> str:
     # what is reserved becomes zero
     codes = {"<u8": "Q", "<u4": "I", "<f4": "f", "|u1": "x"}
@@ -248,6 +263,7 @@ Answer = _payload("Answer", ANSWER)
 JacobianAnswer = _payload("JacobianAnswer", JACOBIAN_ANSWER)
 BatchQuery = _payload("BatchQuery", BATCH_QUERY)
 BatchAnswer = _payload("BatchAnswer", BATCH_ANSWER)
+VehicleAnswer = _payload("VehicleAnswer", VEHICLE_ANSWER)
 
 
 def evaluate_name(namespace: str, vehicle: str) -> str:
@@ -263,6 +279,11 @@ def evaluate_batch_name(namespace: str, vehicle: str) -> str:
 def evaluate_jacobian_name(namespace: str, vehicle: str) -> str:
     """Name of a vehicle's service for single states with derivatives."""
     return f"{namespace}/{VERSION}/evaluate_jacobian/{vehicle}"
+
+
+def vehicle_name(namespace: str, vehicle: str) -> str:
+    """Name of the service that describes a vehicle."""
+    return f"{namespace}/{VERSION}/vehicle/{vehicle}"
 
 
 def served_name(namespace: str) -> str:

@@ -45,7 +45,12 @@ class Service:
 SINGLE = Service(layout.evaluate_name, (layout.Query, layout.Answer), layout.ANSWER)
 #: Its answer begins with that of a single state.
 JACOBIAN = Service(layout.evaluate_jacobian_name, (layout.Query, layout.JacobianAnswer), layout.ANSWER)
+#: Its query is not read.
+VEHICLE = Service(layout.vehicle_name, (layout.Query, layout.VehicleAnswer), layout.VEHICLE_ANSWER)
 BATCH = Service(layout.evaluate_batch_name, (layout.BatchQuery, layout.BatchAnswer), layout.BATCH_ANSWER)
+
+#: What servers of the first day do not have.
+_LATER = {JACOBIAN: "derivatives", VEHICLE: "descriptions"}
 
 # its log would go to standard output, and says of every server that is not there that it is not there
 iox.set_log_level_from_env_or(iox.LogLevel.Fatal)
@@ -169,8 +174,8 @@ class Link:
             return failure
         if vehicle not in served:
             return UnknownVehicle(vehicle, f"vehicle {vehicle!r} is not served; there are: {', '.join(served)}")
-        if service is JACOBIAN:
-            return Refused("no derivatives", "over shared memory the server has none; it is of an earlier version")
+        if (what := _LATER.get(service)) is not None:
+            return Refused(f"no {what}", "over shared memory the server has none; it is of an earlier version")
         return ServerUnavailable(self._at(), f"the server has not opened {vehicle}")
 
     def _not_served(self, vehicle: str) -> UnknownVehicle:

@@ -1,11 +1,15 @@
 //! Between the pages of shared memory and what is behind them: a query to a checked kind of state, an evaluation to an answer.
 
+use prost::Message;
+
 use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, FULL, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE,
     HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_SHAFT_POWER, HAS_WATER_LEVEL, HAS_WHEEL_COUNT,
     HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, JACOBIAN, JacobianAnswer,
-    MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, Status, SurfaceAnswer,
+    MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, RESERVED_LEN, Status,
+    SurfaceAnswer, VehicleAnswer,
 };
+use crate::proto;
 use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, by_rows, single};
 use wade_core::domain::{Outside, Quantity};
 use wade_core::effects::{BoxQuantity, OutsideBox};
@@ -326,6 +330,30 @@ fn known<const N: usize>(excess: &[f32]) -> [f64; N] {
     std::array::from_fn(|i| excess.get(i).filter(|excess| !excess.is_nan()).map_or(0.0, |&x| f64::from(x)))
 }
 
+impl VehicleAnswer {
+    /// Becomes the description of a vehicle, or says that it is not served any more.
+    pub fn fill(&mut self, vehicle: Option<&ServedVehicle>) {
+        (self.status, self.len, self.reserved) = (Status::NotServed as u32, 0, [0; RESERVED_LEN]);
+        if let Some(vehicle) = vehicle {
+            self.hold(&crate::vehicle(vehicle, false).encode_to_vec());
+        }
+    }
+
+    fn hold(&mut self, description: &[u8]) {
+        self.status = Status::TooLong as u32;
+        if let Some(room) = self.description.get_mut(..description.len()) {
+            room.copy_from_slice(description);
+            (self.status, self.len) = (Status::Ok as u32, description.len() as u32);
+        }
+    }
+
+    /// The description, where the status says that there is one.
+    pub fn decoded(&self) -> Result<proto::GetVehicleResponse, prost::DecodeError> {
+        let len = (self.len as usize).min(self.description.len());
+        proto::GetVehicleResponse::decode(&self.description[..len])
+    }
+}
+
 impl BatchAnswer {
     /// What was wrong with which of the states that were asked about, where something was.
     pub fn refusal_of(&self, states: &[State]) -> Option<(InvalidState, usize)> {
@@ -333,5 +361,29 @@ impl BatchAnswer {
         (self.status == Status::InvalidState as u32)
             .then(|| Some((self.answers[index].refusal_of(states.get(index)?)?, index)))
             .flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shm::layout::DESCRIPTION_LEN;
+
+    #[test]
+    fn a_description_without_room_is_said_to_be_too_long() {
+        let unset = VehicleAnswer {
+            sequence: 0,
+            flags: 0,
+            status: 0,
+            len: 0,
+            reserved: [0; RESERVED_LEN],
+            description: [0; DESCRIPTION_LEN],
+        };
+        for (len, status) in [(DESCRIPTION_LEN, Status::Ok), (DESCRIPTION_LEN + 1, Status::TooLong)] {
+            let mut answer = unset;
+            answer.hold(&vec![7; len]);
+            let held = if status == Status::Ok { len as u32 } else { 0 };
+            assert_eq!((answer.status, answer.len), (status as u32, held));
+        }
     }
 }

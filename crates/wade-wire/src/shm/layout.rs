@@ -5,6 +5,7 @@
 //! | `<namespace>/v4/evaluate/<vehicle>` | request-response | [`Query`] | [`Answer`] |
 //! | `<namespace>/v4/evaluate_batch/<vehicle>` | request-response | [`BatchQuery`] | [`BatchAnswer`] |
 //! | `<namespace>/v4/evaluate_jacobian/<vehicle>` | request-response | [`Query`] | [`JacobianAnswer`] |
+//! | `<namespace>/v4/vehicle/<vehicle>` | request-response | [`Query`], whose state is not read | [`VehicleAnswer`] |
 //! | `<namespace>/v4/wake` | event | a client wakes the server | |
 //! | `<namespace>/v4/done` | event | the server wakes the one client whose listener is called [`wake_name`] | |
 //! | `<namespace>/served` | event | nobody connects: its attributes tell [`SERVED_LAYOUT`] and [`SERVED_VEHICLES`], in every version | |
@@ -34,6 +35,8 @@ pub const MAX_EFFECTS: usize = 32;
 pub const MAX_QUANTITIES: usize = 16;
 /// Room for wheels.
 pub const MAX_WHEELS: usize = wade_core::vehicle::MAX_WHEELS;
+/// Room for the description of a vehicle [bytes]: 64 surfaces and 32 effects with long names take 40,000.
+pub const DESCRIPTION_LEN: usize = 65_376;
 /// Length of the provenance, which is cut to fit.
 pub const PROVENANCE_LEN: usize = 64;
 /// Bytes that each message had without a meaning when the layout began.
@@ -76,9 +79,15 @@ impl Names {
         format!("{}/{VERSION}/evaluate_jacobian/{vehicle}", self.namespace)
     }
 
+    /// The service that describes a vehicle.
+    pub fn vehicle(&self, vehicle: &str) -> String {
+        format!("{}/{VERSION}/vehicle/{vehicle}", self.namespace)
+    }
+
     /// Every service of a vehicle.
-    pub fn of_vehicle(&self, vehicle: &str) -> [String; 3] {
-        [self.evaluate(vehicle), self.evaluate_batch(vehicle), self.evaluate_jacobian(vehicle)]
+    pub fn of_vehicle(&self, vehicle: &str) -> [String; 4] {
+        let [single, batch] = [self.evaluate(vehicle), self.evaluate_batch(vehicle)];
+        [single, batch, self.evaluate_jacobian(vehicle), self.vehicle(vehicle)]
     }
 
     /// Service whose attributes tell which layout and vehicles are served, whatever the version of the layout.
@@ -307,6 +316,25 @@ pub struct JacobianAnswer {
     pub reserved: [u8; RESERVED_LEN],
 }
 
+/// What a server says of a vehicle. 65,528 bytes.
+#[derive(Debug, Clone, Copy, ZeroCopySend)]
+#[repr(C)]
+#[type_name("wade::v4::VehicleAnswer")]
+pub struct VehicleAnswer {
+    /// The query's number.
+    pub sequence: u64,
+    /// [`SERVER_POLLS`]
+    pub flags: u64,
+    /// [`Status`]
+    pub status: u32,
+    /// How many bytes of `description` count.
+    pub len: u32,
+    /// Zero.
+    pub reserved: [u8; RESERVED_LEN],
+    /// The bytes of a `GetVehicleResponse` of proto/wade/v1/hydrodynamics.proto, without the mesh.
+    pub description: [u8; DESCRIPTION_LEN],
+}
+
 /// What comes before the states of a batch. 160 bytes.
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[repr(C)]
@@ -374,6 +402,8 @@ pub enum Status {
     InvalidBatch = 2,
     /// The vehicle is not served any more; there are no forces.
     NotServed = 3,
+    /// The description is longer than [`DESCRIPTION_LEN`]; it is answered over gRPC.
+    TooLong = 4,
 }
 
 impl Query {
@@ -469,6 +499,7 @@ const _: () = assert!(size_of::<Query>() == 328 && align_of::<Query>() == 8);
 const _: () = assert!(size_of::<EffectAnswer>() == 32 && size_of::<SurfaceAnswer>() == 52);
 const _: () = assert!(size_of::<Answer>() == 5080 && align_of::<Answer>() == 8);
 const _: () = assert!(size_of::<JacobianAnswer>() == 5080 + 4 * DERIVATIVES + RESERVED_LEN);
+const _: () = assert!(size_of::<VehicleAnswer>() == 152 + DESCRIPTION_LEN);
 const _: () = assert!(size_of::<BatchHeader>() == 160);
 const _: () = assert!(size_of::<BatchQuery>() == 160 + 328 * MAX_BATCH);
 const _: () = assert!(size_of::<BatchAnswer>() == 168 + 5080 * MAX_BATCH);
