@@ -92,6 +92,7 @@ wade::Motion engine_step(const wade::Body& body, const wade::Motion& motion, con
 wade::Ask Planted::ask() {
   return [this](const wade_state& state, std::uint64_t, wade_forces& forces) {
     now_ += 1000;
+    ++alone;
     last_question = state;
     if (mode == Mode::Gone) return WADE_STATUS_NO_SERVER;
     const bool late = mode == Mode::Late;
@@ -105,6 +106,19 @@ wade::Ask Planted::ask() {
     forces.age_ns = late ? now_ - open_since_ : 1000;
     if (late) open_question_ = state, open_since_ = now_ - 1000;
     return late ? WADE_STATUS_TIMEOUT : WADE_STATUS_OK;
+  };
+}
+
+wade::AskBatch Planted::ask_batch() {
+  return [this](const wade_state* states, std::size_t count, std::uint64_t, wade_forces* forces) {
+    now_ += 1000;
+    ++batches;
+    if (mode != Mode::InTime) return mode == Mode::Gone ? WADE_STATUS_NO_SERVER : WADE_STATUS_TIMEOUT;
+    for (std::size_t i = 0; i < count; ++i) {
+      forces[i] = box_.answer(states[i]);
+      forces[i].age_ns = 1000;
+    }
+    return WADE_STATUS_OK;
   };
 }
 

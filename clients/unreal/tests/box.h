@@ -6,7 +6,7 @@
 
 #pragma once
 
-#include "core/hydrodynamics.h"
+#include "core/fleet.h"
 
 struct Box {
   double length = 1.0;  // [m]
@@ -38,12 +38,17 @@ class Planted {
   explicit Planted(const Box& box) : box_(box) {}
 
   wade::Ask ask();
+  // Of a batch that is late nothing is kept.
+  wade::AskBatch ask_batch();
   wade::Clock clock();
   // The table that the box's answers make.
   std::shared_ptr<const wade::RestTable> table() const;
 
   Mode mode = Mode::InTime;
   wade_state last_question{};
+  // Requests so far.
+  int alone = 0;
+  int batches = 0;
 
  private:
   Box box_;

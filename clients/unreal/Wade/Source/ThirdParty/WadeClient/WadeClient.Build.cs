@@ -31,7 +31,7 @@ public class WadeClient : ModuleRules
 			if (Target.Platform != UnrealTargetPlatform.Mac)
 			{
 				// the name that the library has in itself, under which the loader looks for it
-				RuntimeDependencies.Add(Library + ".1");
+				RuntimeDependencies.Add(Path.Combine(Required(Libraries, Name + ".2"), Name + ".2"));
 			}
 		}
 	}

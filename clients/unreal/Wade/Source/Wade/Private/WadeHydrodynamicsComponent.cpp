@@ -5,8 +5,6 @@
 #include "Engine/HitResult.h"
 #include "Engine/World.h"
 #include "GameFramework/Actor.h"
-#include "PBDRigidsSolver.h"
-#include "Physics/Experimental/PhysScene_Chaos.h"
 #include "PhysicsEngine/BodyInstance.h"
 #include "WadeAxes.h"
 #include "WadeDebugDraw.h"
@@ -14,6 +12,7 @@
 #include "WadeModule.h"
 #include "WadeSettings.h"
 #include "WadeSimCallback.h"
+#include "WadeWorld.h"
 
 #include <limits>
 #include <optional>
@@ -71,17 +70,22 @@ void UWadeHydrodynamicsComponent::BeginPlay()
 		return;
 	}
 	const UWadeSettings* Settings = GetDefault<UWadeSettings>();
-	Link = MakeShared<FWadeLink, ESPMode::ThreadSafe>(Settings->Address(), Vehicle, Settings->bPollForAnswers);
-	FPhysScene* Scene = GetWorld()->GetPhysicsScene();
-	if (!Link->IsOpen() || Scene == nullptr)
+	const TSharedRef<FWadeLink, ESPMode::ThreadSafe> Link =
+		MakeShared<FWadeLink, ESPMode::ThreadSafe>(Settings->Address(), Vehicle, Settings->bPollForAnswers);
+	UWadeWorld* WadeWorld = FindWadeWorld();
+	if (!Link->IsOpen() || WadeWorld == nullptr)
 	{
 		return;
 	}
 	wade::Pacing Pacing;
 	Pacing.substep = 1.0e-3 * Settings->SubstepMilliseconds;
-	Pacing.budget_ns = 1000ull * Settings->BudgetMicroseconds;
-	Callback = Scene->GetSolver()->CreateAndRegisterSimCallbackObject_External<FWadeSimCallback>();
-	Callback->Begin(Link, Pacing);
+	Pacing.budget_ns = 1000ull * uint64(Settings->BudgetMicroseconds);
+	const TSharedRef<FWadeVehicle, ESPMode::ThreadSafe> Made = MakeShared<FWadeVehicle, ESPMode::ThreadSafe>(Link, Pacing);
+	if (!WadeWorld->AddVehicle(Made))
+	{
+		return;
+	}
+	Acting = Made;
 	Body->OnComponentPhysicsStateChanged.AddDynamic(this, &UWadeHydrodynamicsComponent::OnPhysicsStateChanged);
 	SetLinkState(EWadeLinkState::Connecting);
 }
@@ -92,14 +96,12 @@ void UWadeHydrodynamicsComponent::EndPlay(const EEndPlayReason::Type EndPlayReas
 	{
 		Body->OnComponentPhysicsStateChanged.RemoveDynamic(this, &UWadeHydrodynamicsComponent::OnPhysicsStateChanged);
 	}
-	FPhysScene* Scene = GetWorld()->GetPhysicsScene();
-	if (Callback != nullptr && Scene != nullptr)
+	UWadeWorld* WadeWorld = FindWadeWorld();
+	if (Acting.IsValid() && WadeWorld != nullptr)
 	{
-		// the solver frees it when its thread is done with it, and with it the last hold on the link
-		Scene->GetSolver()->UnregisterAndFreeSimCallbackObject_External(Callback);
+		WadeWorld->RemoveVehicle(Acting);
 	}
-	Callback = nullptr;
-	Link.Reset();
+	Acting.Reset();
 	Latest.Reset();
 	SetLinkState(EWadeLinkState::Disconnected);
 	Super::EndPlay(EndPlayReason);
@@ -108,7 +110,7 @@ void UWadeHydrodynamicsComponent::EndPlay(const EEndPlayReason::Type EndPlayReas
 void UWadeHydrodynamicsComponent::TickComponent(float DeltaTime, ELevelTick TickType, FActorComponentTickFunction* ThisTickFunction)
 {
 	Super::TickComponent(DeltaTime, TickType, ThisTickFunction);
-	if (Callback == nullptr)
+	if (!Acting.IsValid() || FindWadeWorld() == nullptr)
 	{
 		return;
 	}
@@ -122,10 +124,19 @@ void UWadeHydrodynamicsComponent::TickComponent(float DeltaTime, ELevelTick Tick
 
 void UWadeHydrodynamicsComponent::OnPhysicsStateChanged(UPrimitiveComponent* /*Changed*/, EComponentPhysicsStateChange Change)
 {
-	if (Callback != nullptr && Change == EComponentPhysicsStateChange::Destroyed)
+	UWadeWorld* WadeWorld = FindWadeWorld();
+	if (Acting.IsValid() && WadeWorld != nullptr && Change == EComponentPhysicsStateChange::Destroyed)
 	{
-		Callback->GetProducerInputData_External()->Scene = FWadeScene();
+		FWadeScene Scene;
+		Scene.Vehicle = Acting;
+		WadeWorld->SetScene(Scene);
 	}
+}
+
+UWadeWorld* UWadeHydrodynamicsComponent::FindWadeWorld() const
+{
+	const UWorld* World = GetWorld();
+	return World != nullptr ? World->GetSubsystem<UWadeWorld>() : nullptr;
 }
 
 UPrimitiveComponent* UWadeHydrodynamicsComponent::FindBody() const
@@ -163,10 +174,7 @@ double UWadeHydrodynamicsComponent::TraceBedAt(const FVector& Location) const
 
 void UWadeHydrodynamicsComponent::TakeOutput()
 {
-	while (Chaos::TSimCallbackOutputHandle<FWadeSimOutput> Output = Callback->PopOutputData_External())
-	{
-		Latest = MakeShared<FWadeReport>(Output->Report);
-	}
+	Latest = FindWadeWorld()->LatestReport(Acting);
 	if (!Latest.IsValid())
 	{
 		return;
@@ -178,22 +186,24 @@ void UWadeHydrodynamicsComponent::TakeOutput()
 		Hull.center_of_mass = Latest->CenterOfMass;
 		Hull.z0 = wade::axes::meters_per_unit * GroundContactZ;
 		Hull.radius = RadiusOf(HullRadius);
-		Link->RefreshTable(Latest->BundleVersion, Hull);
+		Acting->Link->RefreshTable(Latest->BundleVersion, Hull);
 	}
 }
 
 void UWadeHydrodynamicsComponent::GiveInput()
 {
-	FWadeScene& Scene = Callback->GetProducerInputData_External()->Scene;
+	FWadeScene Scene;
+	Scene.Vehicle = Acting;
 	const UPrimitiveComponent* Body = FindBody();
 	FBodyInstance* Instance = Body != nullptr ? Body->GetBodyInstance(Bone) : nullptr;
 	Scene.Proxy = Instance != nullptr ? Instance->GetPhysicsActorHandle() : nullptr;
 	if (Body == nullptr || Scene.Proxy == nullptr)
 	{
+		FindWadeWorld()->SetScene(Scene);
 		return;
 	}
 	Scene.HullInBody = HullInBody;
-	Scene.Table = Link->Table();
+	Scene.Table = Acting->Link->Table();
 	Scene.Beginnings = Beginnings;
 	Scene.Surroundings.z0 = wade::axes::meters_per_unit * GroundContactZ;
 	Scene.Surroundings.radius = RadiusOf(HullRadius);
@@ -219,6 +229,7 @@ void UWadeHydrodynamicsComponent::GiveInput()
 		Sample.BedHeight = TraceBedAt(Location);
 	}
 	Scene.Water.bed_height = Sample.bBedKnown ? std::optional<double>(wade::axes::meters_per_unit * Sample.BedHeight) : std::nullopt;
+	FindWadeWorld()->SetScene(Scene);
 }
 
 void UWadeHydrodynamicsComponent::SetLinkState(EWadeLinkState State)
@@ -229,13 +240,13 @@ void UWadeHydrodynamicsComponent::SetLinkState(EWadeLinkState State)
 	}
 	LinkState = State;
 	const FString Name = UEnum::GetValueAsString(State);
-	if (State == EWadeLinkState::Serving || !Link.IsValid())
+	if (State == EWadeLinkState::Serving || !Acting.IsValid())
 	{
 		UE_LOG(LogWade, Log, TEXT("%s (%s): %s"), *GetOwner()->GetName(), *Vehicle, *Name);
 	}
 	else
 	{
-		UE_LOG(LogWade, Warning, TEXT("%s (%s): %s. %s"), *GetOwner()->GetName(), *Vehicle, *Name, *Link->Reason());
+		UE_LOG(LogWade, Warning, TEXT("%s (%s): %s. %s"), *GetOwner()->GetName(), *Vehicle, *Name, *Acting->Link->Reason());
 	}
 	OnLinkStateChanged.Broadcast(State);
 }

@@ -49,8 +49,11 @@ namespace
 FWadeLink::FWadeLink(const FString& InAddress, const FString& InVehicle, bool bPoll)
 	: Address(InAddress)
 	, Vehicle(InVehicle)
+	, GroupName(TCHAR_TO_UTF8(*(InAddress + TEXT(" ") + InVehicle)))
+	, bBatches(InAddress.StartsWith(TEXT("shm:")))
 {
-	const wade_status Status = Open(Address, Vehicle, bPoll ? WADE_WAIT_SPIN : WADE_WAIT_BLOCK, 0, Client);
+	const uint32 MaxBatch = bBatches ? uint32(wade::Fleet::most_in_batch) : 0;
+	const wade_status Status = Open(Address, Vehicle, bPoll ? WADE_WAIT_SPIN : WADE_WAIT_BLOCK, MaxBatch, Client);
 	if (Status != WADE_STATUS_OK)
 	{
 		UE_LOG(LogWade, Error, TEXT("%s at %s: %s"), *Vehicle, *Address, UTF8_TO_TCHAR(wade_status_message(Status)));
@@ -68,6 +71,11 @@ FWadeLink::~FWadeLink()
 wade_status FWadeLink::Evaluate(const wade_state& State, uint64 BudgetNs, wade_forces& Forces) const
 {
 	return wade_evaluate(Client, &State, BudgetNs, &Forces);
+}
+
+wade_status FWadeLink::EvaluateBatch(const wade_state* States, size_t Count, uint64 BudgetNs, wade_forces* Forces) const
+{
+	return wade_evaluate_batch(Client, States, Count, BudgetNs, Forces, nullptr);
 }
 
 FString FWadeLink::Reason() const

@@ -4,9 +4,10 @@
 
 #include "CoreMinimal.h"
 #include "Async/Future.h"
-#include "core/rest_table.h"
+#include "core/fleet.h"
 
 #include <memory>
+#include <string>
 
 class FWadeLink
 {
@@ -21,6 +22,15 @@ public:
 	/** May be called from any thread. */
 	wade_status Evaluate(const wade_state& State, uint64 BudgetNs, wade_forces& Forces) const;
 
+	/** The same for several vehicles of this name. */
+	wade_status EvaluateBatch(const wade_state* States, size_t Count, uint64 BudgetNs, wade_forces* Forces) const;
+
+	/** Whether a batch may replace questions asked alone: over gRPC it has no sessions. */
+	bool HasBatches() const { return bBatches; }
+
+	/** Vehicles of one group are one name on one server. */
+	const std::string& Group() const { return GroupName; }
+
 	/** Why there is no connection. */
 	FString Reason() const;
 
@@ -33,6 +43,8 @@ public:
 private:
 	FString Address;
 	FString Vehicle;
+	std::string GroupName;
+	bool bBatches = false;
 	wade_client* Client = nullptr;
 	std::shared_ptr<const wade::RestTable> Known;
 	TFuture<std::shared_ptr<const wade::RestTable>> Asked;

@@ -37,14 +37,6 @@ void FWadeModule::StartupModule()
 	if (Version != WADE_ABI_VERSION)
 	{
 		UE_LOG(LogWade, Error, TEXT("%s has version %u, the plugin was compiled for %d, so that no water acts. Run clients/unreal/install of wade, then build again."), *Path, Version, WADE_ABI_VERSION);
-		ShutdownModule();
-	}
-}
-
-void FWadeModule::ShutdownModule()
-{
-	if (Library != nullptr)
-	{
 		FPlatformProcess::FreeDllHandle(Library);
 		Library = nullptr;
 	}

@@ -11,11 +11,11 @@ class FWadeModule : public IModuleInterface
 {
 public:
 	virtual void StartupModule() override;
-	virtual void ShutdownModule() override;
 
 	/** Whether the client library is loaded; nothing of it may be called otherwise. */
 	static bool IsLibraryLoaded();
 
 private:
+	/** Stays loaded until the process ends: a client that is closed may still be at it in the background. */
 	void* Library = nullptr;
 };

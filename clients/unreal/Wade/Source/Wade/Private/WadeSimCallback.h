@@ -1,4 +1,4 @@
-// What runs in the physics thread, before each step of the solver.
+// What runs in the physics thread, before each step of the solver: all vehicles of a world together.
 
 #pragma once
 
@@ -7,11 +7,27 @@
 #include "PhysicsProxy/SingleParticlePhysicsProxy.h"
 #include "Templates/SharedPointer.h"
 #include "WadeLink.h"
-#include "core/hydrodynamics.h"
+#include "core/fleet.h"
 
-/** What the game thread knows. */
+#include <vector>
+
+/** A vehicle as the physics thread has it. Made in the game thread, which touches nothing of it but the link. */
+class FWadeVehicle
+{
+public:
+	FWadeVehicle(const TSharedRef<FWadeLink, ESPMode::ThreadSafe>& InLink, const wade::Pacing& Pacing);
+
+	const TSharedRef<FWadeLink, ESPMode::ThreadSafe> Link;
+	wade::Hydrodynamics Hydrodynamics;
+	/** Those of the last scene. */
+	uint32 Beginnings = 0;
+};
+
+/** What the game thread knows of a vehicle. */
 struct FWadeScene
 {
+	TSharedPtr<FWadeVehicle, ESPMode::ThreadSafe> Vehicle;
+	/** The component takes it back when the body's physics state ends. */
 	Chaos::FSingleParticlePhysicsProxy* Proxy = nullptr;
 	FTransform HullInBody = FTransform::Identity;
 	wade::Water Water;
@@ -25,6 +41,7 @@ struct FWadeScene
 /** What came of a step: world, Unreal's units but forces, which are in N. */
 struct FWadeReport
 {
+	TSharedPtr<FWadeVehicle, ESPMode::ThreadSafe> Vehicle;
 	wade::LinkState Link = wade::LinkState::Connecting;
 	uint32 BundleVersion = 0;
 	/** Hull frame [m]. */
@@ -44,35 +61,36 @@ struct FWadeReport
 	TArray<FVector> SurfaceForces;
 };
 
-/** From the game thread, once a frame. */
+/** From the game thread, once a frame: all vehicles of the world, since an input may be skipped. */
 struct FWadeSimInput : public Chaos::FSimCallbackInput
 {
-	FWadeScene Scene;
+	TArray<FWadeScene> Scenes;
 
-	void Reset() { Scene = FWadeScene(); }
+	void Reset() { Scenes.Reset(); }
 };
 
 /** To the game thread, once a step. */
 struct FWadeSimOutput : public Chaos::FSimCallbackOutput
 {
-	FWadeReport Report;
+	TArray<FWadeReport> Reports;
 
-	void Reset() { Report = FWadeReport(); }
+	void Reset() { Reports.Reset(); }
 };
 
 class FWadeSimCallback : public Chaos::TSimCallbackObject<FWadeSimInput, FWadeSimOutput, Chaos::ESimCallbackOptions::Presimulate>
 {
 public:
-	/** Before the first step. */
-	void Begin(const TSharedPtr<FWadeLink, ESPMode::ThreadSafe>& InLink, const wade::Pacing& Pacing);
+	FWadeSimCallback();
+
+	virtual FName GetFNameForStatId() const override;
 
 private:
 	virtual void OnPreSimulate_Internal() override;
-	void ReportStep(const wade::Body& Body, const wade::Motion& Motion, const wade::StepLoad& Load);
 
-	TSharedPtr<FWadeLink, ESPMode::ThreadSafe> Link;
-	TUniquePtr<wade::Hydrodynamics> Hydrodynamics;
-	/** The last input. Its body lives: the component takes it back when the body's physics state ends. */
-	FWadeScene Scene;
-	uint32 Beginnings = 0;
+	/** Those of the last input. */
+	TArray<FWadeScene> Scenes;
+	wade::Fleet Fleet;
+	/** Of this step; kept for their room. */
+	std::vector<wade::Member> Members;
+	std::vector<const FWadeScene*> MemberScenes;
 };

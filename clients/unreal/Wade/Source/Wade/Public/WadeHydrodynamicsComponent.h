@@ -10,8 +10,8 @@
 #include "WadeWaterSurface.h"
 #include "WadeHydrodynamicsComponent.generated.h"
 
-class FWadeLink;
-class FWadeSimCallback;
+class FWadeVehicle;
+class UWadeWorld;
 struct FWadeReport;
 
 /** Who says where the water is. */
@@ -189,11 +189,12 @@ private:
 	void GiveInput();
 	void SetLinkState(EWadeLinkState State);
 
-	TSharedPtr<FWadeLink, ESPMode::ThreadSafe> Link;
+	UWadeWorld* FindWadeWorld() const;
+
+	/** Null where the water does not act: out of play, or without the client library. */
+	TSharedPtr<FWadeVehicle, ESPMode::ThreadSafe> Acting;
 	/** Of the last step that is known here; null before it. */
 	TSharedPtr<FWadeReport> Latest;
-	/** Owned by the physics solver once it is registered. */
-	FWadeSimCallback* Callback = nullptr;
 	EWadeLinkState LinkState = EWadeLinkState::Disconnected;
 	FWadeSampleWater WaterCallback;
 	TArray<double> WheelSpeeds;

@@ -43,7 +43,8 @@ public:
 	UPROPERTY(EditAnywhere, Config, Category = "Server", meta = (EditCondition = "Transport == EWadeTransport::SharedMemory"))
 	bool bPollForAnswers = false;
 
-	/** Most time that a vehicle may wait for its answers in one physics step [us]. 0 never waits: answers are a step late. */
+	/** Most time that a vehicle may wait for its answers in one physics step [us]; vehicles of one name pool theirs. 0 never waits:
+	 *  answers are a step late. */
 	UPROPERTY(EditAnywhere, Config, Category = "Pacing", meta = (ClampMin = "0", ClampMax = "10000"))
 	int32 BudgetMicroseconds = 300;
 

@@ -10,6 +10,7 @@
 
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -37,6 +38,9 @@ struct Pacing {
   int most_substeps = 16;
   // Most time that a step may wait for answers, all its questions together [ns]. 0 never waits: every answer is a step late.
   std::uint64_t budget_ns = 300000;
+
+  // Questions of a step of `time` [s].
+  int substeps(double time) const;
 };
 
 // One a wheel of the vehicle, by axle from the front, left before right; of four wheels front left, front right, rear left, rear
@@ -87,6 +91,26 @@ class Hydrodynamics {
   StepLoad step(const Body& body, const Motion& motion, const Water& water, const Surroundings& surroundings,
                 double time);
 
+  // The same in parts, for a caller that asks about several vehicles at once (`Fleet`): `begin_step`; then, `substeps` times,
+  // `pose`, an answer to `open_question` where there is one, and `advance`; then `end_step`.
+  void begin_step(const Body& body, const Motion& motion, const Water& water, const Surroundings& surroundings,
+                  double time);
+  int substeps() const { return step_.substeps; }
+  void pose();
+  // Null where the server is not to be asked.
+  const wade_state* open_question() const { return open_ ? &open_->state : nullptr; }
+  // Asks the open question by itself, within what is left of the budget.
+  void ask_alone();
+  // What a batch said to the open question; `forces` is null where the batch was not answered.
+  void hear(wade_status status, const wade_forces* forces);
+  // Leaves the open question and those of the rest of the step unasked.
+  void pass_over();
+  // What this step may still wait for its answers [ns].
+  std::uint64_t budget_left() const { return step_.budget_ns; }
+  void spend(std::uint64_t time_ns) { step_.budget_ns -= std::min(time_ns, step_.budget_ns); }
+  void advance();
+  StepLoad end_step();
+
   // After a teleport: the velocity of the step before says nothing of forces.
   void begin_anew();
 
@@ -103,12 +127,27 @@ class Hydrodynamics {
     Vec6 load;
     Mat6 added{};
   };
+  // The step under way.
   struct Step {
-    const Body& body;
-    const Water& water;
-    const Surroundings& surroundings;
-    std::uint64_t deadline = 0;
+    Body body;
+    Motion motion;
+    Water water;
+    Surroundings surroundings;
+    double time = 0.0;
+    int substeps = 0;
+    std::uint64_t budget_ns = 0;
+    // a server that was late once is not waited for again in this step
     bool silent = false;
+    Vec6 others;    // everything that acts but the water, world
+    Motion shadow;  // where the body is in the substep
+    Immersion immersion;
+    Vec6 impulse;
+    bool answered = false;
+    StepLoad out;
+  };
+  struct Open {
+    wade_state state;
+    HeldAnswer::Asked asked;
   };
   struct Sent {
     std::uint64_t time = 0;
@@ -116,10 +155,11 @@ class Hydrodynamics {
   };
 
   Vec6 external(const Body& body, const Motion& motion, const Vec3& gravity) const;
-  WaterLoad water_load(Step& step, const Motion& motion, double time, StepLoad& out);
-  bool answered(Step& step, const Motion& motion, const Immersion& immersion, StepLoad& out);
-  bool take(const Body& body, HeldAnswer::Asked asked);
-  void take_late(const Body& body, std::uint64_t now);
+  Open question_now() const;
+  void count(wade_status status);
+  WaterLoad water_load() const;
+  bool take(HeldAnswer::Asked asked);
+  void take_late(std::uint64_t now);
 
   Ask ask_;
   Clock clock_;
@@ -134,6 +174,8 @@ class Hydrodynamics {
   std::size_t next_sent_ = 0;
   double unasked_time_ = 0.0;
   Accelerations accelerations_;
+  Step step_;
+  std::optional<Open> open_;
 
   struct Before {
     Motion motion;
