@@ -141,6 +141,7 @@ fn with_derivatives(name: String, model: Model, condition: Condition) -> Subject
         time_step: 0.0,
         implicit_added_mass: false,
         physics: Physics::Full,
+        waters: None,
     };
     let work = move || {
         let (values, slopes, forces) = &mut room;
@@ -297,6 +298,7 @@ fn base(vehicle: &str) -> impl Iterator<Item = Subject> {
                     time_step: 0.0,
                     implicit_added_mass: true,
                     physics: Physics::Full,
+                    waters: None,
                 };
                 let base = model.base().expect("the shipped bundles have one");
                 states.iter().for_each(|state| base.evaluate(black_box(state), &motion, None, &mut loads));

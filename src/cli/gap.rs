@@ -411,6 +411,7 @@ fn predictor(model: &Model, physics: Physics) -> impl FnMut(&Asked<'_>) -> Predi
             time_step: asked.time_step,
             implicit_added_mass: false,
             physics,
+            waters: None,
         };
         model.evaluate_moving(asked.condition, (&motion, Some(&mut memory)), &mut workspace, &mut forces);
         let (force, moment) = (forces.uncertainty, forces.moment_uncertainty);

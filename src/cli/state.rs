@@ -63,8 +63,23 @@ pub struct StateArgs {
     #[arg(long, allow_negative_numbers = true)]
     depth_rate: Option<f32>,
     /// Speed of each wheel [rad/s] by axle from the front, left before right: of four wheels FL,FR,RL,RR
-    #[arg(long, value_name = "W,W,...", value_parser = wheel_speeds, allow_hyphen_values = true)]
+    #[arg(long, value_name = "W,W,...", value_parser = per_wheel, allow_hyphen_values = true)]
     wheel_speeds: Option<PerWheel<f32>>,
+    /// Wave number along the direction in which a regular wave travels [rad/m], body frame
+    #[arg(long, value_name = "KX,KY,KZ", value_parser = numbers::<3>, allow_hyphen_values = true, requires = "wave_amplitude")]
+    wave_vector: Option<[f32; 3]>,
+    /// Half the height of the wave from trough to crest [m]
+    #[arg(long, value_name = "A", requires = "wave_vector", allow_negative_numbers = true)]
+    wave_amplitude: Option<f32>,
+    /// Phase of the wave at the body origin [rad]: a crest at 0, and after it the water falls
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_negative_numbers = true)]
+    wave_phase: f32,
+    /// Height of the water above the body origin at each wheel [m], in the order of --wheel-speeds
+    #[arg(long, value_name = "H,H,...", value_parser = per_wheel, allow_hyphen_values = true)]
+    wheel_levels: Option<PerWheel<f32>>,
+    /// Exponent of the profile of the current over the height over the bed, such as 0.14; 0 of an even one
+    #[arg(long, value_name = "N", default_value_t = 0.0, allow_negative_numbers = true)]
+    current_exponent: f32,
     /// Leave the force of added mass out, for a caller who integrates with the matrix
     #[arg(long)]
     implicit_added_mass: bool,
@@ -144,6 +159,11 @@ impl StateArgs {
             implicit_added_mass: self.implicit_added_mass,
             physics: self.physics.map(Physics::from),
             jacobian: self.jacobian,
+            wave_vector: self.wave_vector.unwrap_or_default(),
+            wave_amplitude: self.wave_amplitude.unwrap_or(0.0),
+            wave_phase: self.wave_phase,
+            wheel_levels: self.wheel_levels,
+            current_exponent: self.current_exponent,
         }
     }
 }
@@ -154,7 +174,7 @@ fn gravity(roll: f64, pitch: f64) -> [f32; 3] {
 }
 
 /// One number a wheel with commas between.
-fn wheel_speeds(text: &str) -> Result<PerWheel<f32>, String> {
+fn per_wheel(text: &str) -> Result<PerWheel<f32>, String> {
     let values =
         list(text).map_err(|error| format!("{error}: one number a wheel is needed, such as 3,3.5"))?;
     PerWheel::new(&values).ok_or_else(|| format!("{} numbers, {MAX_WHEELS} wheels at most", values.len()))

@@ -18,6 +18,7 @@ use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::model::kernel::Isa;
 use wade_core::model::{Model, Workspace};
 use wade_core::physics::{Memory, Motion, Physics};
+use wade_core::sea::Sea;
 use wade_core::served::ServedVehicle;
 use wade_core::vehicle::PerWheel;
 use wade_core::wrench::Wrench;
@@ -65,8 +66,13 @@ impl<'a> Recording<'a> {
         time_step: f64,
     ) -> Wrench {
         let speeds = self.model.wheel_speeds(wheel_speeds);
-        let motion =
-            Motion { wheel_speeds: &speeds, time_step, implicit_added_mass: false, physics: Physics::Full };
+        let motion = Motion {
+            wheel_speeds: &speeds,
+            time_step,
+            implicit_added_mass: false,
+            physics: Physics::Full,
+            waters: None,
+        };
         let Self { model, memory, workspace, forces } = self;
         model.evaluate_moving(condition, (&motion, Some(memory)), workspace, forces);
         forces.wrench
@@ -278,6 +284,7 @@ impl Drawn {
             implicit_added_mass: false,
             physics: None,
             jacobian: false,
+            sea: Sea::default(),
         }
     }
 }

@@ -26,6 +26,7 @@ mod install;
 mod jacobian;
 mod page;
 mod reload;
+mod sea;
 mod shipped_weights;
 mod shm;
 mod soak;

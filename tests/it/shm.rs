@@ -200,7 +200,7 @@ fn what_is_set_and_cannot_be_used_is_refused_by_name() {
         (
             Query { flags: HAS_WHEEL_LEVELS, wheel_water_level_m: six, ..good },
             Field::WheelWaterLevel,
-            Unsupported,
+            Count,
         ),
         (Query { wheel_water_level_m: wheels, ..good }, Field::WheelWaterLevel, WithoutFlag),
         (Query { flags: HAS_WHEEL_SPEEDS, wheel_speed_radps: six, ..good }, Field::WheelSpeed, Count),

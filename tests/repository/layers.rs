@@ -54,7 +54,7 @@ const LAYERS: [(&str, &[&[&str]]); 3] = [
                 "real",
                 "wrench",
             ],
-            &["geometry", "vehicle"],
+            &["geometry", "sea", "vehicle"],
             &["features", "physics", "stability"],
             &["analytic", "anchor", "effects"],
             &["bundle", "model", "served"],

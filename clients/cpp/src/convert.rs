@@ -66,6 +66,7 @@ impl From<&WadeState> for State {
             implicit_added_mass: has(WADE_IMPLICIT_ADDED_MASS),
             physics: PHYSICS.into_iter().find(|(flag, _)| has(*flag)).map(|(_, physics)| physics),
             jacobian: false,
+            ..Self::default()
         }
     }
 }

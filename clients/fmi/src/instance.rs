@@ -416,6 +416,7 @@ impl Instance {
                 _ => None,
             },
             jacobian: false,
+            ..State::default()
         }
     }
 

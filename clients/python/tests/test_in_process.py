@@ -30,6 +30,8 @@ FINE: dict[str, Any] = {
     **{"depth_m": 0.15, "density_kgpm3": 1000.0, "gravity_direction": (0.0, 0.0, -1.0)},
     **{"heading_rad": 0.0, "depth_rate_mps": 0.0, "wheel_speed_radps": (0.0, 0.0, 0.0, 0.0)},
     **{"water_level_m": np.nan, "bed_clearance_m": 0.0, "bed": 0.0},
+    **{"wave_amplitude_m": 0.0, "wave_phase_rad": 0.0, "current_exponent": 0.0},
+    "wheel_water_level_m": (0.0, 0.0, 0.0, 0.0),
 }
 #: States of which each input that an effect needs is given, too.
 ALL_STATES = [

@@ -36,6 +36,12 @@ REFUSED = [
     ("wheel_speed_radps", (1, 2), "has 2 values, and the vehicle has 4 wheels"),
     ("wheel_speed_radps", (1, 2, 3, 4, 5, 6), "has 6 values, and the vehicle has 4 wheels"),
     ("time_step_s", -0.001, "negative"),
+    ("wave_amplitude_m", -0.1, "negative"),
+    ("wave_vector_radpm", (NAN, 0, 0), "finite"),
+    ("wave_phase_rad", INFINITY, "finite"),
+    ("wheel_water_level_m", (1, 2), "has 2 values, and the vehicle has 4 wheels"),
+    ("wheel_water_level_m", (0, NAN, 0, 0), "finite"),
+    ("current_exponent", -1.0, "negative"),
 ]
 
 # a field and a value of the wrong shape, single and batch of two
@@ -55,6 +61,9 @@ MISSHAPEN = [
     ("wheel_speed_radps", (1.0, 2.0, 3.0), np.zeros((2, 3))),
     ("wheel_speed_radps", (), np.zeros((2, 9))),
     ("wheel_speed_radps", 1.0, [1.0, 1.0]),
+    ("wave_vector_radpm", (1.0, 2.0), [(1.0, 2.0)] * 2),
+    ("wheel_water_level_m", (), np.zeros((2, 9))),
+    ("wave_amplitude_m", "high", "high"),
     ("time_step_s", None, [0.1, 0.1, 0.1]),
     ("session", -1, [1, 2, 3]),
     ("session", 0.5, "first"),

@@ -199,3 +199,31 @@ def test_threads_may_share_a_client(server: Server) -> None:
             with ThreadPoolExecutor(4) as pool:
                 lifts = pool.map(lambda d, c=client: c.evaluate("husky", wade.State(depth_m=d)).force_n[2], depths)
                 assert list(lifts) == alone
+
+
+def test_moving_water_is_that_of_the_command(client: Any) -> None:
+    still: dict[str, Any] = {"depth_m": 0.15, "velocity_mps": (0.5, 0.1, 0), "current_mps": (-0.5, 0, 0)}
+    arguments = ["--velocity=0.5,0.1,0", "--current=-0.5,0,0", "--depth=0.15"]
+    kinds: list[tuple[dict[str, Any], list[str]]] = [
+        (
+            {"wave_vector_radpm": (1.5, 0.5, 0), "wave_amplitude_m": 0.0625, "wave_phase_rad": 0.75},
+            ["--wave-vector=1.5,0.5,0", "--wave-amplitude=0.0625", "--wave-phase=0.75"],
+        ),
+        ({"wheel_water_level_m": (0.0, 0.03125, 0.0, -0.0625)}, ["--wheel-levels=0,0.03125,0,-0.0625"]),
+        ({"current_exponent": 0.125}, ["--current-exponent=0.125"]),
+    ]
+    calm = client.evaluate("husky", wade.State(**still)).force_n
+    for moving, more in kinds:
+        expected = query("husky", [*arguments, *more])["wrench"]["force"]
+        alone = client.evaluate("husky", wade.State(**still, **moving)).force_n
+        assert (alone == np.array(expected, np.float32)).all() and (alone != calm).any()
+        rows: dict[str, Any] = {
+            name: np.tile(np.asarray(value), (2, 1) if np.ndim(value) else 2) for name, value in moving.items()
+        }
+        both = client.evaluate_batch("husky", wade.State(**{**still, "depth_m": [0.15, 0.15]}, **rows)).force_n
+        assert (both == alone).all()
+    # no wave without a height, and none without the rest
+    flat = wade.State(**still, wave_vector_radpm=(1.0, 0, 0))
+    assert (client.evaluate("husky", flat).force_n == calm).all()
+    with pytest.raises(wade.InvalidState, match="wave_vector_radpm must be greater than zero"):
+        client.evaluate("husky", wade.State(**still, wave_amplitude_m=0.1))

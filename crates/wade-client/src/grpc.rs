@@ -148,6 +148,11 @@ pub(super) fn message(state: &State) -> proto::State {
         heading_rad: state.heading,
         depth_rate_mps: state.depth_rate,
         wheel_speed_radps: state.wheel_speeds.map_or_else(Vec::new, |speeds| speeds.to_vec()),
+        wave_vector_radpm: (state.wave_amplitude != 0.0).then(|| vector(state.wave_vector)).flatten(),
+        wave_amplitude_m: state.wave_amplitude,
+        wave_phase_rad: state.wave_phase,
+        wheel_water_level_m: state.wheel_levels.map_or_else(Vec::new, |levels| levels.to_vec()),
+        current_exponent: state.current_exponent,
         time_step_s: state.time_step,
         implicit_added_mass: state.implicit_added_mass,
         physics: state.physics.map_or(0, |physics| physics as i32),
@@ -161,8 +166,9 @@ fn ground_contact(state: &State) -> proto::GroundContact {
 
 /// What the states of a batch have in common: the message carries it once, or not at all.
 pub(super) fn shared(state: &State) -> impl PartialEq + use<> {
-    let State { heading, depth_rate, wheel_speeds, physics, .. } = state;
-    let given = (heading.is_some(), depth_rate.is_some(), wheel_speeds.map(|speeds| speeds.len()));
+    let State { heading, depth_rate, wheel_speeds, wheel_levels, physics, .. } = state;
+    let [speeds, levels] = [wheel_speeds, wheel_levels].map(|values| values.map(|values| values.len()));
+    let given = (heading.is_some(), depth_rate.is_some(), speeds, levels);
     (state.dry_contact, state.implicit_added_mass, state.jacobian, *physics, given)
 }
 
@@ -185,16 +191,26 @@ pub(super) fn batch_message(vehicle: &str, states: &[State]) -> proto::EvaluateB
         omit_surfaces: false,
         heading_rad: states.iter().filter_map(|s| s.heading).collect(),
         depth_rate_mps: states.iter().filter_map(|s| s.depth_rate).collect(),
-        wheel_speed_radps: states
-            .iter()
-            .filter_map(|s| s.wheel_speeds.as_deref())
-            .flatten()
-            .copied()
-            .collect(),
+        wheel_speed_radps: of_wheels(states, |s| s.wheel_speeds.as_deref()),
+        wave_vector_radpm: unless_zero(rows(|s| s.wave_vector)),
+        wave_amplitude_m: unless_zero(states.iter().map(|s| s.wave_amplitude).collect()),
+        wave_phase_rad: unless_zero(states.iter().map(|s| s.wave_phase).collect()),
+        wheel_water_level_m: of_wheels(states, |s| s.wheel_levels.as_deref()),
+        current_exponent: unless_zero(states.iter().map(|s| s.current_exponent).collect()),
         implicit_added_mass: states.first().is_some_and(|s| s.implicit_added_mass),
         physics: states.first().and_then(|s| s.physics).map_or(0, |physics| physics as i32),
         jacobian: states.first().is_some_and(|s| s.jacobian),
     }
+}
+
+/// The values of the wheels, row by row; empty where none are stated.
+fn of_wheels(states: &[State], values: fn(&State) -> Option<&[f32]>) -> Vec<f32> {
+    states.iter().filter_map(values).flatten().copied().collect()
+}
+
+/// An array of which zero is the default; empty where it holds nothing else.
+fn unless_zero(values: Vec<f32>) -> Vec<f32> {
+    if values.iter().all(|value| *value == 0.0) { Vec::new() } else { values }
 }
 
 /// An array with NaN where a state has no value; empty where none has.

@@ -19,6 +19,7 @@ pub mod frame;
 mod lanes;
 mod named_enum;
 pub mod real;
+pub mod sea;
 pub mod wrench;
 
 pub mod geometry;

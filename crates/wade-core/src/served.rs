@@ -108,6 +108,12 @@ impl ServedVehicle {
     ) {
         let Loads { forces, effects: added, jacobian, edge, workspace, slopes, stepped: steps } = loads;
         let condition = &condition.resolved(self.model.vehicle().z0);
+        let stirred = Some(&circumstances.sea).filter(|sea| !sea.is_calm());
+        let stirred = stirred.and_then(|sea| self.model.in_sea(condition, sea));
+        let (condition, waters) = match stirred {
+            Some((state, waters)) => (&state.resolved(self.model.vehicle().z0), Some(waters)),
+            None => (condition, None),
+        };
         let (memory, session) = match session {
             Some(session) => {
                 let (memory, effects) = session.split();
@@ -121,13 +127,17 @@ impl ServedVehicle {
             time_step: circumstances.time_step,
             implicit_added_mass: circumstances.implicit_added_mass,
             physics: circumstances.physics.unwrap_or(self.physics),
+            waters: waters.as_ref(),
         };
         *jacobian = None;
-        if circumstances.jacobian && self.has_jacobian() {
+        if circumstances.jacobian && waters.is_none() && self.has_jacobian() {
             let room = (&mut *workspace, slopes);
             *jacobian = self.model.evaluate_with_jacobian(condition, (&motion, memory), room, forces);
         } else {
             self.model.evaluate_moving(condition, (&motion, memory), workspace, forces);
+        }
+        if let (Some(waters), Some(base)) = (&waters, &mut forces.base) {
+            base.water_level = waters.level();
         }
         match &self.effects {
             Some(effects) => {

@@ -38,18 +38,32 @@ pub fn state(message: &proto::State, vehicle: &ServedVehicle) -> Result<State, I
         dry_contact: is_dry(message.ground_contact)?,
         heading: message.heading_rad.map_or_else(|| heading(message.attitude.as_ref()), |h| Ok(Some(h)))?,
         depth_rate: message.depth_rate_mps,
-        wheel_speeds: match message.wheel_speed_radps.as_slice() {
-            [] => None,
-            speeds => {
-                let count = || InvalidState::wheel_count(speeds.len(), vehicle);
-                Some(PerWheel::new(speeds).ok_or_else(count)?)
-            }
-        },
+        wheel_speeds: per_wheel(Field::WheelSpeed, &message.wheel_speed_radps, vehicle)?,
         time_step: message.time_step_s,
         implicit_added_mass: message.implicit_added_mass,
         physics: physics(message.physics)?,
         jacobian: message.jacobian,
+        wave_vector: vector(&message.wave_vector_radpm),
+        wave_amplitude: message.wave_amplitude_m,
+        wave_phase: message.wave_phase_rad,
+        wheel_levels: per_wheel(Field::WheelWaterLevel, &message.wheel_water_level_m, vehicle)?,
+        current_exponent: message.current_exponent,
     })
+}
+
+/// One value a wheel, or none.
+fn per_wheel(
+    field: Field,
+    values: &[f32],
+    vehicle: &ServedVehicle,
+) -> Result<Option<PerWheel<f32>>, InvalidState> {
+    match values {
+        [] => Ok(None),
+        values => {
+            let count = || InvalidState::wheel_count(field, values.len(), vehicle);
+            PerWheel::new(values).ok_or_else(count).map(Some)
+        }
+    }
 }
 
 fn physics(code: i32) -> Result<Option<Physics>, InvalidState> {
@@ -133,7 +147,12 @@ pub fn batch(
     let dry_contact = is_dry(message.ground_contact)?;
     let heading = optional_rows::<1>(Field::Heading, &message.heading_rad, len)?;
     let depth_rate = optional_rows::<1>(Field::DepthRate, &message.depth_rate_mps, len)?;
-    let wheel_speeds = wheel_rows(&message.wheel_speed_radps, len, vehicle)?;
+    let wheel_speeds = wheel_rows(Field::WheelSpeed, &message.wheel_speed_radps, len, vehicle)?;
+    let wheel_levels = wheel_rows(Field::WheelWaterLevel, &message.wheel_water_level_m, len, vehicle)?;
+    let wave_vector = rows(Field::WaveVector, &message.wave_vector_radpm, len, default.wave_vector)?;
+    let wave_amplitude = rows(Field::WaveAmplitude, &message.wave_amplitude_m, len, [0.0])?;
+    let wave_phase = rows(Field::WavePhase, &message.wave_phase_rad, len, [0.0])?;
+    let current_exponent = rows(Field::CurrentExponent, &message.current_exponent, len, [0.0])?;
     let state = |i: usize| State {
         velocity: velocity(i),
         current: current(i),
@@ -155,6 +174,11 @@ pub fn batch(
         implicit_added_mass: message.implicit_added_mass,
         physics,
         jacobian: message.jacobian,
+        wave_vector: wave_vector(i),
+        wave_amplitude: wave_amplitude(i)[0],
+        wave_phase: wave_phase(i)[0],
+        wheel_levels: wheel_levels(i),
+        current_exponent: current_exponent(i)[0],
     };
     Ok((0..len).map(state).collect())
 }
@@ -188,13 +212,14 @@ fn optional_rows<const WIDTH: usize>(
     Ok(move |i| rows.get(i).copied())
 }
 
-/// The wheel speeds of state `i`, or none where the array is empty.
+/// The values of the wheels in state `i`, or none where the array is empty.
 fn wheel_rows(
+    field: Field,
     values: &[f32],
     len: usize,
     vehicle: &ServedVehicle,
 ) -> Result<impl Fn(usize) -> Option<PerWheel<f32>>, Refusal> {
-    let name = Field::WheelSpeed.name();
+    let name = field.name();
     let (given, wheels) = (values.len() / len, vehicle.model().wheels().len());
     if !values.len().is_multiple_of(len) {
         return Err(Refusal::UnequalLength {
@@ -205,7 +230,7 @@ fn wheel_rows(
         });
     }
     if !values.is_empty() && (given != wheels || given > MAX_WHEELS) {
-        return Err(InvalidState::wheel_count(given, vehicle).into());
+        return Err(InvalidState::wheel_count(field, given, vehicle).into());
     }
     Ok(move |i| values.get(i * given..(i + 1) * given).filter(|row| !row.is_empty()).and_then(PerWheel::new))
 }

@@ -6,6 +6,7 @@ use wade_core::condition::{Condition, FRESH_WATER, GroundContact, LEAST_UPRIGHT}
 use wade_core::effects::Circumstances;
 use wade_core::frame::Vec3;
 use wade_core::physics::Physics;
+use wade_core::sea::{Sea, Wave};
 use wade_core::served::ServedVehicle;
 use wade_core::vehicle::{MAX_WHEELS, PerWheel};
 
@@ -50,6 +51,16 @@ pub struct State {
     pub physics: Option<Physics>,
     /// The derivatives of the wrench are asked for.
     pub jacobian: bool,
+    /// Wave number of a regular wave along the direction in which it travels [rad/m].
+    pub wave_vector: [f32; 3],
+    /// Half its height [m]; 0 of none.
+    pub wave_amplitude: f32,
+    /// Its phase at the body origin [rad].
+    pub wave_phase: f32,
+    /// Height of the water surface above the body origin along up at each wheel [m], in the order of `wheel_speeds`.
+    pub wheel_levels: Option<PerWheel<f32>>,
+    /// Exponent of the profile of the current; 0 of one that is even.
+    pub current_exponent: f32,
 }
 
 impl Default for State {
@@ -74,6 +85,11 @@ impl Default for State {
             implicit_added_mass: false,
             physics: None,
             jacobian: false,
+            wave_vector: [0.0; 3],
+            wave_amplitude: 0.0,
+            wave_phase: 0.0,
+            wheel_levels: None,
+            current_exponent: 0.0,
         }
     }
 }
@@ -127,6 +143,14 @@ wade_core::named_enum! {
         Physics = 21 => "physics",
         /// `jacobian`
         Jacobian = 22 => "jacobian",
+        /// `wave_vector_radpm`
+        WaveVector = 23 => "wave_vector_radpm",
+        /// `wave_amplitude_m`
+        WaveAmplitude = 24 => "wave_amplitude_m",
+        /// `wave_phase_rad`
+        WavePhase = 25 => "wave_phase_rad",
+        /// `current_exponent`
+        CurrentExponent = 26 => "current_exponent",
     }
 }
 
@@ -209,12 +233,12 @@ impl InvalidState {
         Self { field, problem, words: None }
     }
 
-    /// So many wheel speeds for a vehicle that has another number of wheels.
-    pub fn wheel_count(given: usize, vehicle: &ServedVehicle) -> Self {
+    /// So many values of wheels for a vehicle that has another number of them.
+    pub fn wheel_count(field: Field, given: usize, vehicle: &ServedVehicle) -> Self {
         let wheels = vehicle.model().wheels();
         let name = |&wheel: &usize| vehicle.model().vehicle().surfaces[wheel].name.as_str();
         let names: Vec<&str> = wheels.iter().map(name).collect();
-        Self::wheels(given, wheels.len(), &names.join(", "))
+        Self::wheels(field, given, wheels.len(), &names.join(", "))
     }
 
     /// Derivatives of a vehicle that has none.
@@ -227,9 +251,14 @@ impl InvalidState {
         Self { words: Some(words.into()), ..Self::new(Field::Jacobian, Problem::Unsupported) }
     }
 
+    /// Water that moves in a way that the server does not know about this vehicle, or beside something else.
+    fn unsupported(field: Field, words: &str) -> Self {
+        let words = format!("{} is set, {words}", field.name());
+        Self { words: Some(words.into()), ..Self::new(field, Problem::Unsupported) }
+    }
+
     /// The same where the names of the wheels are not known; empty names are none.
-    pub(crate) fn wheels(given: usize, wheels: usize, names: &str) -> Self {
-        let field = Field::WheelSpeed;
+    pub(crate) fn wheels(field: Field, given: usize, wheels: usize, names: &str) -> Self {
         let given = match given {
             1 => "1 value".to_owned(),
             given => format!("{given} values"),
@@ -245,7 +274,7 @@ impl InvalidState {
         };
         let limit = match wheels {
             0..=MAX_WHEELS => String::new(),
-            _ => format!(": speeds of {MAX_WHEELS} wheels can be stated at most"),
+            _ => format!(": values of {MAX_WHEELS} wheels can be stated at most"),
         };
         let words = format!("{} has {given}, and the vehicle has {expected}{limit}", field.name());
         Self { words: Some(words.into()), ..Self::new(field, Problem::Count) }
@@ -297,8 +326,13 @@ pub fn limit(field: Field) -> f64 {
         Field::Heading => 1e6,
         Field::DepthRate | Field::WheelSpeed | Field::TimeStep => 1e3,
         Field::WaterLevel | Field::BedClearance | Field::Bed => 1e3,
+        Field::WheelWaterLevel | Field::WaveVector | Field::WaveAmplitude => 1e3,
+        // a phase may have been counted up
+        Field::WavePhase => 1e6,
+        // that of a jet along the surface: water at the bed stands still
+        Field::CurrentExponent => 10.0,
         // these are refused whatever their value
-        Field::WheelWaterLevel | Field::Flags | Field::Physics | Field::Jacobian => 1e3,
+        Field::Flags | Field::Physics | Field::Jacobian => 1e3,
     }
 }
 
@@ -332,15 +366,67 @@ impl State {
         if self.jacobian && !vehicle.has_jacobian() {
             return Err(InvalidState::no_jacobian(vehicle));
         }
-        match &self.wheel_speeds {
-            Some(speeds)
-                if speeds.len() != vehicle.model().wheels().len()
-                    && speeds.iter().all(|speed| speed.is_finite()) =>
+        let per_wheel =
+            [(Field::WheelSpeed, &self.wheel_speeds), (Field::WheelWaterLevel, &self.wheel_levels)];
+        for (field, values) in per_wheel {
+            if let Some(values) = values
+                && values.len() != vehicle.model().wheels().len()
+                && values.iter().all(|value| value.is_finite())
             {
-                Err(InvalidState::wheel_count(speeds.len(), vehicle))
+                return Err(InvalidState::wheel_count(field, values.len(), vehicle));
             }
-            _ => self.check(),
         }
+        let checked = self.check()?;
+        match self.moving_water() {
+            Some(field) if vehicle.model().base().is_none() => {
+                let name = &vehicle.model().vehicle().name;
+                let words = format!(
+                    "and {name} is answered in still and even water alone: its bundle is from before the physical base"
+                );
+                Err(InvalidState::unsupported(field, &words))
+            }
+            _ => Ok(checked),
+        }
+    }
+
+    /// The field by which the water does more than lie still or flow evenly.
+    fn moving_water(&self) -> Option<Field> {
+        let moves = [
+            (self.wave_amplitude != 0.0, Field::WaveAmplitude),
+            (self.wheel_levels.is_some(), Field::WheelWaterLevel),
+            (self.current_exponent != 0.0, Field::CurrentExponent),
+        ];
+        moves.into_iter().find_map(|(moves, field)| moves.then_some(field))
+    }
+
+    fn sea(&self) -> Result<Sea, InvalidState> {
+        let vector = vector(Field::WaveVector, &self.wave_vector)?;
+        let amplitude = scalar(Field::WaveAmplitude, self.wave_amplitude)?;
+        let phase = scalar(Field::WavePhase, self.wave_phase)?;
+        let wrong = |field: Field, problem: Problem| Err(InvalidState::new(field, problem));
+        if amplitude < 0.0 {
+            return wrong(Field::WaveAmplitude, Problem::Negative);
+        }
+        if amplitude > 0.0 && vector.norm() == 0.0 {
+            return wrong(Field::WaveVector, Problem::NotPositive);
+        }
+        let exponent = scalar(Field::CurrentExponent, self.current_exponent)?;
+        if exponent < 0.0 {
+            return wrong(Field::CurrentExponent, Problem::Negative);
+        }
+        let levels =
+            self.wheel_levels.map(|levels| levels.try_map(|level| scalar(Field::WheelWaterLevel, level)));
+        let wheel_levels = levels.transpose()?;
+        if wheel_levels.is_some() && amplitude > 0.0 {
+            let words = "and wave_amplitude_m too: state the surface in one of the two ways";
+            return Err(InvalidState::unsupported(Field::WheelWaterLevel, words));
+        }
+        if let Some(field) = self.moving_water().filter(|_| self.jacobian) {
+            let words = format!("and {} too: derivatives are those in still and even water", field.name());
+            return Err(InvalidState::unsupported(Field::Jacobian, &words));
+        }
+        let wave = (amplitude > 0.0).then_some(Wave { vector, amplitude, phase });
+        Ok(Sea { wave, wheel_levels, current_exponent: exponent })
     }
 
     /// The same for a vehicle that is not known here: it may have another number of wheels than speeds are stated. Speeds that do
@@ -365,6 +451,7 @@ impl State {
             implicit_added_mass: self.implicit_added_mass,
             physics: self.physics,
             jacobian: self.jacobian,
+            sea: self.sea()?,
         })
     }
 

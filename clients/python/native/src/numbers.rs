@@ -4,12 +4,16 @@ use wade_core::physics::Physics;
 use wade_core::vehicle::{MAX_WHEELS, PerWheel};
 use wade_wire::State;
 use wade_wire::shm::layout::{
-    DRY_CONTACT, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_DEPTH_RATE, HAS_HEADING, HAS_WATER_LEVEL,
-    HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, JACOBIAN, QUASI_STEADY,
+    DRY_CONTACT, FULL, HAS_BED, HAS_BED_CLEARANCE, HAS_CURRENT_EXPONENT, HAS_DEPTH_RATE, HAS_HEADING,
+    HAS_WATER_LEVEL, HAS_WAVE, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS,
+    JACOBIAN, QUASI_STEADY,
 };
 
 /// Numbers of a state.
-pub const NUMBERS: usize = 26 + MAX_WHEELS;
+pub const NUMBERS: usize = 32 + 2 * MAX_WHEELS;
+
+/// Those of them that say how the water moves, and the time step.
+const MOVING: usize = 7 + MAX_WHEELS;
 
 /// Bytes that are no rows of states.
 #[derive(Debug, thiserror::Error)]
@@ -22,11 +26,18 @@ pub struct Misshapen {
 
 /// A state of its numbers and of the flags of shared memory.
 pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
-    let &[depth, density, ref middle @ .., water_level, bed_clearance, bed, time_step] = numbers;
+    let (still, moving) = numbers.split_at(NUMBERS - MOVING);
+    let &[depth, density, ref middle @ .., water_level, bed_clearance, bed] = still else { unreachable!() };
+    let &[kx, ky, kz, amplitude, phase, ref levels @ .., exponent, time_step] = moving else {
+        unreachable!()
+    };
     let vector = |i: usize| [middle[3 * i], middle[3 * i + 1], middle[3 * i + 2]];
     let (heading, depth_rate, wheels) = (middle[18], middle[19], &middle[20..]);
     // places behind the last wheel are NaN
-    let count = wheels.iter().rposition(|speed| !speed.is_nan()).map_or(1, |last| last + 1);
+    let per_wheel = |values: &[f32]| {
+        let count = values.iter().rposition(|value| !value.is_nan()).map_or(1, |last| last + 1);
+        PerWheel::new(&values[..count])
+    };
     let has = |flag: u64| flags & flag != 0;
     State {
         velocity: vector(0),
@@ -40,7 +51,7 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
         dry_contact: has(DRY_CONTACT),
         heading: has(HAS_HEADING).then_some(heading),
         depth_rate: has(HAS_DEPTH_RATE).then_some(depth_rate),
-        wheel_speeds: PerWheel::new(&wheels[..count]).filter(|_| has(HAS_WHEEL_SPEEDS)),
+        wheel_speeds: per_wheel(wheels).filter(|_| has(HAS_WHEEL_SPEEDS)),
         time_step,
         implicit_added_mass: has(IMPLICIT_ADDED_MASS),
         water_level: has(HAS_WATER_LEVEL).then_some(water_level),
@@ -53,6 +64,11 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
             _ => None,
         },
         jacobian: has(JACOBIAN),
+        wave_vector: if has(HAS_WAVE) { [kx, ky, kz] } else { [0.0; 3] },
+        wave_amplitude: if has(HAS_WAVE) { amplitude } else { 0.0 },
+        wave_phase: if has(HAS_WAVE) { phase } else { 0.0 },
+        wheel_levels: per_wheel(levels).filter(|_| has(HAS_WHEEL_LEVELS)),
+        current_exponent: if has(HAS_CURRENT_EXPONENT) { exponent } else { 0.0 },
     }
 }
 

@@ -19,7 +19,7 @@ from .forces import Array, Effect, Forces, named_effect
 from .local import SessionStream, flags, session_numbers
 from .stability import DEFAULT_TIMEOUT_S as MAP_TIMEOUT_S
 from .stability import Ford, Stability
-from .state import SCALARS, TOLD, VECTORS, State
+from .state import SCALARS, TOLD, VECTORS, ZERO, State
 from .vehicle import Vehicle
 from .version import VERSION
 
@@ -76,6 +76,8 @@ class InProcess:
         numbers = np.full((length, _NUMBERS), np.nan, "<f4")
         start = 0
         for name, width in _WIDTHS.items():
+            if name in ZERO:
+                numbers[:, start : start + width] = 0.0
             if name in rows:
                 row = rows[name].reshape(length, -1)
                 numbers[:, start : start + row.shape[1]] = row

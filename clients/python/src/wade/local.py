@@ -35,6 +35,12 @@ def flags(state: State) -> int:
         flags |= layout.HAS_BED_CLEARANCE
     if state.bed is not None:
         flags |= layout.HAS_BED
+    if state.wheel_water_level_m is not None:
+        flags |= layout.HAS_WHEEL_LEVELS
+    if not (state.wave_amplitude_m is None and state.wave_vector_radpm is None and state.wave_phase_rad is None):
+        flags |= layout.HAS_WAVE
+    if state.current_exponent is not None:
+        flags |= layout.HAS_CURRENT_EXPONENT
     if state.physics == Physics.HYDROSTATIC:
         flags |= layout.HYDROSTATIC
     elif state.physics == Physics.QUASI_STEADY:

@@ -30,7 +30,7 @@ from .errors import (
 from .forces import BoxQuantity, Forces, Quantity, named_effect
 from .latency import Latency, Percentiles
 from .stability import Foot, Ford, Stability, StabilityModes
-from .state import TIME_STEP_AT, TOLD_AT, VECTORS, State
+from .state import MAX_WHEELS, TIME_STEP_AT, TOLD_AT, VECTORS, State
 from .v1 import admin_pb2, hydrodynamics_pb2
 from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
 
@@ -100,7 +100,8 @@ def evaluate_request(vehicle: str, state: State) -> Message:
         if not state.is_default(name):
             vector = getattr(message, name)
             vector.x, vector.y, vector.z = values[2 + 3 * i : 5 + 3 * i]
-    heading, rate, *wheels, water_level, bed_clearance, bed = values[TOLD_AT:TIME_STEP_AT]
+    told = values[TOLD_AT:TIME_STEP_AT]
+    (heading, rate, *wheels), (water_level, bed_clearance, bed, *moving) = told[:_WHEELS_END], told[_WHEELS_END:]
     if state.water_level_m is not None:
         message.water_level_m = water_level
     if state.bed_clearance_m is not None:
@@ -114,9 +115,8 @@ def evaluate_request(vehicle: str, state: State) -> Message:
     if state.depth_rate_mps is not None:
         message.depth_rate_mps = rate
     if state.wheel_speed_radps is not None:
-        speeds = [speed for speed in wheels if not math.isnan(speed)]
-        with np.errstate(over="ignore"):
-            message.wheel_speed_radps = np.array(speeds, "<f4").tobytes()
+        message.wheel_speed_radps = _of_wheels(wheels)
+    _set_moving(message, state, moving)
     if values[TIME_STEP_AT] != 0.0:
         message.time_step_s = values[TIME_STEP_AT]
     if state.implicit_added_mass:
@@ -124,6 +124,27 @@ def evaluate_request(vehicle: str, state: State) -> Message:
     if state.jacobian:
         message.jacobian = True
     return request
+
+
+#: Place behind the wheels' speeds in what a state tells.
+_WHEELS_END = 2 + MAX_WHEELS
+
+
+def _of_wheels(values: list[float]) -> bytes:
+    with np.errstate(over="ignore"):
+        return np.array([value for value in values if not math.isnan(value)], "<f4").tobytes()
+
+
+def _set_moving(message: Any, state: State, moving: list[float]) -> None:
+    """Sets how the water moves beside its current."""
+    kx, ky, kz, amplitude, phase, *levels, exponent = moving
+    if not (state.wave_vector_radpm is None and state.wave_amplitude_m is None and state.wave_phase_rad is None):
+        message.wave_vector_radpm.x, message.wave_vector_radpm.y, message.wave_vector_radpm.z = kx, ky, kz
+        message.wave_amplitude_m, message.wave_phase_rad = amplitude, phase
+    if state.wheel_water_level_m is not None:
+        message.wheel_water_level_m = _of_wheels(levels)
+    if state.current_exponent is not None:
+        message.current_exponent = exponent
 
 
 def evaluate_batch_request(vehicle: str, states: State, surfaces: bool) -> tuple[Message, int]:

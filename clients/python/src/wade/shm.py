@@ -24,7 +24,7 @@ from .errors import DeadlineExceeded, InvalidState, Refused, ResourceExhausted, 
 from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
 from .local import SessionStream, flags, session_numbers
 from .shm_link import BATCH, JACOBIAN, SINGLE, VEHICLE, Link, Lost, Service, memory, vehicles
-from .state import TOLD_AT, State
+from .state import PER_WHEEL, TOLD_AT, State
 from .vehicle import Vehicle
 
 _T = TypeVar("_T")
@@ -74,7 +74,7 @@ class ShmClient:
         with self._lock:
             page = self._exchange(vehicle, service, write, lambda address: _read(address, dtype), end, timeout_s)
         answer, jacobian = (page["answer"], page["jacobian"]) if state.jacobian else (page, None)
-        _check(answer["status"], answer, None, _wheels(floats) if state.wheel_speed_radps is not None else 0)
+        _check(answer["status"], answer, None, _wheels(floats))
         return _forces(answer, jacobian)
 
     def evaluate_batch(
@@ -86,7 +86,7 @@ class ShmClient:
         rows, flagged = states.rows(), flags(states)
         length = states.length(rows)
         sessions = np.broadcast_to(states.sessions(length), length)
-        wheels = rows["wheel_speed_radps"].shape[1] if "wheel_speed_radps" in rows else 0
+        wheels = {name: rows[name].shape[1] for name in PER_WHEEL if name in rows}
         with self._lock:
             forces: Forces | None = None
             start = 0
@@ -185,7 +185,9 @@ class ShmClient:
         return self._link
 
 
-_NO_LEVELS = (math.nan,) * layout.MAX_WHEELS
+#: Places behind the wheels' speeds, and of the wheels' levels, among what is told.
+_WHEELS_END = 2 + layout.MAX_WHEELS
+_LEVELS_AT = _WHEELS_END + 8
 _PER_ROW = {
     "water_level_m": layout.HAS_WATER_LEVEL,
     "bed_clearance_m": layout.HAS_BED_CLEARANCE,
@@ -194,16 +196,21 @@ _PER_ROW = {
 
 
 def _query(who: tuple[int, int, int, int], floats: list[float], owner: int) -> bytes:
-    # in the order of the layout; the wheels' levels are not set
-    stated, (heading, depth_rate, *wheels, level, clearance, bed, time_step) = floats[:TOLD_AT], floats[TOLD_AT:]
-    values = (*stated, time_step, heading, depth_rate, level, clearance, bed, *wheels, *_NO_LEVELS)
+    # in the order of the layout
+    stated, told = floats[:TOLD_AT], floats[TOLD_AT:]
+    (heading, depth_rate, *wheels), (level, clearance, bed, *wave) = told[:_WHEELS_END], told[_WHEELS_END:_LEVELS_AT]
+    *levels, exponent, time_step = told[_LEVELS_AT:]
+    values = (*stated, time_step, heading, depth_rate, level, clearance, bed, *wheels, *levels)
+    moving = (*wave, exponent)
     try:
-        return layout.QUERY_STRUCT.pack(*who, *values, owner)
+        return layout.QUERY_STRUCT.pack(*who, *values, owner, *moving)
     except OverflowError:
         # beyond single precision: infinite, which the server refuses and names
         limit = float(np.finfo(np.float32).max)
-        values = tuple(math.copysign(math.inf, x) if abs(x) > limit else x for x in values)
-        return layout.QUERY_STRUCT.pack(*who, *values, owner)
+        values, moving = (
+            tuple(math.copysign(math.inf, x) if abs(x) > limit else x for x in part) for part in (values, moving)
+        )
+        return layout.QUERY_STRUCT.pack(*who, *values, owner, *moving)
 
 
 def _read(address: int, dtype: np.dtype[Any]) -> np.void:
@@ -248,7 +255,7 @@ def _write_queries(queries: Any, flags: int, sessions: Any, rows: dict[str, Arra
             # of a row of a batch NaN says that it states none
             queries["flags"] &= ~np.where(np.isnan(rows[name][chunk]), flag, 0).astype(np.uint64)
     for name, array in rows.items():
-        place = queries[name][:, : array.shape[1]] if name == "wheel_speed_radps" else queries[name]
+        place = queries[name][:, : array.shape[1]] if name in PER_WHEEL else queries[name]
         place[...] = array[chunk]
 
 
@@ -304,7 +311,7 @@ def _effects(answer: np.void, surfaces: Any) -> tuple[Any, ...]:
 
 
 def _read_batch(
-    address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool, wheels: int
+    address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool, wheels: dict[str, int]
 ) -> Forces:
     """Adds the answers to a chunk to those before it, or to new forces where there are none of this bundle."""
     batch = np.frombuffer(memory(address, layout.BATCH_ANSWER.itemsize), layout.BATCH_ANSWER)[0]
@@ -314,7 +321,7 @@ def _read_batch(
 
 
 def _read_row(
-    address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool, wheels: int
+    address: int, forces: Forces | None, length: int, chunk: slice, with_surfaces: bool, wheels: dict[str, int]
 ) -> Forces:
     page = np.frombuffer(memory(address, layout.JACOBIAN_ANSWER.itemsize), layout.JACOBIAN_ANSWER)
     answer = page["answer"]
@@ -417,21 +424,24 @@ def _surface_count(answer: np.void) -> int:
     return min(int(answer["surface_count"]), layout.MAX_SURFACES)
 
 
-def _wheels(floats: list[float]) -> int:
-    """How many wheel speeds a state has."""
-    wheels = floats[TOLD_AT + 2 : TOLD_AT + 2 + layout.MAX_WHEELS]
-    return sum(not math.isnan(speed) for speed in wheels)
+def _wheels(floats: list[float]) -> dict[str, int]:
+    """How many values of wheels a state has, by field."""
+    told = floats[TOLD_AT:]
+    values = told[2:_WHEELS_END], told[_LEVELS_AT : _LEVELS_AT + layout.MAX_WHEELS]
+    counts = (sum(not math.isnan(value) for value in of_wheels) for of_wheels in values)
+    return dict(zip(PER_WHEEL, counts, strict=True))
 
 
-def _check(status: int, answer: np.void, index: int | None, wheels: int) -> None:
+def _check(status: int, answer: np.void, index: int | None, wheels: dict[str, int]) -> None:
     if status == layout.STATUS_OK:
         return
     field = layout.FIELDS.get(int(answer["field"]))
     problem = layout.PROBLEMS.get(int(answer["problem"]))
     counts = answer["problem"] == layout.PROBLEM_COUNT and answer["flags"] & layout.HAS_WHEEL_COUNT
-    if field == "wheel_speed_radps" and counts:
-        # the names of the wheels are not in shared memory
-        given = "1 value" if wheels == 1 else f"{wheels} values"
+    if field in PER_WHEEL and counts:
+        # the names of the wheels are not in this page
+        count = wheels.get(field, 0)
+        given = "1 value" if count == 1 else f"{count} values"
         there = {0: "no wheels", 1: "1 wheel"}.get(int(answer["wheel_count"]), f"{answer['wheel_count']} wheels")
         problem = f"has {given}, and the vehicle has {there}"
     if status == layout.STATUS_INVALID_STATE and field and problem:

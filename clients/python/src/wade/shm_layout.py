@@ -23,6 +23,7 @@ PROVENANCE_LEN = 64
 RESERVED_LEN = 128
 DESCRIPTION_LEN = 65_376
 RESERVED_LEFT = 120
+QUERY_RESERVED = 96
 
 #: Attributes of the service of `served_name`: the version of the layout, and lists of the vehicles that are served.
 SERVED_LAYOUT = "layout"
@@ -45,6 +46,9 @@ QUASI_STEADY = 1024
 FULL = 2048
 #: Flag of a query: the derivatives are asked for, for which `evaluate_jacobian_name` alone has room.
 JACOBIAN = 4096
+#: Flags of a query: these fields are set. Without them they are not read.
+HAS_WAVE = 8192
+HAS_CURRENT_EXPONENT = 16384
 #: Flag of an answer: the server polls, so that waking it is of no use.
 SERVER_POLLS = 1
 #: Flag of an answer: the session begins with this query.
@@ -87,7 +91,11 @@ QUERY = np.dtype(
         ("wheel_speed_radps", "<f4", MAX_WHEELS),
         ("wheel_water_level_m", "<f4", MAX_WHEELS),
         ("owner", "<u8"),
-        ("reserved", "u1", RESERVED_LEFT),
+        ("wave_vector_radpm", "<f4", 3),
+        ("wave_amplitude_m", "<f4"),
+        ("wave_phase_rad", "<f4"),
+        ("current_exponent", "<f4"),
+        ("reserved", "u1", QUERY_RESERVED),
     ]
 )
 
@@ -185,6 +193,10 @@ FIELDS = {
     20: "flags",
     21: "physics",
     22: "jacobian",
+    23: "wave_vector_radpm",
+    24: "wave_amplitude_m",
+    25: "wave_phase_rad",
+    26: "current_exponent",
 }
 
 #: The code of a number of values that does not fit the vehicle.

@@ -60,7 +60,15 @@ TOLD = {
     "water_level_m": 1,
     "bed_clearance_m": 1,
     "bed": 1,
+    "wave_vector_radpm": 3,
+    "wave_amplitude_m": 1,
+    "wave_phase_rad": 1,
+    "wheel_water_level_m": MAX_WHEELS,
+    "current_exponent": 1,
 }
+#: Those of them with a value a wheel, and those that are 0 where they are None.
+PER_WHEEL = ("wheel_speed_radps", "wheel_water_level_m")
+ZERO = ("wave_vector_radpm", "wave_amplitude_m", "wave_phase_rad", "current_exponent")
 #: Where the numbers of `State.floats` stand.
 TOLD_AT = len(SCALARS) + 3 * len(VECTORS)
 TIME_STEP_AT = TOLD_AT + sum(TOLD.values())
@@ -106,6 +114,14 @@ class State:
             vehicle floats.
         bed: Share of the motion through the water that is motion over the bed, 0 parked to 1 driving. None:
             from velocities.
+        wave_vector_radpm: A regular wave about the level, of linear theory: wave number along the direction in which
+            it travels [rad/m], `[3]` or `[N, 3]`. For this and the next four the vehicle needs the physical base.
+        wave_amplitude_m: Half the height of the wave from trough to crest [m]. None: no wave.
+        wave_phase_rad: `k . x - w t` of the wave at the body origin [rad]: a crest at 0, and after it the water falls.
+        wheel_water_level_m: Height of the water surface above the body origin along up at each wheel [m], in the order
+            of `wheel_speed_radps`; the level is then that at the body origin. Not beside a wave.
+        current_exponent: Exponent n of the profile of the current over the height s h over the bed,
+            `current_mps (1 + n) s^n`. None: even.
         physics: How much of the physical base answers. One for the whole batch. None: as the server is set, by
             default all of it.
         time_step_s: Time since the state before it in the run [s]. 0: what effects remember stays as it is.
@@ -134,6 +150,11 @@ class State:
     water_level_m: ArrayLike | None = None
     bed_clearance_m: ArrayLike | None = None
     bed: ArrayLike | None = None
+    wave_vector_radpm: ArrayLike | None = None
+    wave_amplitude_m: ArrayLike | None = None
+    wave_phase_rad: ArrayLike | None = None
+    wheel_water_level_m: ArrayLike | None = None
+    current_exponent: ArrayLike | None = None
     physics: Physics | None = None
     time_step_s: ArrayLike = _NO_TIME
     implicit_added_mass: bool = False
@@ -199,7 +220,9 @@ class State:
         except InvalidState:
             raise
         except (TypeError, ValueError):
-            expected = "three numbers" if name in VECTORS else _NUMBERS_TOLD.get(name, "one number")
+            expected = (
+                "three numbers" if name in (*VECTORS, "wave_vector_radpm") else _NUMBERS_TOLD.get(name, "one number")
+            )
             raise _wrong(name, f"must be {expected}, got {_describe(getattr(self, name))}") from None
         return values
 
@@ -219,13 +242,13 @@ class State:
         told = [name for name in TOLD if getattr(self, name) is not None and name != first]
         for name in (*SCALARS[1:], *VECTORS, *told, "time_step_s"):
             array = _array(name, getattr(self, name))
-            shape = (depth.size, 3) if name in VECTORS else (depth.size,)
-            if name == "wheel_speed_radps":
-                shape = (depth.size, _wheels(array.shape))
+            shape = (depth.size, 3) if name in (*VECTORS, "wave_vector_radpm") else (depth.size,)
+            if name in PER_WHEEL:
+                shape = (depth.size, _wheels(name, array.shape))
             if array.shape not in (shape, shape[1:]):
                 raise _wrong(name, f"must have shape {shape} or {shape[1:]}, got {_describe(getattr(self, name))}")
             rows[name] = np.broadcast_to(array, shape)
-            if name == "wheel_speed_radps" and np.isnan(array).any():
+            if name in PER_WHEEL and np.isnan(array).any():
                 index = int(np.isnan(rows[name]).any(axis=1).argmax())
                 description = f"{name} must be finite (state {index} of the batch)"
                 raise InvalidState([Violation(name, description, index)])
@@ -251,15 +274,19 @@ class State:
 _DEFAULTS: dict[str, Any] = {name: field.default for name, field in State.__dataclass_fields__.items()}
 
 
-_NUMBERS_TOLD = {"wheel_speed_radps": f"1 to {MAX_WHEELS} numbers, one a wheel"}
+_NUMBERS_TOLD = dict.fromkeys(PER_WHEEL, f"1 to {MAX_WHEELS} numbers, one a wheel")
 
 
 def _told(name: str, value: Any, count: int) -> tuple[float, ...]:
     if value is None:
-        return (math.nan,) * count
+        return (0.0 if name in ZERO else math.nan,) * count
     if count == 1:
         return (float(value),)
     numbers = tuple(float(number) for number in value)
+    if name not in PER_WHEEL:
+        if len(numbers) != count:
+            raise ValueError
+        return numbers
     if not 1 <= len(numbers) <= count:
         raise ValueError
     # which is what stands behind the last wheel
@@ -268,12 +295,12 @@ def _told(name: str, value: Any, count: int) -> tuple[float, ...]:
     return numbers + (math.nan,) * (count - len(numbers))
 
 
-def _wheels(shape: tuple[int, ...]) -> int:
-    """How many wheels the speeds of a batch are for."""
+def _wheels(name: str, shape: tuple[int, ...]) -> int:
+    """How many wheels the values of a batch are for."""
     wheels = shape[-1] if len(shape) in (1, 2) else 0
     if not 1 <= wheels <= MAX_WHEELS:
         expected = f"[N, W] or [W] with W from 1 to {MAX_WHEELS}"
-        raise _wrong("wheel_speed_radps", f"must have one value a wheel, {expected}, got shape {shape}")
+        raise _wrong(name, f"must have one value a wheel, {expected}, got shape {shape}")
     return wheels
 
 

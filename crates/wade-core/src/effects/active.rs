@@ -16,6 +16,7 @@ use crate::condition::Condition;
 use crate::forces::SurfaceForce;
 use crate::frame::{Vec3, WaterPlane};
 use crate::physics::Physics;
+use crate::sea::Sea;
 use crate::vehicle::{MAX_SURFACES, PerWheel, Vehicle};
 use crate::wrench::Wrench;
 
@@ -34,8 +35,10 @@ pub struct Circumstances {
     pub implicit_added_mass: bool,
     /// How much of the physical base answers; by default as the vehicle is served.
     pub physics: Option<Physics>,
-    /// The derivatives of the wrench are asked for.
+    /// The derivatives of the wrench are asked for; in calm water alone.
     pub jacobian: bool,
+    /// What the water does beside lying still or flowing evenly.
+    pub sea: Sea,
 }
 
 /// What effects remember from state to state: waves and flooding. Starts at rest and dry.

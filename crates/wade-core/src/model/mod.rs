@@ -23,6 +23,7 @@ use crate::forces::{Forces, SurfaceForce};
 use crate::frame::Vec3;
 use crate::physics::drag::SurfaceDrag;
 use crate::physics::{Base, BaseLoads, Memory, Motion, Physics, STATED_NONE};
+use crate::sea::{Sea, Waters};
 use crate::vehicle::{Dimensions, MAX_SURFACES, PerWheel, Vehicle};
 use blend::Blend;
 use kernel::{Buffers, Isa, Kernel, MAX_DYNAMIC, MAX_OUTPUTS, StaticRows, WetSurface};
@@ -192,6 +193,13 @@ impl Model {
         speeds
     }
 
+    /// A state in a sea as one in the plane and the flow that stand for it, and what the sea is beside them; none of a model
+    /// without the physical base, which knows still water alone.
+    pub fn in_sea(&self, condition: &Condition, sea: &Sea) -> Option<(Condition, Waters)> {
+        let condition = condition.resolved(self.vehicle.z0);
+        self.base.as_ref().map(|base| base.in_sea(&condition, sea, &self.wheels))
+    }
+
     /// The instruction set in use, where there is a network.
     pub fn isa(&self) -> Option<Isa> {
         self.learned.as_ref().map(|learned| learned.kernel.isa())
@@ -207,6 +215,7 @@ impl Model {
             time_step: 0.0,
             implicit_added_mass: false,
             physics: Physics::Full,
+            waters: None,
         };
         self.evaluate_moving(condition, (&motion, None), workspace, forces);
     }

@@ -18,7 +18,8 @@ use crate::frame::{GRAVITY, Vec3, WaterPlane};
 use crate::geometry::hydrostatics::float_depth;
 use crate::geometry::wetting::{Wetting, WettingTable};
 use crate::real::{Dual, Real};
-use crate::vehicle::{ContactPatch, MAX_SURFACES, Vehicle};
+use crate::sea::{Draft, Sea, Waters};
+use crate::vehicle::{ContactPatch, MAX_SURFACES, MAX_WHEELS, Vehicle};
 use crate::wrench::Wrench;
 
 crate::named_enum! {
@@ -166,6 +167,8 @@ pub struct Motion<'a> {
     pub implicit_added_mass: bool,
     /// How much of the base answers.
     pub physics: Physics,
+    /// The sea about the hull, of a state that [`Base::in_sea`] gave.
+    pub waters: Option<&'a Waters>,
 }
 
 /// A vehicle prepared for the base.
@@ -249,8 +252,48 @@ impl Base {
         out.wetting.resize(count, Wetting::default());
         out.drags.resize(count, SurfaceDrag::default());
         self.table.wetting_into(&plane, &mut out.wetting);
-        self.drag.evaluate(&plane, condition, motion.wheel_speeds, &mut out.drags);
+        let Some(waters) = motion.waters else {
+            self.drag.evaluate(&plane, condition, motion.wheel_speeds, &mut out.drags);
+            return self.combine(condition, motion, memory, out);
+        };
+        let mut pressures = [Wrench::default(); MAX_SURFACES];
+        let into = (&mut out.drags[..], &mut pressures[..count]);
+        self.drag.evaluate_in_sea((&plane, condition), motion.wheel_speeds, waters, into);
         self.combine(condition, motion, memory, out);
+        let steepness = waters.steepness();
+        for (surface, pressure) in out.surfaces.iter_mut().zip(&pressures) {
+            surface.hydrostatic = surface.hydrostatic * steepness + *pressure;
+        }
+        // water that is accelerated presses on the hull as on what it displaces, and on what moves with the hull besides; the
+        // first is in the pressure
+        let water = joined(&waters.acceleration, &Vec3::zeros());
+        let load = out.added_mass * water;
+        out.hull += Wrench {
+            force: load.fixed_rows::<3>(0).into_owned(),
+            moment: load.fixed_rows::<3>(3).into_owned(),
+        };
+    }
+
+    /// A state in a sea as one in the plane and the flow that stand for it, and what the sea is beside them.
+    pub fn in_sea(&self, condition: &Condition, sea: &Sea, wheels: &[usize]) -> (Condition, Waters) {
+        let plane = condition.water_plane(self.z0);
+        let condition = Condition { water_level: Some(plane.offset), ..*condition };
+        let up = plane.normal.into_inner();
+        let immersion = self.ellipsoid.share_under(&plane);
+        let clearance = condition.bed_clearance.unwrap_or_else(|| self.usual_clearance(immersion));
+        let [low, high] = self.ellipsoid.span(&plane);
+        let draft = Draft {
+            center: self.ellipsoid.center(),
+            half: self.ellipsoid.half_axes(),
+            low: low.min(0.0),
+            high: high.min(0.0),
+            water: plane.offset - self.z0 * up.z + clearance,
+        };
+        let mut places = [(0, Vec3::zeros()); MAX_WHEELS];
+        for (place, &surface) in places.iter_mut().zip(wheels) {
+            *place = (surface, self.centers[surface]);
+        }
+        sea.about(&condition, &draft, &places[..wheels.len().min(MAX_WHEELS)])
     }
 
     /// The loads in a state from what the water reaches and the motion does, which `out` holds.

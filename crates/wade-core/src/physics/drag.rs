@@ -25,9 +25,10 @@ use nalgebra::Vector3;
 
 use super::elements::{Element, LANES};
 use crate::condition::Condition;
-use crate::frame::{VISCOSITY, Vec3, WaterPlane};
+use crate::frame::{GRAVITY, VISCOSITY, Vec3, WaterPlane};
 use crate::lanes::{self, Instructions, run_for};
 use crate::real::{Dual, Real, norm};
+use crate::sea::Waters;
 use crate::vehicle::{SurfaceKind, Vehicle};
 use crate::wrench::Wrench;
 
@@ -247,7 +248,48 @@ impl Drag {
         );
     }
 
-    /// The same with derivatives.
+    /// The same in a sea, in which the water moves past each element as it does there; and in `pressures` what the pressure of the
+    /// sea adds to that under its plane (the Froude-Krylov load), about the body origin.
+    pub fn evaluate_in_sea(
+        &self,
+        (plane, condition): (&WaterPlane, &Condition),
+        wheel_speeds: &[f64],
+        waters: &Waters,
+        (out, pressures): (&mut [SurfaceDrag], &mut [Wrench]),
+    ) {
+        let flow = &self.flow(plane, condition);
+        let (weight, up) = (condition.density * GRAVITY, plane.normal.into_inner());
+        let mut unused = Slopes::NONE;
+        for (surface, (out, pressure)) in out.iter_mut().zip(pressures).enumerate() {
+            let (skin, is_track) = self.skin(condition, surface, wheel_speeds[surface]);
+            let mut sums = Sums::default();
+            *pressure = Wrench::default();
+            let [from, to] = self.ranges[surface];
+            for block in &self.blocks[from..to] {
+                let mut water = [[0.0; LANES]; 3];
+                for lane in 0..LANES {
+                    let at = Vec3::from(block.center.map(|axis| axis[lane]));
+                    let velocity = waters.velocity(&at);
+                    (0..3).for_each(|axis| water[axis][lane] = velocity[axis]);
+                    if waters.has_heads() {
+                        let [under, real] = waters.heads(surface, &at);
+                        let half = block.half_height(lane, &up);
+                        let head = mean_head(real, half) - mean_head(under, half);
+                        let normal = Vec3::from(block.normal.map(|axis| axis[lane]));
+                        let force = normal * (-weight * block.area[lane] * head);
+                        *pressure += Wrench { force, moment: at.cross(&force) };
+                    }
+                }
+                match is_track {
+                    true => block.add::<true, false>((flow, Some(&water)), skin, &mut sums, &mut unused),
+                    false => block.add::<false, false>((flow, Some(&water)), skin, &mut sums, &mut unused),
+                }
+            }
+            *out = sums.finish();
+        }
+    }
+
+    /// The same as [`Self::evaluate`] with derivatives.
     pub fn evaluate_dual<const N: usize>(
         &self,
         plane: &WaterPlane<Dual<N>>,
@@ -276,8 +318,8 @@ impl Drag {
         let Work { sums, slopes, columns, wet } = work;
         for block in &self.blocks[from..to] {
             match is_track {
-                true => block.add::<true, true>(flow, skin, sums, slopes),
-                false => block.add::<false, true>(flow, skin, sums, slopes),
+                true => block.add::<true, true>((flow, None), skin, sums, slopes),
+                false => block.add::<false, true>((flow, None), skin, sums, slopes),
             }
             if slopes.share.iter().any(|share| *share > 0.0) {
                 slopes.add_to(columns, &block.center);
@@ -295,8 +337,8 @@ impl Drag {
             let [from, to] = self.ranges[surface];
             for block in &self.blocks[from..to] {
                 match is_track {
-                    true => block.add::<true, false>(flow, skin, &mut sums, &mut unused),
-                    false => block.add::<false, false>(flow, skin, &mut sums, &mut unused),
+                    true => block.add::<true, false>((flow, None), skin, &mut sums, &mut unused),
+                    false => block.add::<false, false>((flow, None), skin, &mut sums, &mut unused),
                 }
             }
             *out = sums.finish();
@@ -430,10 +472,18 @@ impl Block {
         block
     }
 
+    /// Half the height of an element that is spread evenly about its center [m].
+    fn half_height(&self, lane: usize, up: &Vec3) -> f64 {
+        let s = |term: usize| self.spread[term][lane];
+        let squares = s(0) * up.x * up.x + s(1) * up.y * up.y + s(2) * up.z * up.z;
+        let products = s(3) * up.x * up.y + s(4) * up.x * up.z + s(5) * up.y * up.z;
+        (squares + products).max(0.0).sqrt()
+    }
+
     #[inline(always)]
     fn add<const IS_TRACK: bool, const SLOPES: bool>(
         &self,
-        flow: &Flow,
+        (flow, water): (&Flow, Option<&[Lane; 3]>),
         skin: Skin,
         sums: &mut Sums,
         slopes: &mut Slopes,
@@ -462,11 +512,14 @@ impl Block {
             let share = ((depth + reach) / range).clamp(0.0, 1.0);
             let wet = share * self.area[i];
             let [wx, wy, wz] = flow.rate;
-            let hull = [
+            let mut hull = [
                 flow.velocity[0] + (wy * z - wz * y),
                 flow.velocity[1] + (wz * x - wx * z),
                 flow.velocity[2] + (wx * y - wy * x),
             ];
+            if let Some(water) = water {
+                (0..3).for_each(|axis| hull[axis] -= water[axis][i]);
+            }
             let skin = if IS_TRACK {
                 [speed * nz, -speed * nx]
             } else {
@@ -550,6 +603,17 @@ impl Block {
             (slopes.skin[0][i], slopes.skin[1][i]) = (skin[0], skin[1]);
             slopes.share[i] = share;
         }
+    }
+}
+
+/// Mean of the head on an element whose center is at a head, above the surface none [m].
+fn mean_head(head: f64, half_height: f64) -> f64 {
+    if head >= half_height {
+        head
+    } else if head <= -half_height {
+        0.0
+    } else {
+        (head + half_height).powi(2) / (4.0 * half_height)
     }
 }
 

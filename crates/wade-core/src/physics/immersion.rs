@@ -39,6 +39,22 @@ impl Ellipsoid {
         norm(&up.component_mul(&self.half.map(T::from))).max(f64::MIN_POSITIVE.into())
     }
 
+    /// Its center [m].
+    pub fn center(&self) -> Vec3 {
+        self.center
+    }
+
+    /// Half its axes [m].
+    pub fn half_axes(&self) -> Vec3 {
+        self.half
+    }
+
+    /// Heights of its lowest and its highest point over a plane [m].
+    pub fn span(&self, plane: &WaterPlane) -> [f64; 2] {
+        let (reach, depth) = (self.reach(&plane.normal), plane.depth_below(&self.center));
+        [-depth - reach, reach - depth]
+    }
+
     /// Height over the body origin, upright, at which a share of it is under water [m].
     pub fn level_at(&self, share: f64) -> f64 {
         self.center.z + self.half.z * (2.0 * share - 1.0)

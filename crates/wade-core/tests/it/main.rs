@@ -23,6 +23,7 @@ mod model;
 mod physics;
 mod random;
 mod release;
+mod sea;
 mod shipped;
 mod stability;
 mod submergence;

@@ -84,7 +84,13 @@ impl Subject {
 
     /// Load of still water and the rest, about the body origin.
     fn loads(&self, state: &Condition, speeds: &[f64], physics: Physics, out: &mut Answer) -> [Wrench; 2] {
-        let motion = Motion { wheel_speeds: speeds, time_step: 0.0, implicit_added_mass: false, physics };
+        let motion = Motion {
+            wheel_speeds: speeds,
+            time_step: 0.0,
+            implicit_added_mass: false,
+            physics,
+            waters: None,
+        };
         self.base.evaluate(state, &motion, None, &mut out.base);
         let still = out.base.surfaces.iter().fold(Wrench::default(), |sum, s| sum + s.hydrostatic);
         let moving = match &self.model {
@@ -455,6 +461,7 @@ fn a_recording_that_begins_in_motion_was_in_motion_before() {
             time_step: 0.01,
             implicit_added_mass: true,
             physics: Physics::Full,
+            waters: None,
         };
         let mut load = || {
             subject.base.evaluate(&state, &motion, Some(memory), &mut out);

@@ -95,6 +95,7 @@ impl<'a> Release<'a> {
             time_step: dt,
             implicit_added_mass: true,
             physics: Physics::Full,
+            waters: None,
         };
         let state = self.condition();
         base.evaluate(&state, &motion, self.memory.as_mut(), out);

@@ -76,6 +76,7 @@ fn a_speed_turns_its_own_wheel_and_those_of_another_number_none() {
             time_step: 0.0,
             implicit_added_mass: false,
             physics: Physics::Full,
+            waters: None,
         };
         model.evaluate_moving(&state, (&motion, None), &mut workspace, &mut forces);
         forces.surfaces.iter().map(|surface| surface.force.x).collect()
@@ -110,6 +111,7 @@ fn drags(speed: f64, depth: f64, rim: f64) -> [f64; 2] {
             time_step: 0.0,
             implicit_added_mass: false,
             physics: Physics::QuasiSteady,
+            waters: None,
         };
         let state = Condition::level(Vec3::new(speed, 0.0, 0.0), depth);
         model.evaluate_moving(&state, (&motion, None), &mut workspace, &mut forces);

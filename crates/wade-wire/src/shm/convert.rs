@@ -4,10 +4,10 @@ use prost::Message;
 
 use super::layout::{
     Answer, BatchAnswer, DRY_CONTACT, EffectAnswer, FULL, HAS_ADDED_MASS, HAS_BED, HAS_BED_CLEARANCE,
-    HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_SHAFT_POWER, HAS_WATER_LEVEL, HAS_WHEEL_COUNT,
-    HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS, JACOBIAN, JacobianAnswer,
-    MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query, RESERVED_LEN, Status,
-    SurfaceAnswer, VehicleAnswer,
+    HAS_CURRENT_EXPONENT, HAS_DAMPING, HAS_DEPTH_RATE, HAS_HEADING, HAS_SHAFT_POWER, HAS_WATER_LEVEL,
+    HAS_WAVE, HAS_WHEEL_COUNT, HAS_WHEEL_LEVELS, HAS_WHEEL_SPEEDS, HYDROSTATIC, IMPLICIT_ADDED_MASS,
+    JACOBIAN, JacobianAnswer, MAX_BATCH, MAX_EFFECTS, MAX_WHEELS, PROVENANCE_LEN, QUASI_STEADY, Query,
+    RESERVED_LEN, Status, SurfaceAnswer, VehicleAnswer,
 };
 use crate::proto;
 use crate::{Evaluated, Field, InvalidState, Problem, State, added_mass, by_rows, single};
@@ -30,7 +30,9 @@ const QUERY_FLAGS: u64 = DRY_CONTACT
     | HYDROSTATIC
     | QUASI_STEADY
     | FULL
-    | JACOBIAN;
+    | JACOBIAN
+    | HAS_WAVE
+    | HAS_CURRENT_EXPONENT;
 
 impl Query {
     /// The state, or what it sets that cannot be used. Its values are not checked yet.
@@ -38,9 +40,8 @@ impl Query {
         if self.flags & !QUERY_FLAGS != 0 {
             return Err(InvalidState::new(Field::Flags, Problem::Unsupported));
         }
-        if self.has(HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m)? {
-            return Err(InvalidState::new(Field::WheelWaterLevel, Problem::Unsupported));
-        }
+        let wheel_levels = self.has(HAS_WHEEL_LEVELS, Field::WheelWaterLevel, &self.wheel_water_level_m)?;
+        let has_wave = self.flags & HAS_WAVE != 0;
         let optional = |flag: u64, field: Field, value: f32| {
             Ok::<_, InvalidState>(self.has(flag, field, &[value])?.then_some(value))
         };
@@ -65,7 +66,7 @@ impl Query {
             dry_contact: self.flags & DRY_CONTACT != 0,
             heading: heading.then_some(self.heading_rad),
             depth_rate: depth_rate.then_some(self.depth_rate_mps),
-            wheel_speeds: wheel_speeds.then(|| self.wheel_speeds()),
+            wheel_speeds: wheel_speeds.then(|| stated(&self.wheel_speed_radps)),
             time_step: self.time_step_s,
             implicit_added_mass: self.flags & IMPLICIT_ADDED_MASS != 0,
             physics: match self.flags & (HYDROSTATIC | QUASI_STEADY | FULL) {
@@ -76,14 +77,15 @@ impl Query {
                 _ => return Err(InvalidState::new(Field::Physics, Problem::Unknown)),
             },
             jacobian: self.flags & JACOBIAN != 0,
+            wave_vector: if has_wave { self.wave_vector_radpm } else { [0.0; 3] },
+            wave_amplitude: if has_wave { self.wave_amplitude_m } else { 0.0 },
+            wave_phase: if has_wave { self.wave_phase_rad } else { 0.0 },
+            wheel_levels: wheel_levels.then(|| stated(&self.wheel_water_level_m)),
+            current_exponent: match self.flags & HAS_CURRENT_EXPONENT {
+                0 => 0.0,
+                _ => self.current_exponent,
+            },
         })
-    }
-
-    /// The wheel speeds up to the last that is a number. Whether they are those of all wheels is checked where the vehicle is known.
-    fn wheel_speeds(&self) -> PerWheel<f32> {
-        let speeds = &self.wheel_speed_radps;
-        let count = speeds.iter().rposition(|speed| !speed.is_nan()).map_or(1, |last| last + 1);
-        PerWheel::new(&speeds[..count]).unwrap_or_else(PerWheel::none)
     }
 
     /// Whether the flag of an input is set. A value without its flag is a client's mistake, not a value to pass over.
@@ -96,13 +98,26 @@ impl Query {
     }
 }
 
+/// The values of wheels up to the last that is a number. Whether they are those of all wheels is checked where the vehicle is known.
+fn stated(values: &[f32; MAX_WHEELS]) -> PerWheel<f32> {
+    let count = values.iter().rposition(|value| !value.is_nan()).map_or(1, |last| last + 1);
+    PerWheel::new(&values[..count]).unwrap_or_else(PerWheel::none)
+}
+
+/// Values of wheels in the first places, and NaN behind them.
+fn places(values: Option<PerWheel<f32>>) -> [f32; MAX_WHEELS] {
+    let mut places = [f32::NAN; MAX_WHEELS];
+    if let Some(values) = values {
+        places[..values.len()].copy_from_slice(&values);
+    }
+    places
+}
+
 impl From<&State> for Query {
     fn from(state: &State) -> Self {
         let flag = |set: bool, flag: u64| if set { flag } else { 0 };
-        let mut wheel_speed_radps = [f32::NAN; MAX_WHEELS];
-        if let Some(speeds) = state.wheel_speeds {
-            wheel_speed_radps[..speeds.len()].copy_from_slice(&speeds);
-        }
+        let (waves, sheared) = (state.wave_amplitude != 0.0, state.current_exponent != 0.0);
+        let set = |set: bool, value: f32| if set { value } else { f32::NAN };
         Self {
             flags: flag(state.dry_contact, DRY_CONTACT)
                 | flag(state.implicit_added_mass, IMPLICIT_ADDED_MASS)
@@ -113,6 +128,9 @@ impl From<&State> for Query {
                 | flag(state.water_level.is_some(), HAS_WATER_LEVEL)
                 | flag(state.bed_clearance.is_some(), HAS_BED_CLEARANCE)
                 | flag(state.bed.is_some(), HAS_BED)
+                | flag(state.wheel_levels.is_some(), HAS_WHEEL_LEVELS)
+                | flag(waves, HAS_WAVE)
+                | flag(sheared, HAS_CURRENT_EXPONENT)
                 | state.physics.map_or(0, |physics| match physics {
                     Physics::Hydrostatic => HYDROSTATIC,
                     Physics::QuasiSteady => QUASI_STEADY,
@@ -131,7 +149,12 @@ impl From<&State> for Query {
             gravity_direction: state.gravity,
             heading_rad: state.heading.unwrap_or(f32::NAN),
             depth_rate_mps: state.depth_rate.unwrap_or(f32::NAN),
-            wheel_speed_radps,
+            wheel_speed_radps: places(state.wheel_speeds),
+            wheel_water_level_m: places(state.wheel_levels),
+            wave_vector_radpm: state.wave_vector.map(|part| set(waves, part)),
+            wave_amplitude_m: set(waves, state.wave_amplitude),
+            wave_phase_rad: set(waves, state.wave_phase),
+            current_exponent: set(sheared, state.current_exponent),
             time_step_s: state.time_step,
             ..Self::UNSET
         }
@@ -266,12 +289,15 @@ impl Answer {
     pub fn refusal_of(&self, state: &State) -> Option<InvalidState> {
         let invalid = self.refusal()?;
         let wheels = (self.flags & HAS_WHEEL_COUNT != 0).then_some(self.wheel_count as usize);
-        match (wheels, &state.wheel_speeds) {
-            (Some(wheels), Some(given))
-                if (invalid.field, invalid.problem) == (Field::WheelSpeed, Problem::Count) =>
-            {
-                // the names of the wheels are not in shared memory
-                Some(InvalidState::wheels(given.len(), wheels, ""))
+        let given = match invalid.field {
+            Field::WheelSpeed => &state.wheel_speeds,
+            Field::WheelWaterLevel => &state.wheel_levels,
+            _ => &None,
+        };
+        match (wheels, given) {
+            (Some(wheels), Some(given)) if invalid.problem == Problem::Count => {
+                // the names of the wheels are not in this page
+                Some(InvalidState::wheels(invalid.field, given.len(), wheels, ""))
             }
             _ => Some(invalid),
         }

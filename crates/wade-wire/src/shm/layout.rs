@@ -41,8 +41,10 @@ pub const DESCRIPTION_LEN: usize = 65_376;
 pub const PROVENANCE_LEN: usize = 64;
 /// Bytes that each message had without a meaning when the layout began.
 pub const RESERVED_LEN: usize = 128;
-/// Those of them that an [`Answer`] and a [`Query`] have left.
+/// Those of them that an [`Answer`] has left.
 pub const RESERVED_LEFT: usize = 120;
+/// Those of them that a [`Query`] has left.
+pub const QUERY_RESERVED: usize = 96;
 
 /// Version of the layout, as the names of the services have it.
 pub const VERSION: &str = "v4";
@@ -139,6 +141,11 @@ pub const FULL: u64 = 2048;
 /// Flag of [`Query::flags`]: the derivatives of the wrench are asked for, for which only [`Names::evaluate_jacobian`] has room: it
 /// gives them with the flag and without it.
 pub const JACOBIAN: u64 = 4096;
+/// Flag of [`Query::flags`]: `wave_vector_radpm`, `wave_amplitude_m` and `wave_phase_rad` are set. Without it they are not read:
+/// clients of the first day have zeros there.
+pub const HAS_WAVE: u64 = 8192;
+/// Flag of [`Query::flags`]: `current_exponent` is set. Without it it is not read.
+pub const HAS_CURRENT_EXPONENT: u64 = 16384;
 /// Flag of [`Answer::flags`]: the server polls, so that waking it is of no use.
 pub const SERVER_POLLS: u64 = 1;
 /// Flag of [`Answer::flags`]: the session begins with this query, at rest and dry. In the middle of a run it says that the
@@ -203,8 +210,16 @@ pub struct Query {
     /// The client's own number, drawn at random: its sessions are the same on the services for single queries with derivatives
     /// and without. 0 for none: they are apart.
     pub owner: u64,
+    /// Wave number of a regular wave along the direction in which it travels [rad/m].
+    pub wave_vector_radpm: [f32; 3],
+    /// Half its height [m].
+    pub wave_amplitude_m: f32,
+    /// Its phase at the body origin [rad]: a crest at 0, and after it the water falls.
+    pub wave_phase_rad: f32,
+    /// Exponent of the profile of the current over the height over the bed; 0 of one that is even.
+    pub current_exponent: f32,
     /// Zero.
-    pub reserved: [u8; RESERVED_LEFT],
+    pub reserved: [u8; QUERY_RESERVED],
 }
 
 /// The load of one effect. 32 bytes.
@@ -430,7 +445,11 @@ impl Query {
         wheel_speed_radps: [f32::NAN; MAX_WHEELS],
         wheel_water_level_m: [f32::NAN; MAX_WHEELS],
         owner: 0,
-        reserved: [0; RESERVED_LEFT],
+        wave_vector_radpm: [f32::NAN; 3],
+        wave_amplitude_m: f32::NAN,
+        wave_phase_rad: f32::NAN,
+        current_exponent: f32::NAN,
+        reserved: [0; QUERY_RESERVED],
     };
 }
 

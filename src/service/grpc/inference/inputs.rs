@@ -12,7 +12,7 @@ use wade_wire::proto::inference::{InferParameter, ModelInferRequest};
 use wade_wire::{Field, InvalidState, Problem, Refusal, TensorFault};
 
 /// The inputs of every vehicle with their values a state, by the names of the arrays of a batch. All are FP32.
-const INPUTS: [(Field, usize); 13] = [
+const INPUTS: [(Field, usize); 17] = [
     (Field::Depth, 1),
     (Field::WaterLevel, 1),
     (Field::BedClearance, 1),
@@ -26,14 +26,21 @@ const INPUTS: [(Field, usize); 13] = [
     (Field::Gravity, 3),
     (Field::Heading, 1),
     (Field::DepthRate, 1),
+    (Field::WaveVector, 3),
+    (Field::WaveAmplitude, 1),
+    (Field::WavePhase, 1),
+    (Field::CurrentExponent, 1),
 ];
+
+/// Those with a value a wheel.
+const OF_WHEELS: [Field; 2] = [Field::WheelSpeed, Field::WheelWaterLevel];
 
 /// The inputs of a vehicle with the rest of their shapes behind the number of states: a scalar has none.
 pub fn of_vehicle(vehicle: &ServedVehicle) -> impl Iterator<Item = (Field, Option<usize>)> {
     let wheels = vehicle.model().wheels().len();
-    let has_speeds = (1..=MAX_WHEELS).contains(&wheels);
+    let of_wheels = OF_WHEELS.into_iter().filter(move |_| (1..=MAX_WHEELS).contains(&wheels));
     let input = |(field, width): (Field, usize)| (field, (width > 1).then_some(width));
-    INPUTS.into_iter().map(input).chain(has_speeds.then_some((Field::WheelSpeed, Some(wheels))))
+    INPUTS.into_iter().map(input).chain(of_wheels.map(move |field| (field, Some(wheels))))
 }
 
 /// The parameters of a request, which hold for all its states.
@@ -91,12 +98,12 @@ fn names(vehicle: &ServedVehicle) -> String {
     of_vehicle(vehicle).map(|(field, _)| field.name()).collect::<Vec<_>>().join(", ")
 }
 
-/// Refuses the speeds of another number of wheels than the vehicle has, and names these.
+/// Refuses values of another number of wheels than the vehicle has, and names these.
 fn check_wheels(input: &InferInputTensor, vehicle: &ServedVehicle) -> Result<(), Refusal> {
     let wheels = vehicle.model().wheels().len();
-    match *input.shape.as_slice() {
-        [_, given] if input.name == Field::WheelSpeed.name() && given != wheels as i64 => {
-            Err(InvalidState::wheel_count(usize::try_from(given).unwrap_or(0), vehicle).into())
+    match (input.shape.as_slice(), OF_WHEELS.into_iter().find(|field| field.name() == input.name)) {
+        (&[_, given], Some(field)) if given != wheels as i64 => {
+            Err(InvalidState::wheel_count(field, usize::try_from(given).unwrap_or(0), vehicle).into())
         }
         _ => Ok(()),
     }
@@ -178,7 +185,12 @@ fn array(batch: &mut proto::EvaluateBatchRequest, field: Field) -> Option<&mut V
         Field::WaterLevel => &mut batch.water_level_m,
         Field::BedClearance => &mut batch.bed_clearance_m,
         Field::Bed => &mut batch.bed,
-        Field::WheelWaterLevel | Field::Flags | Field::Physics | Field::Jacobian => return None,
+        Field::WheelWaterLevel => &mut batch.wheel_water_level_m,
+        Field::WaveVector => &mut batch.wave_vector_radpm,
+        Field::WaveAmplitude => &mut batch.wave_amplitude_m,
+        Field::WavePhase => &mut batch.wave_phase_rad,
+        Field::CurrentExponent => &mut batch.current_exponent,
+        Field::Flags | Field::Physics | Field::Jacobian => return None,
     })
 }
 

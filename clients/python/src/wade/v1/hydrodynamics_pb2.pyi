@@ -144,7 +144,7 @@ class RollPitch(_message.Message):
     def __init__(self, roll_rad: _Optional[float] = ..., pitch_rad: _Optional[float] = ...) -> None: ...
 
 class State(_message.Message):
-    __slots__ = ("velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "world_from_body", "roll_pitch", "ground_contact", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "time_step_s", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics", "jacobian")
+    __slots__ = ("velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "world_from_body", "roll_pitch", "ground_contact", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "time_step_s", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics", "jacobian", "wave_vector_radpm", "wave_amplitude_m", "wave_phase_rad", "wheel_water_level_m", "current_exponent")
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
     CURRENT_MPS_FIELD_NUMBER: _ClassVar[int]
     ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
@@ -166,6 +166,11 @@ class State(_message.Message):
     BED_FIELD_NUMBER: _ClassVar[int]
     PHYSICS_FIELD_NUMBER: _ClassVar[int]
     JACOBIAN_FIELD_NUMBER: _ClassVar[int]
+    WAVE_VECTOR_RADPM_FIELD_NUMBER: _ClassVar[int]
+    WAVE_AMPLITUDE_M_FIELD_NUMBER: _ClassVar[int]
+    WAVE_PHASE_RAD_FIELD_NUMBER: _ClassVar[int]
+    WHEEL_WATER_LEVEL_M_FIELD_NUMBER: _ClassVar[int]
+    CURRENT_EXPONENT_FIELD_NUMBER: _ClassVar[int]
     velocity_mps: Vector3
     current_mps: Vector3
     angular_velocity_radps: Vector3
@@ -187,7 +192,12 @@ class State(_message.Message):
     bed: float
     physics: Physics
     jacobian: bool
-    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., heading_rad: _Optional[float] = ..., depth_rate_mps: _Optional[float] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., time_step_s: _Optional[float] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[float] = ..., bed_clearance_m: _Optional[float] = ..., bed: _Optional[float] = ..., physics: _Optional[_Union[Physics, str]] = ..., jacobian: bool = ...) -> None: ...
+    wave_vector_radpm: Vector3
+    wave_amplitude_m: float
+    wave_phase_rad: float
+    wheel_water_level_m: _containers.RepeatedScalarFieldContainer[float]
+    current_exponent: float
+    def __init__(self, velocity_mps: _Optional[_Union[Vector3, _Mapping]] = ..., current_mps: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vector3, _Mapping]] = ..., acceleration_mps2: _Optional[_Union[Vector3, _Mapping]] = ..., angular_acceleration_radps2: _Optional[_Union[Vector3, _Mapping]] = ..., depth_m: _Optional[float] = ..., density_kgpm3: _Optional[float] = ..., gravity_direction: _Optional[_Union[Vector3, _Mapping]] = ..., world_from_body: _Optional[_Union[Quaternion, _Mapping]] = ..., roll_pitch: _Optional[_Union[RollPitch, _Mapping]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., heading_rad: _Optional[float] = ..., depth_rate_mps: _Optional[float] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., time_step_s: _Optional[float] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[float] = ..., bed_clearance_m: _Optional[float] = ..., bed: _Optional[float] = ..., physics: _Optional[_Union[Physics, str]] = ..., jacobian: bool = ..., wave_vector_radpm: _Optional[_Union[Vector3, _Mapping]] = ..., wave_amplitude_m: _Optional[float] = ..., wave_phase_rad: _Optional[float] = ..., wheel_water_level_m: _Optional[_Iterable[float]] = ..., current_exponent: _Optional[float] = ...) -> None: ...
 
 class BaseAnswer(_message.Message):
     __slots__ = ("water_level_m", "bed_clearance_m", "bed", "shaft_power_w", "damping")
@@ -294,7 +304,7 @@ class Outside(_message.Message):
     def __init__(self, quantity: _Optional[_Union[Quantity, str]] = ..., excess: _Optional[float] = ..., index: _Optional[int] = ...) -> None: ...
 
 class EvaluateBatchRequest(_message.Message):
-    __slots__ = ("vehicle", "velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "ground_contact", "omit_surfaces", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics", "jacobian")
+    __slots__ = ("vehicle", "velocity_mps", "current_mps", "angular_velocity_radps", "acceleration_mps2", "angular_acceleration_radps2", "depth_m", "density_kgpm3", "gravity_direction", "ground_contact", "omit_surfaces", "heading_rad", "depth_rate_mps", "wheel_speed_radps", "implicit_added_mass", "water_level_m", "bed_clearance_m", "bed", "physics", "jacobian", "wave_vector_radpm", "wave_amplitude_m", "wave_phase_rad", "wheel_water_level_m", "current_exponent")
     VEHICLE_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
     CURRENT_MPS_FIELD_NUMBER: _ClassVar[int]
@@ -315,6 +325,11 @@ class EvaluateBatchRequest(_message.Message):
     BED_FIELD_NUMBER: _ClassVar[int]
     PHYSICS_FIELD_NUMBER: _ClassVar[int]
     JACOBIAN_FIELD_NUMBER: _ClassVar[int]
+    WAVE_VECTOR_RADPM_FIELD_NUMBER: _ClassVar[int]
+    WAVE_AMPLITUDE_M_FIELD_NUMBER: _ClassVar[int]
+    WAVE_PHASE_RAD_FIELD_NUMBER: _ClassVar[int]
+    WHEEL_WATER_LEVEL_M_FIELD_NUMBER: _ClassVar[int]
+    CURRENT_EXPONENT_FIELD_NUMBER: _ClassVar[int]
     vehicle: str
     velocity_mps: _containers.RepeatedScalarFieldContainer[float]
     current_mps: _containers.RepeatedScalarFieldContainer[float]
@@ -335,7 +350,12 @@ class EvaluateBatchRequest(_message.Message):
     bed: _containers.RepeatedScalarFieldContainer[float]
     physics: Physics
     jacobian: bool
-    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: bool = ..., heading_rad: _Optional[_Iterable[float]] = ..., depth_rate_mps: _Optional[_Iterable[float]] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[_Iterable[float]] = ..., bed_clearance_m: _Optional[_Iterable[float]] = ..., bed: _Optional[_Iterable[float]] = ..., physics: _Optional[_Union[Physics, str]] = ..., jacobian: bool = ...) -> None: ...
+    wave_vector_radpm: _containers.RepeatedScalarFieldContainer[float]
+    wave_amplitude_m: _containers.RepeatedScalarFieldContainer[float]
+    wave_phase_rad: _containers.RepeatedScalarFieldContainer[float]
+    wheel_water_level_m: _containers.RepeatedScalarFieldContainer[float]
+    current_exponent: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, vehicle: _Optional[str] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., current_mps: _Optional[_Iterable[float]] = ..., angular_velocity_radps: _Optional[_Iterable[float]] = ..., acceleration_mps2: _Optional[_Iterable[float]] = ..., angular_acceleration_radps2: _Optional[_Iterable[float]] = ..., depth_m: _Optional[_Iterable[float]] = ..., density_kgpm3: _Optional[_Iterable[float]] = ..., gravity_direction: _Optional[_Iterable[float]] = ..., ground_contact: _Optional[_Union[GroundContact, str]] = ..., omit_surfaces: bool = ..., heading_rad: _Optional[_Iterable[float]] = ..., depth_rate_mps: _Optional[_Iterable[float]] = ..., wheel_speed_radps: _Optional[_Iterable[float]] = ..., implicit_added_mass: bool = ..., water_level_m: _Optional[_Iterable[float]] = ..., bed_clearance_m: _Optional[_Iterable[float]] = ..., bed: _Optional[_Iterable[float]] = ..., physics: _Optional[_Union[Physics, str]] = ..., jacobian: bool = ..., wave_vector_radpm: _Optional[_Iterable[float]] = ..., wave_amplitude_m: _Optional[_Iterable[float]] = ..., wave_phase_rad: _Optional[_Iterable[float]] = ..., wheel_water_level_m: _Optional[_Iterable[float]] = ..., current_exponent: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class EvaluateBatchResponse(_message.Message):
     __slots__ = ("surface_force_n", "surface_point_m", "wetted_fraction", "force_n", "moment_nm", "about_m", "uncertainty_n", "outside", "bundle_version", "provenance", "compute_ns", "effects", "effect_force_n", "effect_moment_nm", "effect_left_out", "effect_surface_force_n", "effects_outside", "added_mass", "surface_couple_nm", "moment_uncertainty_nm", "base", "jacobian")

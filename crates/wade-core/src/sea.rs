@@ -1,0 +1,296 @@
+//! How water moves that is neither still nor in uniform flow: a regular wave, a surface that was sampled at the wheels, a current
+//! with a profile over the depth.
+//!
+//! The wave is Airy's, in water of finite depth `h` (Newman, Marine Hydrodynamics, section 6.3): with `theta = phase + k . r`
+//!
+//! `eta = a cos(theta)`, `w^2 = g k tanh(k h)`, `p = -rho g z + rho g eta cosh(k (z + h)) / cosh(k h)`,
+//! `u = a w cosh(k (z + h)) / sinh(k h) cos(theta)` along `k`, `w_z = a w sinh(k (z + h)) / sinh(k h) sin(theta)`
+//!
+//! at the height `z` over still water. Above still water the pressure is that of the surface over it, and velocities are those at
+//! `z = 0`.
+//!
+//! The profile of a current of the mean `U` is a power of the height `s h` over the bed, `U (1 + n) s^n`: open channels have an
+//! `n` of 1/7 to 1/6 (Chow, Open-Channel Hydraulics, 1959, section 8-3).
+
+use nalgebra::{Matrix2, SymmetricEigen, Vector2};
+
+use crate::condition::Condition;
+use crate::frame::{GRAVITY, Vec3};
+use crate::vehicle::{MAX_SURFACES, PerWheel};
+
+/// Least depth of the water under the wave [m]: below it there is nothing to wade in.
+const LEAST_DEPTH: f64 = 1e-3;
+/// Variance of the wheels' places across a line, over that along it, below which they lie on the line [-].
+const ON_A_LINE: f64 = 1e-6;
+
+/// A regular wave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wave {
+    /// Wave number along the direction in which the wave travels, body frame [rad/m]; its part along up is left out.
+    pub vector: Vec3,
+    /// Half the height from trough to crest [m].
+    pub amplitude: f64,
+    /// `k . x - w t` at the body origin [rad]: a crest at 0, and after it the water falls.
+    pub phase: f64,
+}
+
+/// What the water does beside lying still or flowing evenly.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sea {
+    /// A wave about the level of the state.
+    pub wave: Option<Wave>,
+    /// Height of the water surface above the body origin along up at each wheel [m]; the level of the state is then that at the
+    /// body origin.
+    pub wheel_levels: Option<PerWheel<f64>>,
+    /// Exponent of the profile of the current [-]; 0 of one that is even.
+    pub current_exponent: f64,
+}
+
+/// Where a hull is in the water, along up from its lowest wet point to its highest.
+#[derive(Debug, Clone, Copy)]
+pub struct Draft {
+    /// The middle of the hull [m].
+    pub center: Vec3,
+    /// Half its length, width and height [m].
+    pub half: Vec3,
+    /// Lowest point over still water [m].
+    pub low: f64,
+    /// Highest wet point over still water [m].
+    pub high: f64,
+    /// Depth of the water [m].
+    pub water: f64,
+}
+
+/// The sea about a hull in a state; body frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Waters {
+    up: Vec3,
+    /// Height of still water over the body origin [m].
+    level: f64,
+    depth: f64,
+    /// Height of the plane that stands for the surface over the body origin [m], and its slope.
+    plane: (f64, Vec3),
+    wave: Option<Train>,
+    /// How much higher the water stands at a surface than the plane [m].
+    rises: Option<[f64; MAX_SURFACES]>,
+    /// Mean current, its exponent, and the share of it that the state already has.
+    current: Option<(Vec3, f64, f64)>,
+    /// Velocity of the wave that the state already has [m/s].
+    orbit: Vec3,
+    /// Acceleration of the water about the hull [m/s2].
+    pub acceleration: Vec3,
+}
+
+/// A wave in water of a depth.
+#[derive(Debug, Clone, Copy)]
+struct Train {
+    vector: Vec3,
+    number: f64,
+    frequency: f64,
+    amplitude: f64,
+    phase: f64,
+}
+
+impl Wave {
+    /// Angular frequency in water of this depth [rad/s], `w^2 = g k tanh(k h)`.
+    pub fn frequency(number: f64, depth: f64) -> f64 {
+        (GRAVITY * number * (number * depth).tanh()).sqrt()
+    }
+}
+
+impl Train {
+    /// `cosh(k (z + h)) / cosh(k h)` and the same over `sinh(k h)` of cosh and sinh, without their size.
+    fn decay(&self, z: f64, depth: f64) -> [f64; 3] {
+        let k = self.number;
+        let z = z.clamp(-depth, 0.0);
+        let (down, back, there) = ((k * z).exp(), (-k * (z + 2.0 * depth)).exp(), (-2.0 * k * depth).exp());
+        let [sum, difference] = [down + back, down - back];
+        let narrow = (1.0 - there).max(f64::MIN_POSITIVE);
+        [sum / (1.0 + there), sum / narrow, difference / narrow]
+    }
+
+    fn angle(&self, point: &Vec3) -> f64 {
+        self.phase + self.vector.dot(point)
+    }
+
+    /// Horizontal and vertical size of velocity [m/s] at a height, without the phase.
+    fn speeds(&self, z: f64, depth: f64) -> [f64; 2] {
+        let [_, level, upright] = self.decay(z, depth);
+        [level, upright].map(|share| self.amplitude * self.frequency * share)
+    }
+
+    /// Velocity of the water [m/s].
+    fn velocity(&self, up: &Vec3, angle: f64, [level, upright]: [f64; 2]) -> Vec3 {
+        let (sine, cosine) = angle.sin_cos();
+        self.vector * (level * cosine / self.number) + up * (upright * sine)
+    }
+
+    /// And its acceleration [m/s2].
+    fn acceleration(&self, up: &Vec3, angle: f64, [level, upright]: [f64; 2]) -> Vec3 {
+        let (sine, cosine) = angle.sin_cos();
+        (self.vector * (level * sine / self.number) - up * (upright * cosine)) * self.frequency
+    }
+}
+
+impl Sea {
+    /// True where the water lies still or flows evenly.
+    pub fn is_calm(&self) -> bool {
+        *self == Self { current_exponent: 0.0, ..Self::default() }
+    }
+
+    /// The state of a hull in the plane and the flow that stand for this sea about it, and what the sea is beside them. `wheels`
+    /// are the places of the wheels with their surfaces; `condition` has a water level.
+    pub fn about(
+        &self,
+        condition: &Condition,
+        draft: &Draft,
+        wheels: &[(usize, Vec3)],
+    ) -> (Condition, Waters) {
+        let up = condition.up.into_inner();
+        let level = condition.water_level.unwrap_or(0.0);
+        let depth = draft.water.max(LEAST_DEPTH);
+        let wave = self.wave.and_then(|wave| {
+            let vector = wave.vector - up * up.dot(&wave.vector);
+            let number = vector.norm();
+            let frequency = Wave::frequency(number, depth);
+            // one without length, and one that is flat, is no wave
+            (number > 0.0 && wave.amplitude != 0.0).then_some(Train {
+                vector,
+                number,
+                frequency,
+                amplitude: wave.amplitude,
+                phase: wave.phase,
+            })
+        });
+        let mut rises = None;
+        let plane = match (&wave, &self.wheel_levels) {
+            (Some(train), _) => {
+                let (sine, cosine) = train.phase.sin_cos();
+                (level + train.amplitude * cosine, train.vector * (-train.amplitude * sine))
+            }
+            (None, Some(levels)) => {
+                let samples: Vec<(Vec3, f64)> =
+                    wheels.iter().zip(levels.iter()).map(|((_, at), height)| (*at, *height)).collect();
+                let plane = fitted(&up, level, &samples);
+                let mut rise = [0.0; MAX_SURFACES];
+                for ((surface, at), (_, height)) in wheels.iter().zip(&samples) {
+                    rise[*surface] = height - (plane.0 + plane.1.dot(at));
+                }
+                rises = Some(rise);
+                plane
+            }
+            (None, None) => (level, Vec3::zeros()),
+        };
+        let (orbit, acceleration) = wave.map_or_else(Default::default, |train| {
+            // sections answer to the water at their mean depth along the hull, and at their lowest point up and down
+            // (Salvesen, Tuck, Faltinsen 1970); the hull to the mean over its sections
+            let along =
+                train.vector.component_mul(&draft.half).map(|x| if x == 0.0 { 1.0 } else { x.sin() / x });
+            let mean = along.product();
+            let middle = train.speeds(0.5 * (draft.low + draft.high), depth)[0];
+            let lowest = train.speeds(draft.low, depth)[1];
+            let angle = train.angle(&draft.center);
+            let speeds = [mean * middle, mean * lowest];
+            (train.velocity(&up, angle, speeds), train.acceleration(&up, angle, speeds))
+        });
+        let current = (self.current_exponent > 0.0).then(|| {
+            let current = condition.ground_velocity - condition.velocity;
+            let n = self.current_exponent;
+            let [low, high] = [draft.low, draft.high].map(|z| (1.0 + z / depth).clamp(0.0, 1.0));
+            // the mean over the draft
+            let share = match high - low {
+                draft if draft > 1e-6 => (high.powf(n + 1.0) - low.powf(n + 1.0)) / draft,
+                _ => (1.0 + n) * high.powf(n),
+            };
+            (current, n, share)
+        });
+        let flow = current.map_or_else(Vec3::zeros, |(mean, _, share)| mean * (share - 1.0));
+        let (height, slope) = plane;
+        let steep = (1.0 + slope.norm_squared()).sqrt();
+        let state = Condition {
+            velocity: condition.velocity - flow - orbit,
+            up: nalgebra::UnitVector3::new_normalize(up - slope),
+            water_level: Some(height / steep),
+            ..*condition
+        };
+        (state, Waters { up, level, depth, plane, wave, rises, current, orbit, acceleration })
+    }
+}
+
+impl Waters {
+    /// Pressure of water at rest under the plane, over that with the plane's slope left out [-].
+    pub fn steepness(&self) -> f64 {
+        (1.0 + self.plane.1.norm_squared()).sqrt()
+    }
+
+    /// Height of still water over the body origin [m].
+    pub fn level(&self) -> f64 {
+        self.level
+    }
+
+    /// Heads of the pressure at a point of a surface [m]: under the plane, and of this sea.
+    pub fn heads(&self, surface: usize, point: &Vec3) -> [f64; 2] {
+        let height = self.up.dot(point);
+        let under = self.plane.0 + self.plane.1.dot(point) - height;
+        let real = match (&self.wave, &self.rises) {
+            (Some(train), _) => {
+                let z = height - self.level;
+                train.amplitude * train.angle(point).cos() * train.decay(z, self.depth)[0] - z
+            }
+            (None, Some(rises)) => under + rises[surface],
+            (None, None) => under,
+        };
+        [under, real]
+    }
+
+    /// Whether the pressure differs from that under the plane anywhere.
+    pub fn has_heads(&self) -> bool {
+        self.wave.is_some() || self.rises.is_some()
+    }
+
+    /// Velocity of the water at a point, less the one that the state has [m/s].
+    pub fn velocity(&self, point: &Vec3) -> Vec3 {
+        let z = self.up.dot(point) - self.level;
+        let mut velocity = Vec3::zeros();
+        if let Some(train) = &self.wave {
+            velocity +=
+                train.velocity(&self.up, train.angle(point), train.speeds(z, self.depth)) - self.orbit;
+        }
+        if let Some((mean, n, share)) = &self.current {
+            let s = (1.0 + z / self.depth).clamp(0.0, 1.0);
+            velocity += mean * ((1.0 + n) * s.powf(*n) - share);
+        }
+        velocity
+    }
+}
+
+/// The plane next to the samples by least squares: its height over the body origin, where it was sampled too, and its slope, which
+/// is level in directions in which nothing was sampled.
+fn fitted(up: &Vec3, level: f64, samples: &[(Vec3, f64)]) -> (f64, Vec3) {
+    let ahead =
+        (Vec3::x() - up * up.x).try_normalize(0.1).unwrap_or_else(|| up.cross(&Vec3::y()).normalize());
+    let left = up.cross(&ahead);
+    let all = || {
+        let flat = |at: &Vec3| Vector2::new(ahead.dot(at), left.dot(at));
+        std::iter::once((Vector2::zeros(), level))
+            .chain(samples.iter().map(move |(at, height)| (flat(at), *height)))
+    };
+    let count = all().count() as f64;
+    let place = all().map(|(at, _)| at).sum::<Vector2<f64>>() / count;
+    let mean = all().map(|(_, height)| height).sum::<f64>() / count;
+    let (mut spread, mut tilt) = (Matrix2::zeros(), Vector2::zeros());
+    for (at, height) in all() {
+        let from = at - place;
+        spread += from * from.transpose();
+        tilt += from * (height - mean);
+    }
+    let SymmetricEigen { eigenvectors, eigenvalues } = spread.symmetric_eigen();
+    let widest = eigenvalues.max();
+    let mut slope = Vector2::zeros();
+    for (axis, &variance) in eigenvectors.column_iter().zip(eigenvalues.iter()) {
+        if variance > ON_A_LINE * widest {
+            slope += axis * (axis.dot(&tilt) / variance);
+        }
+    }
+    (mean - slope.dot(&place), ahead * slope.x + left * slope.y)
+}
