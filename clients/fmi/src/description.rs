@@ -3,8 +3,11 @@
 use std::fmt::Write;
 
 use serde_json::json;
+use wade_core::condition::Condition;
 use wade_core::domain::Quantity;
-use wade_core::model::Model;
+use wade_core::forces::Forces;
+use wade_core::frame::Vec3;
+use wade_core::model::{Form, Model, Workspace};
 
 use crate::settings::Settings;
 use crate::variables::{Causality, Kind, PHYSICS, Variable};
@@ -169,6 +172,30 @@ pub fn page(settings: &Settings, model: &Model) -> String {
     text
 }
 
+/// Shares of the ranges of depth and speed at which the deviation is stated as an example.
+const EXAMPLES: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// Force and deviation straight ahead in fresh water in the middle of the training domain; none without one.
+fn examples(model: &Model) -> Vec<serde_json::Value> {
+    let [depth, speed] = [Quantity::Depth, Quantity::Speed].map(|quantity| model.domain().range(quantity));
+    let (Some(depth), Some(speed)) = (depth, speed) else { return Vec::new() };
+    let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
+    let examples = EXAMPLES.map(|share| {
+        let within = |range: wade_core::domain::Range| range.min + share * (range.max - range.min);
+        let (depth, speed) = (within(depth), within(speed));
+        model.evaluate(&Condition::level(Vec3::new(speed, 0.0, 0.0), depth), &mut workspace, &mut forces);
+        let single = |vector: Vec3| <[f64; 3]>::from(vector);
+        json!({
+            "depth_m": depth,
+            "velocity_mps": [speed, 0.0, 0.0],
+            "force_n": single(forces.wrench.force),
+            "force_deviation_n": single(forces.uncertainty),
+            "moment_deviation_nm": single(forces.moment_uncertainty),
+        })
+    });
+    examples.into()
+}
+
 /// What the figures rest on: source of the training data, the states they hold for, and the deviation to expect.
 pub fn credibility(model: &Model, digest: &str) -> String {
     let ranges: serde_json::Map<String, serde_json::Value> = Quantity::ALL
@@ -184,9 +211,16 @@ pub fn credibility(model: &Model, digest: &str) -> String {
         "bundle_version": model.version(),
         "bundle_sha256": digest,
         "training_data": model.provenance(),
+        "training_cases": model.weights().and_then(|weights| match &weights.form {
+            Form::Anchored(form) => Some(form.cases.len()),
+            Form::Paper(_) => None,
+        }),
+        "hull_faces": model.vehicle().hull.mesh.faces.len(),
+        "drag_elements": model.base().map(|base| base.elements()),
         "physical_base": model.base_name(),
         "training_domain": ranges,
         "deviation": "outputs force_deviation_n and moment_deviation_nm: one standard deviation, for each state",
+        "deviation_examples": examples(model),
         "outside_the_domain": "output outside says how far; the physical base answers, and the deviation grows",
         "validation": "docs/src/results of the source tree: errors on held-out CFD cases, and published measurements",
     });

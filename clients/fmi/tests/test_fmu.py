@@ -86,7 +86,10 @@ def test_a_unit_is_valid(kind: str, arguments: list[str], tmp_path: Path, server
     assert len(loads) == (3 if arguments else 0)
     assert all(variable.description for variable in description.modelVariables)
     credibility = json.loads(zipfile.ZipFile(out).read("extra/org.wade/credibility.json"))
-    assert credibility["vehicle"] == VEHICLE and "openfoam" in credibility["training_data"]
+    assert credibility["vehicle"] == VEHICLE and "openfoam v1912" in credibility["training_data"]
+    assert "castellated mesh" in credibility["training_data"] and credibility["training_cases"] > 100
+    for example in credibility["deviation_examples"]:
+        assert example["force_n"][0] < 0.0 < example["force_deviation_n"][0] < -example["force_n"][0]
     assert unit(tmp_path, *source, *arguments).read_bytes() == out.read_bytes(), "the same unit is the same file"
 
 
