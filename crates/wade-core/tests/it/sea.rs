@@ -24,12 +24,11 @@ fn body(name: &str) -> (Vehicle, Base) {
 
 /// Load about the body origin in a sea, in a run where there is a memory.
 fn load(
-    base: &Base,
+    (base, wheels): (&Base, &[usize]),
     state: &Condition,
     sea: &Sea,
     (physics, time_step): (Physics, f64),
     memory: Option<&mut Memory>,
-    wheels: &[usize],
 ) -> (Wrench, BaseLoads) {
     let (state, waters) = base.in_sea(state, sea, wheels);
     let motion = Motion {
@@ -117,7 +116,7 @@ fn the_pressure_of_a_wave_on_a_box_is_that_of_linear_theory() {
                     .map(|n| {
                         let sea = wave(number, course, 1e-4, -TAU * f64::from(n) / 16.0);
                         let state = afloat(depth);
-                        components(&load(&base, &state, &sea, (Physics::Hydrostatic, 0.0), None, &[]).0)
+                        components(&load((&base, &[]), &state, &sea, (Physics::Hydrostatic, 0.0), None).0)
                     })
                     .collect();
                 let found = harmonic(&loads).map(|[size, _]| size / 1e-4);
@@ -145,7 +144,7 @@ fn a_long_wave_is_a_level_that_moves_and_tilts() {
         for phase in [0.0, 0.7, 2.0, 4.0] {
             let amplitude = 0.05;
             let sea = wave(number, 0.4, amplitude, phase);
-            let (found, _) = load(&subject.base, &state, &sea, (Physics::Hydrostatic, 0.0), None, &[]);
+            let (found, _) = load((&subject.base, &[]), &state, &sea, (Physics::Hydrostatic, 0.0), None);
             let slope = Vec3::new(0.4_f64.cos(), 0.4_f64.sin(), 0.0) * (-number * amplitude * phase.sin());
             let still = Condition {
                 water_level: Some(level + amplitude * phase.cos()),
@@ -153,7 +152,7 @@ fn a_long_wave_is_a_level_that_moves_and_tilts() {
                 ..state
             };
             let (expected, _) =
-                load(&subject.base, &still, &Sea::default(), (Physics::Hydrostatic, 0.0), None, &[]);
+                load((&subject.base, &[]), &still, &Sea::default(), (Physics::Hydrostatic, 0.0), None);
             let weight = subject.vehicle.mass * GRAVITY;
             assert!((found.force - expected.force).norm() < 1e-4 * weight, "{}", subject.vehicle.name);
         }
@@ -191,7 +190,7 @@ fn a_box_in_regular_waves_is_moved_as_linear_theory_says() {
                 .map(|n| {
                     let sea = wave(number, course, 1e-3, -TAU * f64::from(n) / f64::from(steps));
                     let state = afloat(water);
-                    components(&load(&base, &state, &sea, (Physics::Full, dt), Some(&mut memory), &[]).0)
+                    components(&load((&base, &[]), &state, &sea, (Physics::Full, dt), Some(&mut memory)).0)
                 })
                 .collect();
             let found = harmonic(&loads[11 * steps as usize..]).map(|[size, _]| size / 1e-3);
@@ -216,7 +215,7 @@ fn a_box_in_regular_waves_is_moved_as_linear_theory_says() {
                 bed_clearance: Some(water - 0.2 + height),
                 ..afloat(water)
             };
-            let (load, out) = load(&base, &state, &sea, (Physics::Full, dt), Some(&mut memory), &[]);
+            let (load, out) = load((&base, &[]), &state, &sea, (Physics::Full, dt), Some(&mut memory));
             speed += dt * (load.force.z - MASS * GRAVITY) / (MASS + out.added_mass[(2, 2)]);
             height += dt * speed;
             heights.push([0.0, 0.0, height, 0.0, 0.0, 0.0]);
@@ -251,7 +250,7 @@ fn levels_at_the_wheels_tilt_the_water_and_one_that_is_higher_lifts_its_wheel() 
         let places = wheels.iter().map(|&wheel| vehicle.surfaces[wheel].centroid).enumerate();
         let levels: Vec<f64> = places.map(|(n, at)| height(n, &at)).collect();
         let sea = Sea { wheel_levels: PerWheel::new(&levels), ..Sea::default() };
-        load(&base, &state, &sea, (Physics::Hydrostatic, 0.0), None, &wheels)
+        load((&base, &wheels), &state, &sea, (Physics::Hydrostatic, 0.0), None)
     };
     let weight = vehicle.mass * GRAVITY;
     // a plane is that plane
@@ -263,7 +262,7 @@ fn levels_at_the_wheels_tilt_the_water_and_one_that_is_higher_lifts_its_wheel() 
         up: UnitVector3::new_normalize(Vec3::z() - slope),
         ..state
     };
-    let (plain, _) = load(&base, &tilted, &Sea::default(), (Physics::Hydrostatic, 0.0), None, &wheels);
+    let (plain, _) = load((&base, &wheels), &tilted, &Sea::default(), (Physics::Hydrostatic, 0.0), None);
     assert!((found.force - plain.force * steep).norm() < 1e-9 * weight);
     // higher by 1 cm at one wheel: what the plane does not hold lifts that wheel alone
     let (even, even_loads) = sampled(&|_, _| level);
@@ -273,7 +272,7 @@ fn levels_at_the_wheels_tilt_the_water_and_one_that_is_higher_lifts_its_wheel() 
     assert!(rise[0] > 0.0 && rise[1..].iter().all(|other| other.abs() < 0.6 * rise[0]), "{rise:?}");
     assert!(one.force.z > even.force.z && one.moment.y < even.moment.y && one.moment.x > even.moment.x);
     // and where all agree, it is the level
-    let (still, _) = load(&base, &state, &Sea::default(), (Physics::Hydrostatic, 0.0), None, &wheels);
+    let (still, _) = load((&base, &wheels), &state, &Sea::default(), (Physics::Hydrostatic, 0.0), None);
     assert!((even.force - still.force).norm() < 1e-9 * weight);
 }
 
@@ -289,7 +288,7 @@ fn a_sheared_current_pulls_above_more_than_below_and_keeps_its_mean() {
             ..afloat(0.2)
         };
         let sea = Sea { current_exponent: exponent, ..Sea::default() };
-        load(&base, &state, &sea, (Physics::QuasiSteady, 0.0), None, &[]).0
+        load((&base, &[]), &state, &sea, (Physics::QuasiSteady, 0.0), None).0
     };
     let even = parked(0.0);
     // the box reaches down to the bed, with two rows of elements: on its face int (1 + n)^2 s^2n ds = (1 + n)^2 / (1 + 2 n) of the even flow
@@ -314,7 +313,7 @@ fn a_sheared_current_pulls_above_more_than_below_and_keeps_its_mean() {
             ..afloat(0.4)
         };
         let sea = Sea { current_exponent: exponent, ..Sea::default() };
-        load(&base, &state, &sea, (Physics::QuasiSteady, 0.0), None, &[]).0.force.x
+        load((&base, &[]), &state, &sea, (Physics::QuasiSteady, 0.0), None).0.force.x
     };
     let expected = 4.0 * (1.0 - 0.125) / 3.0 / 0.5;
     assert!((high(1.0) / high(0.0) / expected - 1.0).abs() < 0.03, "{}", high(1.0) / high(0.0));
