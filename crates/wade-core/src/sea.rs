@@ -12,7 +12,7 @@
 //! The profile of a current of the mean `U` is a power of the height `s h` over the bed, `U (1 + n) s^n`: open channels have an
 //! `n` of 1/7 to 1/6 (Chow, Open-Channel Hydraulics, 1959, section 8-3).
 
-use nalgebra::{Matrix2, SymmetricEigen, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
 use crate::condition::Condition;
 use crate::frame::{GRAVITY, Vec3};
@@ -20,7 +20,8 @@ use crate::vehicle::{MAX_SURFACES, PerWheel};
 
 /// Least depth of the water under the wave [m]: below it there is nothing to wade in.
 const LEAST_DEPTH: f64 = 1e-3;
-/// Variance of the wheels' places across a line, over that along it, below which they lie on the line [-].
+/// Product of the variances of the wheels' places along and across a line, over the square of their sum, below which they lie on
+/// it [-].
 const ON_A_LINE: f64 = 1e-6;
 
 /// A regular wave.
@@ -81,6 +82,15 @@ pub struct Waters {
     pub acceleration: Vec3,
 }
 
+/// Water at a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Water {
+    /// Its velocity, less the one that the state has [m/s].
+    pub velocity: Vec3,
+    /// Heads of its pressure [m]: under the plane, and of this sea.
+    pub heads: [f64; 2],
+}
+
 /// A wave in water of a depth.
 #[derive(Debug, Clone, Copy)]
 struct Train {
@@ -89,6 +99,8 @@ struct Train {
     frequency: f64,
     amplitude: f64,
     phase: f64,
+    /// `exp(-2 k h)`
+    there: f64,
 }
 
 impl Wave {
@@ -103,10 +115,11 @@ impl Train {
     fn decay(&self, z: f64, depth: f64) -> [f64; 3] {
         let k = self.number;
         let z = z.clamp(-depth, 0.0);
-        let (down, back, there) = ((k * z).exp(), (-k * (z + 2.0 * depth)).exp(), (-2.0 * k * depth).exp());
+        let down = (k * z).exp();
+        let back = self.there / down;
         let [sum, difference] = [down + back, down - back];
-        let narrow = (1.0 - there).max(f64::MIN_POSITIVE);
-        [sum / (1.0 + there), sum / narrow, difference / narrow]
+        let narrow = (1.0 - self.there).max(f64::MIN_POSITIVE);
+        [sum / (1.0 + self.there), sum / narrow, difference / narrow]
     }
 
     fn angle(&self, point: &Vec3) -> f64 {
@@ -160,6 +173,7 @@ impl Sea {
                 frequency,
                 amplitude: wave.amplitude,
                 phase: wave.phase,
+                there: (-2.0 * number * depth).exp(),
             })
         });
         let mut rises = None;
@@ -169,11 +183,10 @@ impl Sea {
                 (level + train.amplitude * cosine, train.vector * (-train.amplitude * sine))
             }
             (None, Some(levels)) => {
-                let samples: Vec<(Vec3, f64)> =
-                    wheels.iter().zip(levels.iter()).map(|((_, at), height)| (*at, *height)).collect();
-                let plane = fitted(&up, level, &samples);
+                let samples = wheels.iter().zip(levels.iter());
+                let plane = fitted(&up, level, samples.clone().map(|((_, at), height)| (*at, *height)));
                 let mut rise = [0.0; MAX_SURFACES];
-                for ((surface, at), (_, height)) in wheels.iter().zip(&samples) {
+                for ((surface, at), height) in samples {
                     rise[*surface] = height - (plane.0 + plane.1.dot(at));
                 }
                 rises = Some(rise);
@@ -228,69 +241,62 @@ impl Waters {
         self.level
     }
 
-    /// Heads of the pressure at a point of a surface [m]: under the plane, and of this sea.
-    pub fn heads(&self, surface: usize, point: &Vec3) -> [f64; 2] {
-        let height = self.up.dot(point);
-        let under = self.plane.0 + self.plane.1.dot(point) - height;
-        let real = match (&self.wave, &self.rises) {
-            (Some(train), _) => {
-                let z = height - self.level;
-                train.amplitude * train.angle(point).cos() * train.decay(z, self.depth)[0] - z
-            }
-            (None, Some(rises)) => under + rises[surface],
-            (None, None) => under,
-        };
-        [under, real]
-    }
-
     /// Whether the pressure differs from that under the plane anywhere.
     pub fn has_heads(&self) -> bool {
         self.wave.is_some() || self.rises.is_some()
     }
 
-    /// Velocity of the water at a point, less the one that the state has [m/s].
-    pub fn velocity(&self, point: &Vec3) -> Vec3 {
-        let z = self.up.dot(point) - self.level;
-        let mut velocity = Vec3::zeros();
+    /// Water at a point of a surface.
+    pub fn at(&self, surface: usize, point: &Vec3) -> Water {
+        let height = self.up.dot(point);
+        let z = height - self.level;
+        let under = self.plane.0 + self.plane.1.dot(point) - height;
+        let mut water = Water { velocity: Vec3::zeros(), heads: [under; 2] };
         if let Some(train) = &self.wave {
-            velocity +=
-                train.velocity(&self.up, train.angle(point), train.speeds(z, self.depth)) - self.orbit;
+            let (sine, cosine) = train.angle(point).sin_cos();
+            let [pressure, level, upright] = train.decay(z, self.depth);
+            let speed = train.amplitude * train.frequency;
+            water.heads[1] = train.amplitude * cosine * pressure - z;
+            water.velocity += train.vector * (speed * level * cosine / train.number)
+                + self.up * (speed * upright * sine)
+                - self.orbit;
+        }
+        if let Some(rises) = &self.rises {
+            water.heads[1] += rises[surface];
         }
         if let Some((mean, n, share)) = &self.current {
             let s = (1.0 + z / self.depth).clamp(0.0, 1.0);
-            velocity += mean * ((1.0 + n) * s.powf(*n) - share);
+            water.velocity += mean * ((1.0 + n) * s.powf(*n) - share);
         }
-        velocity
+        water
     }
 }
 
 /// The plane next to the samples by least squares: its height over the body origin, where it was sampled too, and its slope, which
 /// is level in directions in which nothing was sampled.
-fn fitted(up: &Vec3, level: f64, samples: &[(Vec3, f64)]) -> (f64, Vec3) {
+fn fitted(up: &Vec3, level: f64, samples: impl Iterator<Item = (Vec3, f64)> + Clone) -> (f64, Vec3) {
     let ahead =
         (Vec3::x() - up * up.x).try_normalize(0.1).unwrap_or_else(|| up.cross(&Vec3::y()).normalize());
     let left = up.cross(&ahead);
-    let all = || {
-        let flat = |at: &Vec3| Vector2::new(ahead.dot(at), left.dot(at));
-        std::iter::once((Vector2::zeros(), level))
-            .chain(samples.iter().map(move |(at, height)| (flat(at), *height)))
-    };
-    let count = all().count() as f64;
-    let place = all().map(|(at, _)| at).sum::<Vector2<f64>>() / count;
-    let mean = all().map(|(_, height)| height).sum::<f64>() / count;
+    let flat = samples.map(|(at, height)| (Vector2::new(ahead.dot(&at), left.dot(&at)), height));
+    let all = std::iter::once((Vector2::zeros(), level)).chain(flat);
+    let (mut count, mut place, mut mean) = (0.0, Vector2::zeros(), 0.0);
+    for (at, height) in all.clone() {
+        (count, place, mean) = (count + 1.0, place + at, mean + height);
+    }
+    (place, mean) = (place / count, mean / count);
     let (mut spread, mut tilt) = (Matrix2::zeros(), Vector2::zeros());
-    for (at, height) in all() {
+    for (at, height) in all {
         let from = at - place;
         spread += from * from.transpose();
         tilt += from * (height - mean);
     }
-    let SymmetricEigen { eigenvectors, eigenvalues } = spread.symmetric_eigen();
-    let widest = eigenvalues.max();
-    let mut slope = Vector2::zeros();
-    for (axis, &variance) in eigenvectors.column_iter().zip(eigenvalues.iter()) {
-        if variance > ON_A_LINE * widest {
-            slope += axis * (axis.dot(&tilt) / variance);
-        }
-    }
+    let wide = spread.trace();
+    let slope = match spread.try_inverse() {
+        Some(inverse) if spread.determinant() > ON_A_LINE * wide * wide => inverse * tilt,
+        // places on a line know the slope along it
+        _ if wide > 0.0 => tilt / wide,
+        _ => Vector2::zeros(),
+    };
     (mean - slope.dot(&place), ahead * slope.x + left * slope.y)
 }

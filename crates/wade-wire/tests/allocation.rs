@@ -11,7 +11,7 @@ use wade_core::forces::Forces;
 use wade_core::model::Workspace;
 use wade_core::model::kernel::Isa;
 use wade_core::served::Session;
-use wade_wire::Evaluator;
+use wade_wire::{Evaluator, State};
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -62,7 +62,16 @@ fn a_query_with_every_effect_allocates_nothing_after_load() {
         let served = served_with(vehicle, every_effect(vehicle));
         let (mut evaluator, mut session) = (Evaluator::default(), Session::default());
         let mut numbers = Numbers::new(1);
-        let states: Vec<_> = (0..50).map(|_| numbers.state().check().expect("valid")).collect();
+        // a third of them in waves, a third over levels at the wheels and a sheared current
+        let moving = |i: usize, state: State| match i % 3 {
+            0 => state,
+            1 => State { wave_vector: [2.0, 1.0, 0.0], wave_amplitude: 0.05, ..state },
+            _ => {
+                State { wheel_levels: Some([0.01, 0.0, 0.02, -0.01].into()), current_exponent: 0.2, ..state }
+            }
+        };
+        let mut state = |i: usize| moving(i, numbers.state()).check_for(&served).expect("valid");
+        let states: Vec<_> = (0..51).map(&mut state).collect();
         evaluator.evaluate(&served, &states[0], Some(&mut session));
         let before = ALLOCATIONS.get();
         for state in &states {

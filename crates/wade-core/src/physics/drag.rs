@@ -28,7 +28,7 @@ use crate::condition::Condition;
 use crate::frame::{GRAVITY, VISCOSITY, Vec3, WaterPlane};
 use crate::lanes::{self, Instructions, run_for};
 use crate::real::{Dual, Real, norm};
-use crate::sea::Waters;
+use crate::sea::{Water, Waters};
 use crate::vehicle::{SurfaceKind, Vehicle};
 use crate::wrench::Wrench;
 
@@ -259,6 +259,7 @@ impl Drag {
     ) {
         let flow = &self.flow(plane, condition);
         let (weight, up) = (condition.density * GRAVITY, plane.normal.into_inner());
+        let has_heads = waters.has_heads();
         let mut unused = Slopes::NONE;
         for (surface, (out, pressure)) in out.iter_mut().zip(pressures).enumerate() {
             let (skin, is_track) = self.skin(condition, surface, wheel_speeds[surface]);
@@ -269,10 +270,9 @@ impl Drag {
                 let mut water = [[0.0; LANES]; 3];
                 for lane in 0..LANES {
                     let at = Vec3::from(block.center.map(|axis| axis[lane]));
-                    let velocity = waters.velocity(&at);
+                    let Water { velocity, heads: [under, real] } = waters.at(surface, &at);
                     (0..3).for_each(|axis| water[axis][lane] = velocity[axis]);
-                    if waters.has_heads() {
-                        let [under, real] = waters.heads(surface, &at);
+                    if has_heads {
                         let half = block.half_height(lane, &up);
                         let head = mean_head(real, half) - mean_head(under, half);
                         let normal = Vec3::from(block.normal.map(|axis| axis[lane]));
