@@ -197,11 +197,7 @@ fn what_is_set_and_cannot_be_used_is_refused_by_name() {
         ),
         (Query { bed_clearance_m: 0.0, ..good }, Field::BedClearance, WithoutFlag),
         (Query { flags: HAS_BED, bed: 1.5, ..good }, Field::Bed, NoShare),
-        (
-            Query { flags: HAS_WHEEL_LEVELS, wheel_water_level_m: six, ..good },
-            Field::WheelWaterLevel,
-            Count,
-        ),
+        (Query { flags: HAS_WHEEL_LEVELS, wheel_water_level_m: six, ..good }, Field::WheelWaterLevel, Count),
         (Query { wheel_water_level_m: wheels, ..good }, Field::WheelWaterLevel, WithoutFlag),
         (Query { flags: HAS_WHEEL_SPEEDS, wheel_speed_radps: six, ..good }, Field::WheelSpeed, Count),
         (Query { wheel_speed_radps: wheels, ..good }, Field::WheelSpeed, WithoutFlag),
