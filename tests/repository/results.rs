@@ -7,6 +7,7 @@ mod cfd;
 mod effects;
 mod gap;
 mod latency;
+mod remote;
 
 use std::path::PathBuf;
 
@@ -32,6 +33,9 @@ fn table(name: &str) -> String {
         "elements" => latency::elements(),
         "python" => latency::python(),
         "epoch" => latency::epoch(),
+        "relay" => remote::relay(),
+        "remote use" => remote::steady(),
+        "remote cuts" => remote::cuts(),
         "forces" => accuracy::forces(),
         "moments" => accuracy::moments(),
         "surfaces" => accuracy::surfaces(),

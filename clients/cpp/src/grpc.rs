@@ -60,6 +60,7 @@ struct Question {
     what: What,
 }
 
+#[allow(clippy::large_enum_variant, reason = "a call allocates nothing")]
 #[derive(Clone, Copy)]
 enum What {
     State {
@@ -232,6 +233,11 @@ impl Shared {
         if !self.free(turn, deadline) {
             return WadeStatus::Timeout;
         }
+        // the open question may have ended with the connection: this one would be taken by the next one, and answered late
+        let status = self.known.connection.status();
+        if status != WadeStatus::Ok {
+            return status;
+        }
         let Some(mut question) = lock_until(&self.question, deadline) else { return WadeStatus::Timeout };
         turn.number += 1;
         let number = turn.number;
@@ -291,7 +297,7 @@ impl Shared {
             if self.known.connection.is_stopped() {
                 return Ok(());
             }
-            // a question of before the connection was lost, which is taken when there is one again
+            // of a question that was taken before it was waited for
             self.asked.clear();
             ready.clear_ready();
         }
