@@ -77,8 +77,8 @@ class Core : public remote::Subject {
     wade::Motion motion;
     motion.position.z = -(remote::z0 + place.depth) + remote::center_of_mass;
     motion.velocity = {place.speed, 0.0, place.rise};
-    // the plugin asks for the table once the link is served
-    if (water_.link() == wade::LinkState::Serving) water_.set_rest_table(table_);
+    // the plugin asks for the table once answers come
+    if (wade::is_answered(water_.link())) water_.set_rest_table(table_);
     const wade::StepLoad load = water_.step(body_, motion, surface_, around_, time);
     remote::Given given;
     given.force = {load.force.x, load.force.y, load.force.z};

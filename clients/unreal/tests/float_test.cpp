@@ -151,6 +151,7 @@ TEST(answers_a_step_late_give_a_float_no_energy) {
     const Swing swing = bob(run, 40.0);
     EXPECT(swing.last < 1.05 * swing.first);
     EXPECT(run.last.answered == 0 && run.last.asked == 1);
+    EXPECT(run.water.link() == LinkState::Stale);
   }
 }
 

@@ -25,6 +25,20 @@ TEST(a_late_answer_is_no_state_and_a_silence_is) {
   EXPECT(monitor.heard(WADE_STATUS_TIMEOUT, 0.9) == LinkState::Serving);
 }
 
+TEST(late_answers_alone_make_a_link_stale_and_not_lost) {
+  LinkMonitor monitor;
+  EXPECT(monitor.heard(WADE_STATUS_TIMEOUT, 0.01) == LinkState::Connecting);
+  EXPECT(monitor.heard_late() == LinkState::Stale);
+  for (int i = 0; i < 300; ++i) {
+    EXPECT(monitor.heard(WADE_STATUS_TIMEOUT, 0.01) == LinkState::Stale);
+    EXPECT(monitor.heard_late() == LinkState::Stale);
+  }
+  EXPECT(monitor.heard(WADE_STATUS_NO_SERVER, 1.1) == LinkState::Lost);
+  EXPECT(monitor.heard(WADE_STATUS_OK, 0.01) == LinkState::Serving);
+  EXPECT(monitor.heard(WADE_STATUS_TIMEOUT, 0.01) == LinkState::Serving);
+  EXPECT(monitor.heard_late() == LinkState::Serving);
+}
+
 TEST(a_refusal_says_which_and_is_forgotten_with_the_next_answer) {
   LinkMonitor monitor;
   EXPECT(monitor.heard(WADE_STATUS_LAYOUT_MISMATCH, 0.01) == LinkState::Incompatible);

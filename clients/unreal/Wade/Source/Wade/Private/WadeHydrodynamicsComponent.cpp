@@ -180,7 +180,7 @@ void UWadeHydrodynamicsComponent::TakeOutput()
 		return;
 	}
 	SetLinkState(Shown(Latest->Link));
-	if (Latest->Link == wade::LinkState::Serving)
+	if (wade::is_answered(Latest->Link))
 	{
 		wade::Hull Hull;
 		Hull.center_of_mass = Latest->CenterOfMass;

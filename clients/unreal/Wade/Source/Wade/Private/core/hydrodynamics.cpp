@@ -202,7 +202,9 @@ void Hydrodynamics::take_late(std::uint64_t now) {
   };
   const auto nearest = std::min_element(
       sent_.begin(), sent_.end(), [&](const Sent& a, const Sent& b) { return distance(a) < distance(b); });
-  if (nearest->time != 0) take(nearest->asked);
+  if (nearest->time == 0) return;
+  take(nearest->asked);
+  monitor_.heard_late();
 }
 
 }  // namespace wade

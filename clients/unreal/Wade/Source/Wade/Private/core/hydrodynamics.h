@@ -170,7 +170,8 @@ class Hydrodynamics {
   wade_forces forces_{};
   std::uint64_t last_answer_ = 0;
   // questions that were not answered in time, so that a late answer finds its own
-  std::array<Sent, 8> sent_{};
+  // at 1 kHz those of a round trip of 60 ms
+  std::array<Sent, 64> sent_{};
   std::size_t next_sent_ = 0;
   double unasked_time_ = 0.0;
   Accelerations accelerations_;

@@ -16,6 +16,9 @@ enum class LinkState {
   Refused,         // the server refuses what it is asked
 };
 
+// Whether answers come, in time or late.
+inline bool is_answered(LinkState state) { return state == LinkState::Serving || state == LinkState::Stale; }
+
 class LinkMonitor {
  public:
   // So many questions without an answer in a row are an accident of scheduling, not a state.
@@ -36,6 +39,14 @@ class LinkMonitor {
     ++missed_;
     silence_ += time;
     return state_ = without_answer(status);
+  }
+
+  // An answer came to a question of before, after what `heard` was given.
+  LinkState heard_late() {
+    answered_ = true;
+    silence_ = 0.0;
+    if (state_ == LinkState::Connecting || state_ == LinkState::Lost) state_ = LinkState::Stale;
+    return state_;
   }
 
  private:
