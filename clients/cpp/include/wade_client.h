@@ -57,6 +57,9 @@
 // Flag of a state: `bed` holds a value.
 #define WADE_HAS_BED 128
 
+// Flag of a state: `wheel_water_level_m` holds values.
+#define WADE_HAS_WHEEL_LEVELS 256
+
 // Flag of a state: of the physical base the pressure of still water alone.
 #define WADE_PHYSICS_HYDROSTATIC 512
 
@@ -65,6 +68,12 @@
 
 // Flag of a state: the whole physical base, however the server is set.
 #define WADE_PHYSICS_FULL 2048
+
+// Flag of a state: `wave_vector_radpm`, `wave_amplitude_m` and `wave_phase_rad` hold values.
+#define WADE_HAS_WAVE 8192
+
+// Flag of a state: `current_exponent` holds a value.
+#define WADE_HAS_CURRENT_EXPONENT 16384
 
 // Flag of forces: no quantity lies outside the training domain.
 #define WADE_IN_DOMAIN 1
@@ -165,7 +174,8 @@ typedef struct {
   uint64_t session;
   // WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, those named WADE_HAS_ and one of those named WADE_PHYSICS_
   uint32_t flags;
-  // Entries of `wheel_speed_radps` that hold a value, where the flags say so: one for each wheel of the vehicle; 0 for four.
+  // Entries of `wheel_speed_radps` and `wheel_water_level_m` that hold a value, where the flags say so: one for each wheel of the
+  // vehicle; 0 for four.
   uint32_t wheel_count;
   // Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
   float depth_m;
@@ -200,6 +210,18 @@ typedef struct {
   // Time since the state before it in the session [s]. The steps of states that could not be asked for want of time are added
   // to the next one that is.
   float time_step_s;
+  // A regular wave about the level, of linear theory: wave number along the direction in which it travels, body frame [rad/m].
+  // For this and the next four the vehicle needs the physical base.
+  float wave_vector_radpm[3];
+  // Half the height of the wave from trough to crest [m].
+  float wave_amplitude_m;
+  // k . x - w t of the wave at the body origin [rad]: a crest at 0, and after it the water falls. w^2 = g k tanh(k h).
+  float wave_phase_rad;
+  // Height of the water surface above the body origin along up at each wheel [m], in the order of `wheel_speed_radps`; the level
+  // is then that at the body origin. Not beside a wave.
+  float wheel_water_level_m[WADE_MAX_WHEELS];
+  // Exponent n of the profile of the current over the height s h over the bed, current_mps (1 + n) s^n.
+  float current_exponent;
 } wade_state;
 
 // The load of one effect that was added to the model.

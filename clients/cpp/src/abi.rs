@@ -37,12 +37,18 @@ pub const WADE_HAS_WATER_LEVEL: u32 = 32;
 pub const WADE_HAS_BED_CLEARANCE: u32 = 64;
 /// Flag of a state: `bed` holds a value.
 pub const WADE_HAS_BED: u32 = 128;
+/// Flag of a state: `wheel_water_level_m` holds values.
+pub const WADE_HAS_WHEEL_LEVELS: u32 = 256;
 /// Flag of a state: of the physical base the pressure of still water alone.
 pub const WADE_PHYSICS_HYDROSTATIC: u32 = 512;
 /// Flag of a state: of the physical base the pressure of still water and the drag.
 pub const WADE_PHYSICS_QUASI_STEADY: u32 = 1024;
 /// Flag of a state: the whole physical base, however the server is set.
 pub const WADE_PHYSICS_FULL: u32 = 2048;
+/// Flag of a state: `wave_vector_radpm`, `wave_amplitude_m` and `wave_phase_rad` hold values.
+pub const WADE_HAS_WAVE: u32 = 8192;
+/// Flag of a state: `current_exponent` holds a value.
+pub const WADE_HAS_CURRENT_EXPONENT: u32 = 16384;
 
 /// Flag of forces: no quantity lies outside the training domain.
 pub const WADE_IN_DOMAIN: u32 = 1;
@@ -145,7 +151,8 @@ pub struct WadeState {
     pub session: u64,
     /// WADE_DRY_CONTACT, WADE_IMPLICIT_ADDED_MASS, those named WADE_HAS_ and one of those named WADE_PHYSICS_
     pub flags: u32,
-    /// Entries of `wheel_speed_radps` that hold a value, where the flags say so: one for each wheel of the vehicle; 0 for four.
+    /// Entries of `wheel_speed_radps` and `wheel_water_level_m` that hold a value, where the flags say so: one for each wheel of the
+    /// vehicle; 0 for four.
     pub wheel_count: u32,
     /// Undisturbed water surface above the ground-contact plane at the body origin [m]; negative where it is below.
     pub depth_m: f32,
@@ -180,6 +187,18 @@ pub struct WadeState {
     /// Time since the state before it in the session [s]. The steps of states that could not be asked for want of time are added
     /// to the next one that is.
     pub time_step_s: f32,
+    /// A regular wave about the level, of linear theory: wave number along the direction in which it travels, body frame [rad/m].
+    /// For this and the next four the vehicle needs the physical base.
+    pub wave_vector_radpm: [f32; 3],
+    /// Half the height of the wave from trough to crest [m].
+    pub wave_amplitude_m: f32,
+    /// k . x - w t of the wave at the body origin [rad]: a crest at 0, and after it the water falls. w^2 = g k tanh(k h).
+    pub wave_phase_rad: f32,
+    /// Height of the water surface above the body origin along up at each wheel [m], in the order of `wheel_speed_radps`; the level
+    /// is then that at the body origin. Not beside a wave.
+    pub wheel_water_level_m: [f32; WADE_MAX_WHEELS],
+    /// Exponent n of the profile of the current over the height s h over the bed, current_mps (1 + n) s^n.
+    pub current_exponent: f32,
 }
 
 /// The load of one effect that was added to the model.
@@ -363,4 +382,4 @@ pub struct WadeVehicle {
 }
 
 // nothing lies between the fields, so that equal values are equal bytes
-const _: () = assert!(size_of::<WadeState>() == 152 && size_of::<WadeForces>() == 4304);
+const _: () = assert!(size_of::<WadeState>() == 208 && size_of::<WadeForces>() == 4304);

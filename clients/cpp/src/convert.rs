@@ -11,10 +11,11 @@ use wade_wire::{Field, InvalidState, Problem, State};
 
 use crate::abi::{
     WADE_DRY_CONTACT, WADE_HAS_ADDED_MASS, WADE_HAS_BASE, WADE_HAS_BED, WADE_HAS_BED_CLEARANCE,
-    WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WATER_LEVEL, WADE_HAS_WHEEL_SPEEDS,
-    WADE_IMPLICIT_ADDED_MASS, WADE_IN_DOMAIN, WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_MAX_WHEELS,
-    WADE_NAME_SIZE, WADE_NEVER, WADE_PHYSICS_FULL, WADE_PHYSICS_HYDROSTATIC, WADE_PHYSICS_QUASI_STEADY,
-    WADE_SESSION_BEGINS, WadeEffectLoad, WadeForces, WadeState, WadeStatus,
+    WADE_HAS_CURRENT_EXPONENT, WADE_HAS_DEPTH_RATE, WADE_HAS_HEADING, WADE_HAS_WATER_LEVEL, WADE_HAS_WAVE,
+    WADE_HAS_WHEEL_LEVELS, WADE_HAS_WHEEL_SPEEDS, WADE_IMPLICIT_ADDED_MASS, WADE_IN_DOMAIN, WADE_MAX_EFFECTS,
+    WADE_MAX_SURFACES, WADE_MAX_WHEELS, WADE_NAME_SIZE, WADE_NEVER, WADE_PHYSICS_FULL,
+    WADE_PHYSICS_HYDROSTATIC, WADE_PHYSICS_QUASI_STEADY, WADE_SESSION_BEGINS, WadeEffectLoad, WadeForces,
+    WadeState, WadeStatus,
 };
 use crate::last::nanoseconds_since;
 
@@ -30,6 +31,9 @@ const STATE_FLAGS: u32 = WADE_DRY_CONTACT
     | WADE_HAS_WATER_LEVEL
     | WADE_HAS_BED_CLEARANCE
     | WADE_HAS_BED
+    | WADE_HAS_WHEEL_LEVELS
+    | WADE_HAS_WAVE
+    | WADE_HAS_CURRENT_EXPONENT
     | WADE_PHYSICS_HYDROSTATIC
     | WADE_PHYSICS_QUASI_STEADY
     | WADE_PHYSICS_FULL;
@@ -45,7 +49,8 @@ impl From<&WadeState> for State {
     fn from(state: &WadeState) -> Self {
         let has = |flag: u32| state.flags & flag != 0;
         let count = if state.wheel_count == 0 { WHEELS } else { state.wheel_count as usize };
-        let wheel_speeds = state.wheel_speed_radps.get(..count).and_then(PerWheel::new);
+        let of_wheels = |values: &[f32]| values.get(..count).and_then(PerWheel::new);
+        let set = |flag: u32, value: f32| if has(flag) { value } else { 0.0 };
         Self {
             velocity: state.velocity_mps,
             current: state.current_mps,
@@ -61,12 +66,16 @@ impl From<&WadeState> for State {
             dry_contact: has(WADE_DRY_CONTACT),
             heading: has(WADE_HAS_HEADING).then_some(state.heading_rad),
             depth_rate: has(WADE_HAS_DEPTH_RATE).then_some(state.depth_rate_mps),
-            wheel_speeds: wheel_speeds.filter(|_| has(WADE_HAS_WHEEL_SPEEDS)),
+            wheel_speeds: of_wheels(&state.wheel_speed_radps).filter(|_| has(WADE_HAS_WHEEL_SPEEDS)),
             time_step: state.time_step_s,
             implicit_added_mass: has(WADE_IMPLICIT_ADDED_MASS),
             physics: PHYSICS.into_iter().find(|(flag, _)| has(*flag)).map(|(_, physics)| physics),
             jacobian: false,
-            ..Self::default()
+            wave_vector: state.wave_vector_radpm.map(|part| set(WADE_HAS_WAVE, part)),
+            wave_amplitude: set(WADE_HAS_WAVE, state.wave_amplitude_m),
+            wave_phase: set(WADE_HAS_WAVE, state.wave_phase_rad),
+            wheel_levels: of_wheels(&state.wheel_water_level_m).filter(|_| has(WADE_HAS_WHEEL_LEVELS)),
+            current_exponent: set(WADE_HAS_CURRENT_EXPONENT, state.current_exponent),
         }
     }
 }
@@ -81,8 +90,12 @@ pub fn checked(state: &WadeState) -> Result<State, InvalidState> {
     if PHYSICS.into_iter().filter(|(flag, _)| has(*flag)).count() > 1 {
         return wrong(Field::Physics, Problem::Unknown);
     }
-    if has(WADE_HAS_WHEEL_SPEEDS) && state.wheel_count as usize > WADE_MAX_WHEELS {
-        return wrong(Field::WheelSpeed, Problem::Count);
+    for (flag, field) in
+        [(WADE_HAS_WHEEL_SPEEDS, Field::WheelSpeed), (WADE_HAS_WHEEL_LEVELS, Field::WheelWaterLevel)]
+    {
+        if has(flag) && state.wheel_count as usize > WADE_MAX_WHEELS {
+            return wrong(field, Problem::Count);
+        }
     }
     let state = State::from(state);
     state.check()?;

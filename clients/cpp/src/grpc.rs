@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
 use wade_client::{ClientError, GrpcLink, Reply, replies};
+use wade_core::vehicle::PerWheel;
 use wade_wire::{DERIVATIVES, Field, InvalidState, Problem, State, proto};
 
 use crate::abi::{WADE_SESSION_BEGINS, WadeBatch, WadeForces, WadeState, WadeStatus};
@@ -196,13 +197,15 @@ impl Grpc {
 }
 
 impl Shared {
-    /// What is wrong with a state that has speeds of other wheels than those of the vehicle; over gRPC the server would say it in
+    /// What is wrong with a state that has values of other wheels than those of the vehicle; over gRPC the server would say it in
     /// words alone.
     fn other_wheels(&self, state: &State) -> Option<InvalidState> {
         let wheels = self.wheels.load(Ordering::Acquire);
         let is_connected = self.known.connection.status() == WadeStatus::Ok;
-        let other = state.wheel_speeds.filter(|speeds| is_connected && speeds.len() != wheels);
-        other.map(|_| InvalidState::new(Field::WheelSpeed, Problem::Count))
+        let given = [(state.wheel_speeds, Field::WheelSpeed), (state.wheel_levels, Field::WheelWaterLevel)];
+        let is_other = |values: &PerWheel<f32>| is_connected && values.len() != wheels;
+        let other = given.into_iter().find(|(values, _)| values.as_ref().is_some_and(is_other));
+        other.map(|(_, field)| InvalidState::new(field, Problem::Count))
     }
 
     fn evaluate(&self, turn: &mut Turn, state: &State, session: u64, budget: Budget) -> WadeStatus {
