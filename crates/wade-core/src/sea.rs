@@ -99,8 +99,8 @@ struct Train {
     frequency: f64,
     amplitude: f64,
     phase: f64,
-    /// `exp(-2 k h)`
-    there: f64,
+    /// `1 - exp(-2 k h)`
+    narrow: f64,
 }
 
 impl Wave {
@@ -111,15 +111,13 @@ impl Wave {
 }
 
 impl Train {
-    /// `cosh(k (z + h)) / cosh(k h)` and the same over `sinh(k h)` of cosh and sinh, without their size.
+    /// `cosh(k (z + h)) / cosh(k h)`, and cosh and sinh of `k (z + h)` over `sinh(k h)`; finite for any length and depth.
     fn decay(&self, z: f64, depth: f64) -> [f64; 3] {
         let k = self.number;
         let z = z.clamp(-depth, 0.0);
-        let down = (k * z).exp();
-        let back = self.there / down;
-        let [sum, difference] = [down + back, down - back];
-        let narrow = (1.0 - self.there).max(f64::MIN_POSITIVE);
-        [sum / (1.0 + self.there), sum / narrow, difference / narrow]
+        let (down, mirrored) = ((k * z).exp(), (-2.0 * k * (z + depth)).exp_m1());
+        let [sum, difference] = [down * (2.0 + mirrored), -down * mirrored];
+        [sum / (2.0 - self.narrow), sum / self.narrow, difference / self.narrow]
     }
 
     fn angle(&self, point: &Vec3) -> f64 {
@@ -173,7 +171,7 @@ impl Sea {
                 frequency,
                 amplitude: wave.amplitude,
                 phase: wave.phase,
-                there: (-2.0 * number * depth).exp(),
+                narrow: -(-2.0 * number * depth).exp_m1(),
             })
         });
         let mut rises = None;

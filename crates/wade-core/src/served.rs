@@ -147,6 +147,8 @@ impl ServedVehicle {
                 let Forces { surfaces, wrench, .. } = &*forces;
                 let mut at_edge = |condition: &Condition| {
                     let state = effects.edge(condition)?;
+                    // in calm water, as the effects were seen
+                    let motion = Motion { waters: None, ..motion };
                     self.model.evaluate_moving(&state, (&motion, None), workspace, edge);
                     Some(edge.wrench)
                 };

@@ -318,3 +318,25 @@ fn a_sheared_current_pulls_above_more_than_below_and_keeps_its_mean() {
     let expected = 4.0 * (1.0 - 0.125) / 3.0 / 0.5;
     assert!((high(1.0) / high(0.0) / expected - 1.0).abs() < 0.03, "{}", high(1.0) / high(0.0));
 }
+
+#[test]
+fn waves_of_any_length_over_any_depth_have_finite_loads() {
+    let (_, base) = body("box");
+    for number in [1e-30, 1e-6, 1.0, 30.0, 1e3] {
+        for depth in [0.0, 1e-3, 0.3, 20.0, 1e3] {
+            for level in [-1.0, 0.0, 100.0] {
+                let state = Condition {
+                    water_level: Some(level),
+                    bed_clearance: Some((depth - 0.2_f64).max(0.0)),
+                    ..Condition::level(Vec3::new(1.0, 0.5, -0.3), 0.0)
+                };
+                let sea = Sea { current_exponent: 0.2, ..wave(number, 0.3, 1e3, 1.0) };
+                let (found, _) = load((&base, &[]), &state, &sea, (Physics::Full, 0.0), None);
+                assert!(
+                    components(&found).iter().all(|x| x.is_finite()),
+                    "{number} {depth} {level}: {found:?}"
+                );
+            }
+        }
+    }
+}
