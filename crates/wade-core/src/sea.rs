@@ -80,6 +80,8 @@ pub struct Waters {
     orbit: Vec3,
     /// Acceleration of the water about the hull [m/s2].
     pub acceleration: Vec3,
+    /// Pressure of water at rest under the plane, over that with the plane's slope left out [-].
+    pub steepness: f64,
 }
 
 /// Water at a point.
@@ -124,21 +126,20 @@ impl Train {
         self.phase + self.vector.dot(point)
     }
 
-    /// Horizontal and vertical size of velocity [m/s] at a height, without the phase.
-    fn speeds(&self, z: f64, depth: f64) -> [f64; 2] {
-        let [_, level, upright] = self.decay(z, depth);
-        [level, upright].map(|share| self.amplitude * self.frequency * share)
+    /// Share of the pressure at a height that is left [-], and the horizontal and vertical size of the velocity there [m/s], without
+    /// the phase.
+    fn sizes(&self, z: f64, depth: f64) -> (f64, [f64; 2]) {
+        let [pressure, level, upright] = self.decay(z, depth);
+        (pressure, [level, upright].map(|share| self.amplitude * self.frequency * share))
     }
 
     /// Velocity of the water [m/s].
-    fn velocity(&self, up: &Vec3, angle: f64, [level, upright]: [f64; 2]) -> Vec3 {
-        let (sine, cosine) = angle.sin_cos();
+    fn velocity(&self, up: &Vec3, (sine, cosine): (f64, f64), [level, upright]: [f64; 2]) -> Vec3 {
         self.vector * (level * cosine / self.number) + up * (upright * sine)
     }
 
     /// And its acceleration [m/s2].
-    fn acceleration(&self, up: &Vec3, angle: f64, [level, upright]: [f64; 2]) -> Vec3 {
-        let (sine, cosine) = angle.sin_cos();
+    fn acceleration(&self, up: &Vec3, (sine, cosine): (f64, f64), [level, upright]: [f64; 2]) -> Vec3 {
         (self.vector * (level * sine / self.number) - up * (upright * cosine)) * self.frequency
     }
 }
@@ -146,7 +147,7 @@ impl Train {
 impl Sea {
     /// True where the water lies still or flows evenly.
     pub fn is_calm(&self) -> bool {
-        *self == Self { current_exponent: 0.0, ..Self::default() }
+        *self == Self::default()
     }
 
     /// The state of a hull in the plane and the flow that stand for this sea about it, and what the sea is beside them. `wheels`
@@ -198,9 +199,9 @@ impl Sea {
             let along =
                 train.vector.component_mul(&draft.half).map(|x| if x == 0.0 { 1.0 } else { x.sin() / x });
             let mean = along.product();
-            let middle = train.speeds(0.5 * (draft.low + draft.high), depth)[0];
-            let lowest = train.speeds(draft.low, depth)[1];
-            let angle = train.angle(&draft.center);
+            let (_, [middle, _]) = train.sizes(0.5 * (draft.low + draft.high), depth);
+            let (_, [_, lowest]) = train.sizes(draft.low, depth);
+            let angle = train.angle(&draft.center).sin_cos();
             let speeds = [mean * middle, mean * lowest];
             (train.velocity(&up, angle, speeds), train.acceleration(&up, angle, speeds))
         });
@@ -217,23 +218,18 @@ impl Sea {
         });
         let flow = current.map_or_else(Vec3::zeros, |(mean, _, share)| mean * (share - 1.0));
         let (height, slope) = plane;
-        let steep = (1.0 + slope.norm_squared()).sqrt();
+        let steepness = (1.0 + slope.norm_squared()).sqrt();
         let state = Condition {
             velocity: condition.velocity - flow - orbit,
             up: nalgebra::UnitVector3::new_normalize(up - slope),
-            water_level: Some(height / steep),
+            water_level: Some(height / steepness),
             ..*condition
         };
-        (state, Waters { up, level, depth, plane, wave, rises, current, orbit, acceleration })
+        (state, Waters { up, level, depth, plane, wave, rises, current, orbit, acceleration, steepness })
     }
 }
 
 impl Waters {
-    /// Pressure of water at rest under the plane, over that with the plane's slope left out [-].
-    pub fn steepness(&self) -> f64 {
-        (1.0 + self.plane.1.norm_squared()).sqrt()
-    }
-
     /// Height of still water over the body origin [m].
     pub fn level(&self) -> f64 {
         self.level
@@ -251,13 +247,10 @@ impl Waters {
         let under = self.plane.0 + self.plane.1.dot(point) - height;
         let mut water = Water { velocity: Vec3::zeros(), heads: [under; 2] };
         if let Some(train) = &self.wave {
-            let (sine, cosine) = train.angle(point).sin_cos();
-            let [pressure, level, upright] = train.decay(z, self.depth);
-            let speed = train.amplitude * train.frequency;
-            water.heads[1] = train.amplitude * cosine * pressure - z;
-            water.velocity += train.vector * (speed * level * cosine / train.number)
-                + self.up * (speed * upright * sine)
-                - self.orbit;
+            let angle = train.angle(point).sin_cos();
+            let (pressure, speeds) = train.sizes(z, self.depth);
+            water.heads[1] = train.amplitude * angle.1 * pressure - z;
+            water.velocity += train.velocity(&self.up, angle, speeds) - self.orbit;
         }
         if let Some(rises) = &self.rises {
             water.heads[1] += rises[surface];

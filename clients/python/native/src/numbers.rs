@@ -34,10 +34,7 @@ pub fn state(numbers: &[f32; NUMBERS], flags: u64) -> State {
     let vector = |i: usize| [middle[3 * i], middle[3 * i + 1], middle[3 * i + 2]];
     let (heading, depth_rate, wheels) = (middle[18], middle[19], &middle[20..]);
     // places behind the last wheel are NaN
-    let per_wheel = |values: &[f32]| {
-        let count = values.iter().rposition(|value| !value.is_nan()).map_or(1, |last| last + 1);
-        PerWheel::new(&values[..count])
-    };
+    let per_wheel = |places: &[f32]| places.first_chunk().map(PerWheel::stated);
     let has = |flag: u64| flags & flag != 0;
     State {
         velocity: vector(0),

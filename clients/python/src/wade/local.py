@@ -37,7 +37,7 @@ def flags(state: State) -> int:
         flags |= layout.HAS_BED
     if state.wheel_water_level_m is not None:
         flags |= layout.HAS_WHEEL_LEVELS
-    if not (state.wave_amplitude_m is None and state.wave_vector_radpm is None and state.wave_phase_rad is None):
+    if state.has_wave():
         flags |= layout.HAS_WAVE
     if state.current_exponent is not None:
         flags |= layout.HAS_CURRENT_EXPONENT

@@ -30,7 +30,7 @@ from .errors import (
 from .forces import BoxQuantity, Forces, Quantity, named_effect
 from .latency import Latency, Percentiles
 from .stability import Foot, Ford, Stability, StabilityModes
-from .state import MAX_WHEELS, TIME_STEP_AT, TOLD_AT, VECTORS, State
+from .state import TIME_STEP_AT, TOLD_AT, VECTORS, WHEELS_END, State
 from .v1 import admin_pb2, hydrodynamics_pb2
 from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
 
@@ -101,7 +101,7 @@ def evaluate_request(vehicle: str, state: State) -> Message:
             vector = getattr(message, name)
             vector.x, vector.y, vector.z = values[2 + 3 * i : 5 + 3 * i]
     told = values[TOLD_AT:TIME_STEP_AT]
-    (heading, rate, *wheels), (water_level, bed_clearance, bed, *moving) = told[:_WHEELS_END], told[_WHEELS_END:]
+    (heading, rate, *wheels), (water_level, bed_clearance, bed, *moving) = told[:WHEELS_END], told[WHEELS_END:]
     if state.water_level_m is not None:
         message.water_level_m = water_level
     if state.bed_clearance_m is not None:
@@ -126,10 +126,6 @@ def evaluate_request(vehicle: str, state: State) -> Message:
     return request
 
 
-#: Place behind the wheels' speeds in what a state tells.
-_WHEELS_END = 2 + MAX_WHEELS
-
-
 def _of_wheels(values: list[float]) -> bytes:
     with np.errstate(over="ignore"):
         return np.array([value for value in values if not math.isnan(value)], "<f4").tobytes()
@@ -138,7 +134,7 @@ def _of_wheels(values: list[float]) -> bytes:
 def _set_moving(message: Any, state: State, moving: list[float]) -> None:
     """Sets how the water moves beside its current."""
     kx, ky, kz, amplitude, phase, *levels, exponent = moving
-    if not (state.wave_vector_radpm is None and state.wave_amplitude_m is None and state.wave_phase_rad is None):
+    if state.has_wave():
         message.wave_vector_radpm.x, message.wave_vector_radpm.y, message.wave_vector_radpm.z = kx, ky, kz
         message.wave_amplitude_m, message.wave_phase_rad = amplitude, phase
     if state.wheel_water_level_m is not None:

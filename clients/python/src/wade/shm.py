@@ -24,7 +24,7 @@ from .errors import DeadlineExceeded, InvalidState, Refused, ResourceExhausted, 
 from .forces import Array, BoxQuantity, Effect, Forces, Quantity, named_effect
 from .local import SessionStream, flags, session_numbers
 from .shm_link import BATCH, JACOBIAN, SINGLE, VEHICLE, Link, Lost, Service, memory, vehicles
-from .state import PER_WHEEL, TOLD_AT, State
+from .state import LEVELS_AT, PER_WHEEL, TOLD_AT, WHEELS_END, State
 from .vehicle import Vehicle
 
 _T = TypeVar("_T")
@@ -185,9 +185,6 @@ class ShmClient:
         return self._link
 
 
-#: Places behind the wheels' speeds, and of the wheels' levels, among what is told.
-_WHEELS_END = 2 + layout.MAX_WHEELS
-_LEVELS_AT = _WHEELS_END + 8
 _PER_ROW = {
     "water_level_m": layout.HAS_WATER_LEVEL,
     "bed_clearance_m": layout.HAS_BED_CLEARANCE,
@@ -198,8 +195,8 @@ _PER_ROW = {
 def _query(who: tuple[int, int, int, int], floats: list[float], owner: int) -> bytes:
     # in the order of the layout
     stated, told = floats[:TOLD_AT], floats[TOLD_AT:]
-    (heading, depth_rate, *wheels), (level, clearance, bed, *wave) = told[:_WHEELS_END], told[_WHEELS_END:_LEVELS_AT]
-    *levels, exponent, time_step = told[_LEVELS_AT:]
+    (heading, depth_rate, *wheels), (level, clearance, bed, *wave) = told[:WHEELS_END], told[WHEELS_END:LEVELS_AT]
+    *levels, exponent, time_step = told[LEVELS_AT:]
     values = (*stated, time_step, heading, depth_rate, level, clearance, bed, *wheels, *levels)
     moving = (*wave, exponent)
     try:
@@ -427,7 +424,7 @@ def _surface_count(answer: np.void) -> int:
 def _wheels(floats: list[float]) -> dict[str, int]:
     """How many values of wheels a state has, by field."""
     told = floats[TOLD_AT:]
-    values = told[2:_WHEELS_END], told[_LEVELS_AT : _LEVELS_AT + layout.MAX_WHEELS]
+    values = told[2:WHEELS_END], told[LEVELS_AT : LEVELS_AT + layout.MAX_WHEELS]
     counts = (sum(not math.isnan(value) for value in of_wheels) for of_wheels in values)
     return dict(zip(PER_WHEEL, counts, strict=True))
 

@@ -69,9 +69,14 @@ TOLD = {
 #: Those of them with a value a wheel, and those that are 0 where they are None.
 PER_WHEEL = ("wheel_speed_radps", "wheel_water_level_m")
 ZERO = ("wave_vector_radpm", "wave_amplitude_m", "wave_phase_rad", "current_exponent")
+#: Those with three numbers.
+THREE = (*VECTORS, "wave_vector_radpm")
 #: Where the numbers of `State.floats` stand.
 TOLD_AT = len(SCALARS) + 3 * len(VECTORS)
 TIME_STEP_AT = TOLD_AT + sum(TOLD.values())
+#: Place behind the wheels' speeds, and of the wheels' levels, in what stands at `TOLD_AT`.
+WHEELS_END = 2 + MAX_WHEELS
+LEVELS_AT = TIME_STEP_AT - TOLD_AT - 1 - MAX_WHEELS
 
 _UNTOLD = (math.nan,) * sum(TOLD.values())
 
@@ -190,6 +195,10 @@ class State:
         """True where a field was left out, so that it need not travel."""
         return getattr(self, name) is _DEFAULTS.get(name)
 
+    def has_wave(self) -> bool:
+        """True where a field of the wave is given."""
+        return not (self.wave_vector_radpm is None and self.wave_amplitude_m is None and self.wave_phase_rad is None)
+
     def floats(self) -> list[float]:
         """The numbers of a single state: the scalars, three a vector, what is told or NaN, the time step.
 
@@ -220,9 +229,7 @@ class State:
         except InvalidState:
             raise
         except (TypeError, ValueError):
-            expected = (
-                "three numbers" if name in (*VECTORS, "wave_vector_radpm") else _NUMBERS_TOLD.get(name, "one number")
-            )
+            expected = "three numbers" if name in THREE else _NUMBERS_TOLD.get(name, "one number")
             raise _wrong(name, f"must be {expected}, got {_describe(getattr(self, name))}") from None
         return values
 
@@ -242,7 +249,7 @@ class State:
         told = [name for name in TOLD if getattr(self, name) is not None and name != first]
         for name in (*SCALARS[1:], *VECTORS, *told, "time_step_s"):
             array = _array(name, getattr(self, name))
-            shape = (depth.size, 3) if name in (*VECTORS, "wave_vector_radpm") else (depth.size,)
+            shape = (depth.size, 3) if name in THREE else (depth.size,)
             if name in PER_WHEEL:
                 shape = (depth.size, _wheels(name, array.shape))
             if array.shape not in (shape, shape[1:]):

@@ -196,8 +196,7 @@ impl Model {
     /// A state in a sea as one in the plane and the flow that stand for it, and what the sea is beside them; none of a model
     /// without the physical base, which knows still water alone.
     pub fn in_sea(&self, condition: &Condition, sea: &Sea) -> Option<(Condition, Waters)> {
-        let condition = condition.resolved(self.vehicle.z0);
-        self.base.as_ref().map(|base| base.in_sea(&condition, sea, &self.wheels))
+        self.base.as_ref().map(|base| base.in_sea(condition, sea, &self.wheels))
     }
 
     /// The instruction set in use, where there is a network.

@@ -260,18 +260,13 @@ impl Base {
         let into = (&mut out.drags[..], &mut pressures[..count]);
         self.drag.evaluate_in_sea((&plane, condition), motion.wheel_speeds, waters, into);
         self.combine(condition, motion, memory, out);
-        let steepness = waters.steepness();
         for (surface, pressure) in out.surfaces.iter_mut().zip(&pressures) {
-            surface.hydrostatic = surface.hydrostatic * steepness + *pressure;
+            surface.hydrostatic = surface.hydrostatic * waters.steepness + *pressure;
         }
         // water that is accelerated presses on the hull as on what it displaces, and on what moves with the hull besides; the
         // first is in the pressure
         let water = joined(&waters.acceleration, &Vec3::zeros());
-        let load = out.added_mass * water;
-        out.hull += Wrench {
-            force: load.fixed_rows::<3>(0).into_owned(),
-            moment: load.fixed_rows::<3>(3).into_owned(),
-        };
+        out.hull += Wrench::from_column(&(out.added_mass * water));
     }
 
     /// A state in a sea as one in the plane and the flow that stand for it, and what the sea is beside them.

@@ -258,7 +258,7 @@ impl Drag {
         (out, pressures): (&mut [SurfaceDrag], &mut [Wrench]),
     ) {
         let flow = &self.flow(plane, condition);
-        let (weight, up) = (condition.density * GRAVITY, plane.normal.into_inner());
+        let (weight, up) = (condition.density * GRAVITY, plane.normal.into_inner().into());
         let has_heads = waters.has_heads();
         let mut unused = Slopes::NONE;
         for (surface, (out, pressure)) in out.iter_mut().zip(pressures).enumerate() {
@@ -273,7 +273,7 @@ impl Drag {
                     let Water { velocity, heads: [under, real] } = waters.at(surface, &at);
                     (0..3).for_each(|axis| water[axis][lane] = velocity[axis]);
                     if has_heads {
-                        let half = block.half_height(lane, &up);
+                        let half = block.half_height(lane, up);
                         let head = mean_head(real, half) - mean_head(under, half);
                         let normal = Vec3::from(block.normal.map(|axis| axis[lane]));
                         let force = normal * (-weight * block.area[lane] * head);
@@ -473,11 +473,16 @@ impl Block {
     }
 
     /// Half the height of an element that is spread evenly about its center [m].
-    fn half_height(&self, lane: usize, up: &Vec3) -> f64 {
+    #[inline(always)]
+    fn half_height(&self, lane: usize, [ux, uy, uz]: [f64; 3]) -> f64 {
         let s = |term: usize| self.spread[term][lane];
-        let squares = s(0) * up.x * up.x + s(1) * up.y * up.y + s(2) * up.z * up.z;
-        let products = s(3) * up.x * up.y + s(4) * up.x * up.z + s(5) * up.y * up.z;
-        (squares + products).max(0.0).sqrt()
+        let variance = s(0) * ux * ux
+            + s(1) * uy * uy
+            + s(2) * uz * uz
+            + s(3) * ux * uy
+            + s(4) * ux * uz
+            + s(5) * uy * uz;
+        variance.max(0.0).sqrt()
     }
 
     #[inline(always)]
@@ -495,13 +500,7 @@ impl Block {
             let [x, y, z] = [self.center[0][i], self.center[1][i], self.center[2][i]];
             let [nx, ny, nz] = [self.normal[0][i], self.normal[1][i], self.normal[2][i]];
             let s = |term: usize| self.spread[term][i];
-            let variance = s(0) * ux * ux
-                + s(1) * uy * uy
-                + s(2) * uz * uz
-                + s(3) * ux * uy
-                + s(4) * ux * uz
-                + s(5) * uy * uz;
-            let reach = variance.max(0.0).sqrt();
+            let reach = self.half_height(i, [ux, uy, uz]);
             let facing = nx * ux + ny * uy + nz * uz;
             let square = facing * facing;
             // of what is nearly horizontal alone

@@ -95,6 +95,14 @@ impl<T: Copy + Default> PerWheel<T> {
     }
 }
 
+impl PerWheel<f32> {
+    /// The values up to the last that is a number, of places behind whose last wheel there is NaN: one at least.
+    pub fn stated(places: &[f32; MAX_WHEELS]) -> Self {
+        let count = places.iter().rposition(|value| !value.is_nan()).map_or(1, |last| last + 1);
+        Self { values: *places, count: count as u8 }
+    }
+}
+
 impl<T> Deref for PerWheel<T> {
     type Target = [T];
 

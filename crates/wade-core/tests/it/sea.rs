@@ -280,20 +280,20 @@ fn levels_at_the_wheels_tilt_the_water_and_one_that_is_higher_lifts_its_wheel() 
 fn a_sheared_current_pulls_above_more_than_below_and_keeps_its_mean() {
     let (_, base) = body("box");
     let current = Vec3::new(-1.0, 0.0, 0.0);
-    let parked = |exponent: f64| {
+    let parked = |water: f64, exponent: f64| {
         let state = Condition {
             velocity: -current,
             ground_velocity: Vec3::zeros(),
             stated_bed: Some(0.0),
-            ..afloat(0.2)
+            ..afloat(water)
         };
         let sea = Sea { current_exponent: exponent, ..Sea::default() };
         load((&base, &[]), &state, &sea, (Physics::QuasiSteady, 0.0), None).0
     };
-    let even = parked(0.0);
+    let even = parked(0.2, 0.0);
     // the box reaches down to the bed, with two rows of elements: on its face int (1 + n)^2 s^2n ds = (1 + n)^2 / (1 + 2 n) of the even flow
     for exponent in [1.0 / 7.0, 1.0 / 3.0, 0.5] {
-        let sheared = parked(exponent);
+        let sheared = parked(0.2, exponent);
         let expected = (1.0 + exponent).powi(2) / (1.0 + 2.0 * exponent);
         let found = sheared.force.x / even.force.x;
         println!("exponent {exponent:.2}: drag {found:.3}, in closed form {expected:.3}");
@@ -305,16 +305,7 @@ fn a_sheared_current_pulls_above_more_than_below_and_keeps_its_mean() {
         assert!((lever - arm / expected).abs() < 0.1 * 0.2, "{lever} {}", arm / expected);
     }
     // half as deep, it meets the upper half of the profile
-    let high = |exponent: f64| {
-        let state = Condition {
-            velocity: -current,
-            ground_velocity: Vec3::zeros(),
-            stated_bed: Some(0.0),
-            ..afloat(0.4)
-        };
-        let sea = Sea { current_exponent: exponent, ..Sea::default() };
-        load((&base, &[]), &state, &sea, (Physics::QuasiSteady, 0.0), None).0.force.x
-    };
+    let high = |exponent: f64| parked(0.4, exponent).force.x;
     let expected = 4.0 * (1.0 - 0.125) / 3.0 / 0.5;
     assert!((high(1.0) / high(0.0) / expected - 1.0).abs() < 0.03, "{}", high(1.0) / high(0.0));
 }

@@ -66,7 +66,7 @@ impl Query {
             dry_contact: self.flags & DRY_CONTACT != 0,
             heading: heading.then_some(self.heading_rad),
             depth_rate: depth_rate.then_some(self.depth_rate_mps),
-            wheel_speeds: wheel_speeds.then(|| stated(&self.wheel_speed_radps)),
+            wheel_speeds: wheel_speeds.then(|| PerWheel::stated(&self.wheel_speed_radps)),
             time_step: self.time_step_s,
             implicit_added_mass: self.flags & IMPLICIT_ADDED_MASS != 0,
             physics: match self.flags & (HYDROSTATIC | QUASI_STEADY | FULL) {
@@ -80,7 +80,7 @@ impl Query {
             wave_vector: if has_wave { self.wave_vector_radpm } else { [0.0; 3] },
             wave_amplitude: if has_wave { self.wave_amplitude_m } else { 0.0 },
             wave_phase: if has_wave { self.wave_phase_rad } else { 0.0 },
-            wheel_levels: wheel_levels.then(|| stated(&self.wheel_water_level_m)),
+            wheel_levels: wheel_levels.then(|| PerWheel::stated(&self.wheel_water_level_m)),
             current_exponent: match self.flags & HAS_CURRENT_EXPONENT {
                 0 => 0.0,
                 _ => self.current_exponent,
@@ -96,12 +96,6 @@ impl Query {
         }
         Ok(has)
     }
-}
-
-/// The values of wheels up to the last that is a number. Whether they are those of all wheels is checked where the vehicle is known.
-fn stated(values: &[f32; MAX_WHEELS]) -> PerWheel<f32> {
-    let count = values.iter().rposition(|value| !value.is_nan()).map_or(1, |last| last + 1);
-    PerWheel::new(&values[..count]).unwrap_or_else(PerWheel::none)
 }
 
 /// Values of wheels in the first places, and NaN behind them.
