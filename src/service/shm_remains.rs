@@ -316,10 +316,34 @@ fn name_of(file: &Path) -> String {
     file.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Removes the dead nodes that iceoryx2 left and that were in no service that is left. The others' services are put right by
-/// who owns them.
+/// Removes the dead nodes that iceoryx2 left and that were in no service that is left, and the ports of dead processes that no
+/// node is left of. The others' services are put right by who owns them.
 fn sweep() {
     remove_nodes(dead_nodes(|_| true));
+    without_a_node().into_iter().for_each(remove_untold_of);
+}
+
+/// Dead processes that left a listener or a segment and no node, as one does whose node was cleared away up to a file that
+/// iceoryx2 looked for and did not yet find. A process has its node before its first port and until after its last, in
+/// whatever container, so the ports are listed before the nodes.
+fn without_a_node() -> BTreeSet<u32> {
+    let global = &Config::global_config().global;
+    let root = PathBuf::from(global.root_path().to_string());
+    let (prefix, nodes) = (global.prefix.to_string(), nodes_folder());
+    let suffixes = [&global.service.event_connection_suffix, &global.service.data_segment_suffix]
+        .map(ToString::to_string);
+    let processes = |folder: &Path, chosen: &dyn Fn(&str) -> bool| -> BTreeSet<u32> {
+        let names = files_in(folder).map(|file| name_of(&file)).filter(|name| chosen(name));
+        names.flat_map(|name| numbers_in(&name)).map(process_of).collect()
+    };
+    let is_port = |name: &str| {
+        let name = name.strip_prefix(&prefix);
+        name.is_some_and(|name| suffixes.iter().any(|end| name.trim_end_matches("_mgmt").ends_with(end)))
+    };
+    let mut left = processes(Path::new(SHARED_MEMORY), &is_port);
+    left.extend(processes(&root, &is_port));
+    let with_nodes = processes(&nodes, &|_| true);
+    left.into_iter().filter(|process| !with_nodes.contains(process) && is_gone(*process)).collect()
 }
 
 fn remove_nodes(dead: Vec<DeadNode>) {

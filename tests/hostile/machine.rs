@@ -47,6 +47,11 @@ impl Machine {
         self.folder.path()
     }
 
+    /// What the names of this iceoryx2's files begin with.
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
     /// The folder that stands for /tmp/iceoryx2.
     pub fn root(&self) -> PathBuf {
         self.path().join("root")

@@ -46,6 +46,8 @@ fn a_server_starts_and_goes_on_whatever_is_done_to_it() {
     full(&machine);
     foreign(&machine);
     terminated_under_clients(&machine);
+    orphaned(&machine);
+    until_back(&machine, &baseline);
     let part = Duration::from_secs_f32(seconds / 2.0);
     killed_at_system_calls(&machine, &mut numbers, part);
     until_back(&machine, &baseline);
@@ -384,6 +386,16 @@ fn terminated_under_clients(machine: &Machine) {
     if let Some(mut python) = python {
         drop(python.stdin.take());
         assert!(python.wait().expect("reaped").success());
+    }
+}
+
+/// A listener and a segment of a process that is dead and has no node, as a kill in the middle of iceoryx2's clearing leaves.
+fn orphaned(machine: &Machine) {
+    let mut process = Command::new("true").spawn().expect("started");
+    let number = u128::from(process.id()) << 64 | 1;
+    assert!(process.wait().expect("reaped").success());
+    for (folder, end) in [(machine.root(), "event"), ("/dev/shm".into(), "data")] {
+        std::fs::write(folder.join(format!("{}{number}.{end}", machine.prefix())), []).expect("written");
     }
 }
 
