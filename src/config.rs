@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use wade_core::physics::Physics;
 
 use crate::service::accounts::Limits;
-use crate::service::{grpc, health, http, shm};
+use crate::service::{access, grpc, health, http, shm};
 
 /// Settings of `wade serve`: the file deploy/wade.toml shows every key with its default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,6 +22,10 @@ pub struct Config {
     pub drain_s: f64,
     /// Length of the window of `GetLatency` [s].
     pub latency_window_s: f64,
+    /// Encryption of TCP.
+    pub tls: access::TlsConfig,
+    /// Who may do what over TCP.
+    pub access: access::Config,
     /// gRPC.
     pub grpc: grpc::Config,
     /// Shared memory.
@@ -42,6 +46,8 @@ impl Default for Config {
             physics: Physics::Full,
             drain_s: 5.0,
             latency_window_s: 10.0,
+            tls: access::TlsConfig::default(),
+            access: access::Config::default(),
             grpc: grpc::Config::default(),
             shm: shm::Config::default(),
             http: http::Config::default(),
@@ -95,6 +101,25 @@ pub enum ConfigError {
         value: String,
         /// What is allowed.
         expected: &'static str,
+    },
+    /// An address that other machines reach, without encryption.
+    #[error(
+        "{key}.listen = \"{listen}\": other machines reach it and nothing is encrypted: set tls.certificate and tls.key, or \
+         {key}.insecure = true (--insecure) where everybody on that network may read and ask"
+    )]
+    Exposed {
+        /// The table.
+        key: &'static str,
+        /// The address.
+        listen: String,
+    },
+    /// A setting that another one needs, or that goes against it.
+    #[error("{key}: {reason}")]
+    Conflict {
+        /// The key.
+        key: &'static str,
+        /// What is wrong.
+        reason: &'static str,
     },
 }
 
@@ -162,7 +187,48 @@ impl Config {
         let can_be_ready = self.shm.enabled || !self.ready.require.contains(&health::Part::Shm);
         range(can_be_ready, "shm.enabled", &false, "true where ready.require names \"shm\"")?;
         let silent = grpc.listen.is_empty() && grpc.unix_socket.as_os_str().is_empty() && !self.shm.enabled;
-        range(!silent, "shm.enabled", &false, "true where grpc.listen and grpc.unix_socket are both empty")
+        range(!silent, "shm.enabled", &false, "true where grpc.listen and grpc.unix_socket are both empty")?;
+        self.validate_access()
+    }
+
+    /// Checks that nothing is open to other machines unless it was said to be.
+    fn validate_access(&self) -> Result<(), ConfigError> {
+        let (tls, access, is_set) = (&self.tls, &self.access, |path: &PathBuf| !path.as_os_str().is_empty());
+        let conflict = |is_wrong: bool, key, reason| {
+            if is_wrong { Err(ConfigError::Conflict { key, reason }) } else { Ok(()) }
+        };
+        conflict(tls.is_on() && !is_set(&tls.key), "tls.key", "tls.certificate is set, and has no key")?;
+        conflict(
+            !tls.is_on() && is_set(&tls.key),
+            "tls.certificate",
+            "tls.key is set, and has no certificate",
+        )?;
+        conflict(
+            !tls.is_on() && tls.believes_clients(),
+            "tls.certificate",
+            "tls.client_ca is set, and clients show certificates over TLS alone",
+        )?;
+        conflict(
+            !access.certificates.is_empty() && !tls.believes_clients(),
+            "tls.client_ca",
+            "access.certificates names certificates, and no authority is believed",
+        )?;
+        conflict(
+            self.grpc.admin_over_tcp && (tls.believes_clients() || is_set(&access.tokens)),
+            "grpc.admin_over_tcp",
+            "lets everybody administer although callers show who they are: give the role administer instead",
+        )?;
+        for (key, listen, insecure) in
+            [("grpc", &self.grpc.listen, self.grpc.insecure), ("http", &self.http.listen, self.http.insecure)]
+        {
+            // what is no address is refused where it is bound
+            let address = listen.parse::<std::net::SocketAddr>().ok();
+            let is_open = address.is_some_and(|address| !address.ip().to_canonical().is_loopback());
+            if is_open && !insecure && !tls.is_on() {
+                return Err(ConfigError::Exposed { key, listen: listen.clone() });
+            }
+        }
+        Ok(())
     }
 
     /// The most that connections may make the server hold.

@@ -5,6 +5,7 @@ mod held;
 pub use held::{Closed, Resource};
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
@@ -67,6 +68,11 @@ struct VehicleLabels {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct UpLabels {
     transport: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct FileLabels {
+    file: String,
 }
 
 const RELOAD_OUTCOMES: [&str; 2] = ["accepted", "refused"];
@@ -222,6 +228,7 @@ pub struct Metrics {
     bundle_version: Family<VehicleLabels, Gauge>,
     reloads: Family<ReloadLabels, Counter>,
     transport_up: Family<UpLabels, Gauge>,
+    certificate_end: Family<FileLabels, Gauge>,
     shm_restarts: Counter,
     holding: held::HeldMetrics,
 }
@@ -273,6 +280,14 @@ impl Metrics {
             "1 where the transport answers the server's own question, else 0",
             Family::clone(&transport_up),
         );
+        // without TLS there is none, and so no line
+        let certificate_end = Family::default();
+        registry.register_with_unit(
+            "certificate_end",
+            "When the certificate of the server expires, since 1970",
+            Unit::Seconds,
+            Family::clone(&certificate_end),
+        );
         let holding = held::HeldMetrics::register(&mut registry);
         Self {
             registry,
@@ -284,6 +299,7 @@ impl Metrics {
             bundle_version,
             reloads,
             transport_up,
+            certificate_end,
             shm_restarts,
         }
     }
@@ -346,6 +362,14 @@ impl Metrics {
     /// States whether a transport answers.
     pub fn set_transport_up(&self, transport: &'static str, up: bool) {
         self.transport_up.get_or_create(&UpLabels { transport }).set(i64::from(up));
+    }
+
+    /// States when the server's certificate expires, since 1970.
+    pub fn set_certificate_end(&self, file: &Path, since_1970: Duration) {
+        let file = FileLabels { file: file.display().to_string() };
+        self.certificate_end
+            .get_or_create(&file)
+            .set(i64::try_from(since_1970.as_secs()).unwrap_or(i64::MAX));
     }
 
     /// Begins a new window; to be called at a steady period by somebody who owns a clock.

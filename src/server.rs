@@ -23,6 +23,7 @@ use watchdog::Watchdog;
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::metrics::Metrics;
+use crate::service::access::{Access, Door, FileError, Protocol};
 use crate::service::accounts::Accounts;
 use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
@@ -46,6 +47,9 @@ pub enum StartError {
     /// The bundles.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// A file of certificates, a key or tokens.
+    #[error(transparent)]
+    Access(#[from] FileError),
     /// A thread or a runtime.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
@@ -62,6 +66,9 @@ pub struct Running {
     metrics: Arc<Metrics>,
     grpc: Arc<grpc::Server>,
     listeners: Arc<Listeners>,
+    access: Arc<Access>,
+    http_door: Door,
+    grpc_door: Door,
     http_address: Option<SocketAddr>,
     health: Arc<Health>,
     stop: watch::Sender<bool>,
@@ -88,6 +95,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         Arc::clone(&engine),
         Arc::clone(&metrics),
     ));
+    let access = Arc::new(Access::new(&config.tls, &config.access, &config.grpc, Arc::clone(&metrics))?);
     let listeners = Arc::new(Listeners::bind(&config.grpc)?);
     let http_listener = http::bind(&config.http)?;
     let shared = call::Shared {
@@ -99,7 +107,11 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     };
     let health = Arc::new(Health::new(&config.ready, Arc::clone(&metrics)));
     let accounts = Accounts::new(&config.limits(), Arc::clone(&metrics));
-    let runtime = runtime()?;
+    // handshakes are computed there, where nobody waits for an answer
+    let (runtime, handshakes) = (runtime()?, runtime()?);
+    let door = |protocol, insecure| Door::new(&access, protocol, insecure, handshakes.handle());
+    let grpc_door = door(Protocol::Http2, config.grpc.insecure);
+    let http_door = door(Protocol::Http1, config.http.insecure);
     let (stop, stopped) = watch::channel(false);
     let (stop_http, http_stopped) = watch::channel(false);
     let mut running = Running {
@@ -107,6 +119,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
             config.grpc.clone(),
             shared.clone(),
             Arc::clone(&accounts),
+            grpc_door.clone(),
         ))?),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         health: Arc::clone(&health),
@@ -117,11 +130,15 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         reloader,
         metrics,
         listeners,
+        access,
+        http_door: http_door.clone(),
+        grpc_door,
         stop,
         stop_http,
         runtime,
         failed: Arc::new(AtomicBool::new(false)),
     };
+    running.spawn_handshakes(handshakes, http_stopped.clone())?;
     for _ in 0..config.grpc.threads {
         running.spawn_grpc(stopped.clone())?;
     }
@@ -132,8 +149,13 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         health.set(Part::Http, State::Ok);
     }
     let window = Duration::from_secs_f64(config.latency_window_s);
-    let shared =
-        http::Shared { config: config.http.clone(), grpc: shared, accounts, health: Arc::clone(&health) };
+    let shared = http::Shared {
+        config: config.http.clone(),
+        grpc: shared,
+        accounts,
+        health: Arc::clone(&health),
+        door: http_door,
+    };
     running.spawn_housekeeping(http_listener, shared, window, http_stopped)?;
     running.reloader.load_all()?;
     if config.shm.enabled {
@@ -173,6 +195,16 @@ impl Running {
     /// Which transports answer.
     pub fn health(&self) -> &Arc<Health> {
         &self.health
+    }
+
+    /// Who may do what over TCP, and the files that say so.
+    pub fn access(&self) -> &Arc<Access> {
+        &self.access
+    }
+
+    /// Whether gRPC over TCP is encrypted, and HTTP.
+    pub fn is_encrypted(&self) -> [bool; 2] {
+        [&self.grpc_door, &self.http_door].map(Door::is_encrypted)
     }
 
     /// What is counted.
@@ -224,6 +256,21 @@ impl Running {
             runtime.shutdown_background();
         })?;
         self.threads.push(thread);
+        Ok(())
+    }
+
+    /// The handshakes of TLS, and a look now and then at the files that it needs.
+    fn spawn_handshakes(&mut self, runtime: Runtime, stop: watch::Receiver<bool>) -> Result<(), StartError> {
+        if !self.access.has_files() {
+            runtime.shutdown_background();
+            return Ok(());
+        }
+        let access = Arc::clone(&self.access);
+        let thread = self.spawn("wade-tls", move || {
+            runtime.block_on(access.follow_files(stop));
+            runtime.shutdown_background();
+        })?;
+        self.housekeeping.push(thread);
         Ok(())
     }
 
@@ -301,6 +348,8 @@ impl Running {
             tcp: self.grpc_address(),
             unix: self.unix_path().map(Path::to_owned),
             http: self.http_address,
+            grpc_door: self.grpc_door.clone(),
+            http_door: self.http_door.clone(),
         };
         let runtime = runtime()?;
         let thread = self.spawn("wade-watchdog", move || {

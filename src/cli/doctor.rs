@@ -12,7 +12,7 @@ use serde::Serialize;
 use wade::config::Config;
 use wade::cores;
 use wade::service::occupant::{self, Occupant};
-use wade_client::{Address, Client, ClientError, GrpcClient, Method, ShmClient};
+use wade_client::{Address, Client, ClientError, Credentials, GrpcClient, Method, ShmClient};
 use wade_core::model::kernel::Isa;
 use wade_learn::cfd::openfoam::OpenFoam;
 use wade_wire::State;
@@ -324,7 +324,8 @@ fn servers(config: &Config, vehicle: Option<&str>) -> Vec<Check> {
     let Some(vehicle) = vehicle else { return Vec::new() };
     let mut addresses = Vec::new();
     if !config.grpc.listen.is_empty() {
-        addresses.push(("server, gRPC", Address::Tcp(config.grpc.listen.clone())));
+        let form = if config.tls.is_on() && !config.grpc.insecure { Address::Tls } else { Address::Tcp };
+        addresses.push(("server, gRPC", form(config.grpc.listen.clone())));
     }
     if !config.grpc.unix_socket.as_os_str().is_empty() {
         addresses.push(("server, socket", Address::Unix(config.grpc.unix_socket.clone())));
@@ -353,9 +354,9 @@ fn ask(address: &Address, vehicle: &str) -> Result<u32, ClientError> {
         Address::Shm(namespace) => {
             Client::Shm(Box::new(ShmClient::new(vehicle, Wait::Block, TIMEOUT).in_namespace(namespace)))
         }
-        Address::Tcp(_) | Address::Unix(_) => {
-            let url = address.url().unwrap_or_default();
-            Client::Grpc(Box::new(GrpcClient::tcp(&url, vehicle, Method::Unary, TIMEOUT)?))
+        Address::Tcp(_) | Address::Tls(_) | Address::Unix(_) => {
+            let (url, shown) = (address.url().unwrap_or_default(), Credentials::from_environment()?);
+            Client::Grpc(Box::new(GrpcClient::connect(&url, vehicle, Method::Unary, TIMEOUT, &shown)?))
         }
     };
     Ok(client.evaluate(&State::still(0.0))?.version)

@@ -27,7 +27,7 @@ pub struct FmuCommand {
     /// Carry the bundle: no server is needed
     #[arg(long, required_unless_present = "connect", conflicts_with = "connect")]
     embedded: bool,
-    /// Ask this server: host:port, http://host:port, unix:PATH or shm:NAMESPACE
+    /// Ask this server: host:port, https://host:port, unix:PATH or shm:NAMESPACE
     #[arg(long, value_name = "ADDRESS")]
     connect: Option<Address>,
     /// Give the load of each surface too

@@ -1,6 +1,7 @@
 //! The logs of `wade serve`.
 
 use std::io::IsTerminal;
+use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
 
@@ -48,8 +49,12 @@ pub fn starting(config: &Config, file: Option<&Path>) {
 
 /// Says where the server can be reached, and after how long.
 pub fn ready(config: &Config, running: &Running, elapsed: Duration) {
+    let [grpc, http] = running.is_encrypted();
+    let scheme = |encrypted| if encrypted { "https" } else { "http" };
     if let Some(address) = running.grpc_address() {
-        tracing::info!(%address, "gRPC");
+        let form = if grpc { format!("https://{address}") } else { address.to_string() };
+        tracing::info!(address = form, "gRPC");
+        warn_if_open("gRPC", address, grpc);
     }
     if let Some(path) = running.unix_path() {
         tracing::info!(address = %format!("unix:{}", path.display()), "gRPC");
@@ -63,9 +68,17 @@ pub fn ready(config: &Config, running: &Running, elapsed: Duration) {
         ),
     }
     if let Some(address) = running.http_address() {
-        tracing::info!("page at http://{address}/");
+        tracing::info!("page at {}://{address}/", scheme(http));
+        warn_if_open("HTTP", address, http);
     }
     tracing::info!("serving, ready in {} ms", elapsed.as_millis());
+}
+
+/// Says that other machines reach an address without encryption.
+fn warn_if_open(what: &str, address: SocketAddr, encrypted: bool) {
+    if !encrypted && !address.ip().to_canonical().is_loopback() {
+        tracing::warn!("{what} at {address} is not encrypted: whoever is on that network may read and ask");
+    }
 }
 
 /// A path as whoever reads the log elsewhere needs it.

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use tracing::callsite::Identifier;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::layer::{Context, Layer};
+use wade::service::admin::AUDIT;
 
 /// Lines of one kind that are written in each interval; further ones are counted.
 const MOST: u32 = 10;
@@ -23,7 +24,7 @@ struct Kind {
     lines: u32,
 }
 
-/// The limit. Levels below INFO are written in full: somebody asked for them.
+/// The limit. Levels below INFO are written in full: somebody asked for them. So is what administrators did.
 #[derive(Debug, Clone, Default)]
 pub struct Limit {
     kinds: Arc<Mutex<HashMap<Identifier, Kind>>>,
@@ -79,7 +80,8 @@ impl Limit {
 
 impl<S: Subscriber> Layer<S> for Limit {
     fn event_enabled(&self, event: &Event<'_>, _: Context<'_, S>) -> bool {
-        *event.metadata().level() > Level::INFO || self.admits(event, Instant::now())
+        let metadata = event.metadata();
+        *metadata.level() > Level::INFO || metadata.target() == AUDIT || self.admits(event, Instant::now())
     }
 }
 
@@ -111,9 +113,10 @@ mod tests {
             tracing::info!("something else");
             for _ in 0..100 {
                 tracing::debug!("asked for");
+                tracing::info!(target: AUDIT, "administration");
             }
         });
-        assert_eq!(written.0.load(Ordering::Relaxed), MOST + 1 + 100);
+        assert_eq!(written.0.load(Ordering::Relaxed), MOST + 1 + 200);
         assert_eq!(limit.left_out(Instant::now()), []);
         let left_out = limit.left_out(Instant::now() + INTERVAL);
         assert_eq!(left_out.iter().map(|(.., lines)| *lines).collect::<Vec<_>>(), [1000 - MOST]);

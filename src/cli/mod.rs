@@ -21,7 +21,9 @@ mod soak;
 mod soak_server;
 mod stability;
 mod state;
+mod token;
 mod train;
+mod trust;
 mod validate;
 mod vehicle;
 
@@ -72,6 +74,7 @@ enum Command {
     Gap(gap::Gap),
     Vehicle(vehicle::Vehicle),
     Fmu(fmu::FmuCommand),
+    Token(token::TokenCommand),
     Doctor(doctor::Doctor),
     Completions(shell::Completions),
     Man(shell::Man),
@@ -97,6 +100,7 @@ impl Cli {
             Command::Gap(command) => command.run(),
             Command::Vehicle(command) => command.run(),
             Command::Fmu(command) => command.run(),
+            Command::Token(command) => command.run(),
             Command::Doctor(command) => command.run(),
             Command::Completions(command) => command.run(),
             Command::Man(command) => command.run(),

@@ -15,6 +15,7 @@ use wade_wire::proto::EvaluateResponse;
 use wade_wire::shm::{NAMESPACE, Wait};
 
 use super::state::StateArgs;
+use super::trust::Trust;
 use super::{Vehicles, emit, outside, usage_error};
 
 /// Ask for the forces in one state
@@ -29,7 +30,7 @@ pub struct Query {
     vehicle: String,
     #[command(flatten)]
     state: StateArgs,
-    /// Ask this server: host:port, http://host:port, unix:PATH or shm:NAMESPACE
+    /// Ask this server: host:port, https://host:port, unix:PATH or shm:NAMESPACE
     #[arg(long)]
     addr: Option<Address>,
     /// Compute here, or ask the server on this machine at its usual address [default: inproc, or that of --addr]
@@ -38,6 +39,8 @@ pub struct Query {
     /// Namespace of the server's shared memory, with --transport shm
     #[arg(long, conflicts_with = "addr")]
     namespace: Option<String>,
+    #[command(flatten)]
+    trust: Trust,
     #[command(flatten)]
     vehicles: Vehicles,
     /// Longest wait for an answer [s]
@@ -67,7 +70,9 @@ impl Transport {
     fn suits(self, address: &Address) -> bool {
         matches!(
             (self, address),
-            (Self::Grpc, Address::Tcp(_)) | (Self::Uds, Address::Unix(_)) | (Self::Shm, Address::Shm(_))
+            (Self::Grpc, Address::Tcp(_) | Address::Tls(_))
+                | (Self::Uds, Address::Unix(_))
+                | (Self::Shm, Address::Shm(_))
         )
     }
 }
@@ -158,8 +163,9 @@ impl Query {
                 let about = self.vehicles.model(vehicle).map(|model| About::of_model(&model));
                 return Ok((Client::Shm(Box::new(client)), about.unwrap_or_default()));
             }
-            Address::Tcp(_) | Address::Unix(_) => {
-                GrpcClient::tcp(&address.url().unwrap_or_default(), vehicle, unary, timeout)?
+            Address::Tcp(_) | Address::Tls(_) | Address::Unix(_) => {
+                let (url, credentials) = (address.url().unwrap_or_default(), self.trust.credentials()?);
+                GrpcClient::connect(&url, vehicle, unary, timeout, &credentials)?
             }
         };
         let surfaces = grpc.vehicle()?.surfaces.into_iter().map(|surface| surface.name).collect();

@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use clap::Args;
 use wade_client::{Address, AddressError, ClientError, reload};
-use wade_wire::proto::ReloadRequest;
+use wade_wire::proto::{ReloadRequest, Reloaded};
+
+use super::trust::Trust;
 
 /// Longest wait for a server that may not be there.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -13,9 +15,11 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 /// Which server reads a changed bundle.
 #[derive(Debug, Args)]
 pub struct Running {
-    /// Server that reads the changed bundle, where it serves from the same folder: host:port, http://host:port or unix:PATH
+    /// Server that reads the changed bundle, where it serves from the same folder: host:port, https://host:port or unix:PATH
     #[arg(long, value_name = "ADDR", default_value = "unix:/tmp/wade.sock", value_parser = of_grpc)]
     server: Address,
+    #[command(flatten)]
+    trust: Trust,
 }
 
 /// An address at which a server can be asked to read bundles.
@@ -24,7 +28,7 @@ fn of_grpc(text: &str) -> Result<Address, String> {
     match address.url() {
         Some(_) => Ok(address),
         None => {
-            Err("shared memory carries queries alone; write host:port, http://host:port or unix:PATH".into())
+            Err("shared memory carries queries alone; write host:port, https://host:port or unix:PATH".into())
         }
     }
 }
@@ -36,7 +40,7 @@ impl Running {
         let folder = wade_core::bundle::canonical(bundle);
         let request = ReloadRequest { vehicle: vehicle.to_owned(), bundle: folder.display().to_string() };
         let server = &self.server;
-        match reload(&server.url().unwrap_or_default(), request, TIMEOUT) {
+        match self.asked(request) {
             Ok(reloaded) => {
                 for one in reloaded {
                     let (name, version) = (&one.vehicle, one.bundle_version);
@@ -63,10 +67,14 @@ impl Running {
         }
     }
 
+    fn asked(&self, request: ReloadRequest) -> Result<Vec<Reloaded>, ClientError> {
+        reload(&self.server.url().unwrap_or_default(), request, TIMEOUT, &self.trust.credentials()?)
+    }
+
     /// Has a server that must be there read a vehicle again, or all where none is named; false where it refused a bundle.
     pub fn ask(&self, vehicle: &str) -> Result<bool, ClientError> {
         let request = ReloadRequest { vehicle: vehicle.to_owned(), bundle: String::new() };
-        let reloaded = reload(&self.server.url().unwrap_or_default(), request, TIMEOUT)?;
+        let reloaded = self.asked(request)?;
         for one in &reloaded {
             let (server, name, version) = (&self.server, &one.vehicle, one.bundle_version);
             match one.refusal.as_str() {

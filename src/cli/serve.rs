@@ -12,7 +12,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use wade::config::Config;
 use wade::cores;
 use wade::server::{self, Running};
-use wade::service::admin::Reload;
+use wade::service::admin::{AUDIT, Reload};
 use wade_core::physics::Physics;
 use wade_wire::shm::Wait;
 
@@ -44,6 +44,9 @@ pub struct Serve {
     /// Address of metrics and probes; empty for none
     #[arg(long, value_name = "ADDR")]
     http: Option<String>,
+    /// Serve TCP without TLS, on whatever address, where everybody on the network may read and ask
+    #[arg(long)]
+    insecure: bool,
     /// First part of the names in shared memory; servers beside each other need one each
     #[arg(long, value_name = "NAME")]
     namespace: Option<String>,
@@ -105,6 +108,8 @@ impl Serve {
         set(&mut config.grpc.listen, self.listen);
         set(&mut config.grpc.unix_socket, self.unix_socket);
         set(&mut config.http.listen, self.http);
+        config.grpc.insecure |= self.insecure;
+        config.http.insecure |= self.insecure;
         set(&mut config.physics, self.physics.map(Physics::from));
         set(&mut config.cpus, self.cpus);
         set(&mut config.log.filter, self.log);
@@ -214,9 +219,10 @@ impl Signals {
 
 /// Reads every bundle again on a thread of its own: a signal that ends the server does not wait for it.
 fn start_reload(running: &Running) {
-    let reloader = Arc::clone(running.reloader());
+    let (reloader, access) = (Arc::clone(running.reloader()), Arc::clone(running.access()));
     let reloading = std::thread::Builder::new().name("wade-reload".into()).spawn(move || {
-        tracing::info!("SIGHUP: reading every bundle again");
+        tracing::info!(target: AUDIT, by = "SIGHUP", job = "reload every vehicle", "administration");
+        access.reload();
         match reloader.reload("") {
             Ok(reloads) => {
                 for Reload { vehicle, served_version, refusal, .. } in reloads {

@@ -11,13 +11,14 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use wade::cores;
 use wade::soak::{self, Ask, Clients, Config, Input, Rate, Report, SendError, Slo};
-use wade_client::{Address, Client, ClientError, GrpcClient, InProcess, Method, ShmClient};
+use wade_client::{Address, Client, ClientError, Credentials, GrpcClient, InProcess, Method, ShmClient};
 use wade_core::domain::{Domain, Range};
 use wade_wire::State;
 use wade_wire::shm::Wait;
 
 use super::progress::soak_bar;
 use super::soak_server::{Server, Wanted};
+use super::trust::Trust;
 use super::{Vehicles, emit, usage_error};
 
 /// Load a server at a steady rate for a stated time and report its latency
@@ -82,9 +83,11 @@ pub struct Soak {
     /// Print the JSON too
     #[arg(long)]
     json: bool,
-    /// Ask this server, and start none: host:port, http://host:port, unix:PATH or shm:NAMESPACE
+    /// Ask this server, and start none: host:port, https://host:port, unix:PATH or shm:NAMESPACE
     #[arg(long)]
     addr: Option<Address>,
+    #[command(flatten)]
+    trust: Trust,
     /// Which CPUs server and client run on
     #[arg(long, value_enum, default_value_t = Pin::Split)]
     pin: Pin,
@@ -149,7 +152,7 @@ impl Transport {
     /// The usual one of an address.
     fn of(address: &Address) -> Self {
         match address {
-            Address::Tcp(_) => Self::Grpc,
+            Address::Tcp(_) | Address::Tls(_) => Self::Grpc,
             Address::Unix(_) => Self::Uds,
             Address::Shm(_) => Self::ShmBlock,
         }
@@ -164,7 +167,7 @@ impl Transport {
         match self {
             Self::Inproc => None,
             Self::ShmSpin | Self::ShmBlock => Some("shm:NAMESPACE"),
-            Self::Grpc | Self::GrpcStream => Some("host:port or http://host:port"),
+            Self::Grpc | Self::GrpcStream => Some("host:port or https://host:port"),
             Self::Uds | Self::UdsStream => Some("unix:PATH"),
         }
     }
@@ -173,7 +176,7 @@ impl Transport {
         matches!(
             (self, address),
             (Self::ShmSpin | Self::ShmBlock, Address::Shm(_))
-                | (Self::Grpc | Self::GrpcStream, Address::Tcp(_))
+                | (Self::Grpc | Self::GrpcStream, Address::Tcp(_) | Address::Tls(_))
                 | (Self::Uds | Self::UdsStream, Address::Unix(_))
         )
     }
@@ -209,7 +212,9 @@ impl Soak {
             })?),
         };
         let address = self.addr.clone().or_else(|| server.as_ref().map(|server| server.address().clone()));
-        let target = Target { transport, address: address.as_ref(), vehicles: &self.vehicles };
+        let credentials = self.trust.credentials()?;
+        let (address, credentials) = (address.as_ref(), &credentials);
+        let target = Target { transport, address, credentials, vehicles: &self.vehicles };
         self.wait_for_answers(&target, server.as_mut())?;
         if !client_cpus.is_empty() {
             cores::pin_to(&client_cpus)?;
@@ -352,14 +357,17 @@ struct Target<'a> {
     transport: Transport,
     /// None where no server is asked.
     address: Option<&'a Address>,
+    credentials: &'a Credentials,
     vehicles: &'a Vehicles,
 }
 
 impl Target<'_> {
     fn client(&self, vehicle: &str) -> Result<Client, ClientError> {
         let url = || self.address.and_then(Address::url).unwrap_or_default();
-        let grpc =
-            |method| GrpcClient::tcp(&url(), vehicle, method, TIMEOUT).map(|c| Client::Grpc(Box::new(c)));
+        let grpc = |method| {
+            GrpcClient::connect(&url(), vehicle, method, TIMEOUT, self.credentials)
+                .map(|client| Client::Grpc(Box::new(client)))
+        };
         let shm = |wait| {
             let client = ShmClient::new(vehicle, wait, TIMEOUT);
             Ok(Client::Shm(Box::new(match self.address {
@@ -397,7 +405,9 @@ impl Target<'_> {
     /// The training domain: of the server that is asked over gRPC, else of our own bundle.
     fn domain(&self, vehicle: &str) -> Result<Domain> {
         match self.address.and_then(Address::url) {
-            Some(url) => Ok(GrpcClient::tcp(&url, vehicle, Method::Unary, TIMEOUT)?.domain()?),
+            Some(url) => {
+                Ok(GrpcClient::connect(&url, vehicle, Method::Unary, TIMEOUT, self.credentials)?.domain()?)
+            }
             None => Ok(*self.vehicles.model(vehicle)?.domain()),
         }
     }

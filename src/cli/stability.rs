@@ -10,6 +10,7 @@ use wade_client::{Address, ClientError, GrpcClient, Method};
 use wade_wire::{Evaluator, Refusal, proto};
 
 use super::state::Contact;
+use super::trust::Trust;
 use super::{Vehicles, emit};
 
 /// Whether a vehicle that stands in moving water floats, slides, topples or can be steered
@@ -53,9 +54,11 @@ pub struct StabilityCommand {
     /// Exit status 1 where it floats, slides, topples or cannot be steered with a greater probability
     #[arg(long, value_name = "P")]
     risk: Option<f32>,
-    /// Ask this server: host:port, http://host:port or unix:PATH [default: compute here]
+    /// Ask this server: host:port, https://host:port or unix:PATH [default: compute here]
     #[arg(long)]
     addr: Option<Address>,
+    #[command(flatten)]
+    trust: Trust,
     /// Longest wait for an answer [s]
     #[arg(long, default_value_t = 60.0)]
     timeout: f64,
@@ -106,7 +109,9 @@ impl StabilityCommand {
             Some(address) => {
                 let timeout = Duration::try_from_secs_f64(self.timeout)?;
                 let url = address.url().unwrap_or_default();
-                GrpcClient::tcp(&url, &self.vehicle, Method::Unary, timeout)?.stability(request.clone())?
+                let credentials = self.trust.credentials()?;
+                GrpcClient::connect(&url, &self.vehicle, Method::Unary, timeout, &credentials)?
+                    .stability(request.clone())?
             }
         };
         let is_one = request.depth_m.len() == 1 && request.speed_mps.len() == 1;

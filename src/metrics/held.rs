@@ -30,6 +30,7 @@ wade_core::named_enum! {
     #[allow(non_camel_case_types, missing_docs, reason = "the names are the label's values")]
     pub enum Closed {
         no_handshake,
+        no_tls,
         no_request,
         idle,
         answer_not_read,

@@ -6,12 +6,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use hyper_util::rt::TokioIo;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::sync::watch;
+use tonic::codegen::http::Uri;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Status};
 
+use crate::service::access::Door;
 use crate::service::health::{Health, Part, State};
 use crate::service::{grpc, stopped};
 use wade_wire::proto::ListVehiclesRequest;
@@ -31,6 +34,8 @@ pub(super) struct Watchdog {
     pub tcp: Option<SocketAddr>,
     pub unix: Option<PathBuf>,
     pub http: Option<SocketAddr>,
+    pub grpc_door: Door,
+    pub http_door: Door,
 }
 
 impl Watchdog {
@@ -54,11 +59,11 @@ impl Watchdog {
             tokio::select! {
                 _ = ticks.tick() => {
                     for asked in &mut grpc {
-                        let answer = ask_grpc(asked).await;
+                        let answer = ask_grpc(asked, &self.grpc_door).await;
                         asked.note(answer);
                     }
                     if let Some(asked) = &mut http {
-                        let answer = ask_http(&asked.at).await;
+                        let answer = ask_http(&asked.at, &self.http_door).await;
                         asked.note(answer);
                     }
                     self.say(Part::Grpc, &grpc);
@@ -136,10 +141,10 @@ async fn within<T>(work: impl Future<Output = Result<T, String>>) -> Result<T, S
     tokio::time::timeout(PATIENCE, work).await.unwrap_or_else(|_| late())
 }
 
-async fn ask_grpc(asked: &mut Asked<Channel>) -> Result<(), String> {
+async fn ask_grpc(asked: &mut Asked<Channel>, door: &Door) -> Result<(), String> {
     let channel = match asked.connection.take() {
         Some(channel) => channel,
-        None => within(connect(&asked.at)).await?,
+        None => within(connect(&asked.at, door)).await?,
     };
     let mut client = HydrodynamicsClient::new(channel.clone());
     let answer = within(async { Ok(client.list_vehicles(ListVehiclesRequest {}).await) }).await?;
@@ -153,18 +158,33 @@ async fn ask_grpc(asked: &mut Asked<Channel>) -> Result<(), String> {
     }
 }
 
-async fn connect(at: &str) -> Result<Channel, String> {
+async fn connect(at: &str, door: &Door) -> Result<Channel, String> {
     let endpoint = Endpoint::from_shared(at.to_owned()).map_err(|error| error.to_string())?;
-    endpoint.connect().await.map_err(|error| error.to_string())
+    let connected = match at.strip_prefix("http://").filter(|_| door.is_encrypted()) {
+        None => endpoint.connect().await,
+        Some(address) => {
+            // gRPC sees the bytes inside: the door makes the connection
+            let (door, address) = (door.clone(), address.to_owned());
+            let connector = tower::service_fn(move |_: Uri| {
+                let (door, address) = (door.clone(), address.clone());
+                async move {
+                    let socket = door.connect(TcpStream::connect(address).await?).await?;
+                    Ok::<_, std::io::Error>(TokioIo::new(socket))
+                }
+            });
+            endpoint.connect_with_connector(connector).await
+        }
+    };
+    connected.map_err(|error| error.to_string())
 }
 
 fn is_answer(status: &Status) -> bool {
     !matches!(status.code(), Code::Unavailable | Code::Unknown | Code::Internal | Code::Cancelled)
 }
 
-async fn ask_http(at: &str) -> Result<(), String> {
+async fn ask_http(at: &str, door: &Door) -> Result<(), String> {
     let exchange = async {
-        let mut stream = TcpStream::connect(at).await?;
+        let mut stream = door.connect(TcpStream::connect(at).await?).await?;
         stream.write_all(b"GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").await?;
         let mut line = [0; 12];
         stream.read_exact(&mut line).await?;

@@ -15,6 +15,9 @@ use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
 use wade_wire::UnknownVehicle;
 
+/// Where the log says who administered what: each line of it is written.
+pub const AUDIT: &str = "wade::audit";
+
 /// No bundle to serve.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {

@@ -27,6 +27,7 @@ use tonic_health::pb::health_server::HealthServer;
 use tonic_health::server::{HealthReporter, HealthService};
 
 use self::turns::Turnstile;
+use super::access::Door;
 use super::accounts::{Accounts, Connection};
 use super::admin::Jobs;
 use super::call::Shared;
@@ -46,6 +47,8 @@ use wade_wire::proto::inference::grpc_inference_service_server::GrpcInferenceSer
 pub struct Config {
     /// TCP address; an empty string turns TCP off.
     pub listen: String,
+    /// Whether TCP is served without TLS, on whatever address and although there is a certificate.
+    pub insecure: bool,
     /// Path of the Unix socket; an empty string turns it off.
     pub unix_socket: PathBuf,
     /// Threads, each with a runtime of its own that computes where it reads.
@@ -83,7 +86,7 @@ pub struct Config {
     pub idle_s: f64,
     /// A connection that does not answer a ping sent after this much silence is closed [s].
     pub keepalive_s: u64,
-    /// Whether an administrator's calls are answered over TCP too.
+    /// Whether an administrator's calls are answered over TCP too, where nobody has to show who they are.
     pub admin_over_tcp: bool,
 }
 
@@ -91,6 +94,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             listen: "127.0.0.1:50051".into(),
+            insecure: false,
             unix_socket: "/tmp/wade.sock".into(),
             threads: 1,
             max_message_bytes: 4 << 20,
@@ -228,15 +232,21 @@ pub struct Server {
     gate: Arc<Semaphore>,
     turnstile: Turnstile,
     health: HealthReporter,
+    door: Door,
 }
 
 impl Server {
     /// A server that is not ready yet; an error where the thread for the administrator's jobs does not start.
-    pub async fn new(config: Config, shared: Shared, accounts: Arc<Accounts>) -> std::io::Result<Self> {
+    pub async fn new(
+        config: Config,
+        shared: Shared,
+        accounts: Arc<Accounts>,
+        door: Door,
+    ) -> std::io::Result<Self> {
         let jobs = Jobs::start(Arc::clone(&shared.reloader))?;
         let gate = Arc::new(Semaphore::new(config.threads));
         let (turnstile, health) = (Turnstile::new(), HealthReporter::new());
-        let server = Self { config, shared, accounts, jobs, gate, turnstile, health };
+        let server = Self { config, shared, accounts, jobs, gate, turnstile, health, door };
         // the crate registers the empty name as SERVING, and nothing is served yet
         for service in HEALTH_NAMES {
             server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
@@ -329,7 +339,7 @@ impl Server {
         open: &mpsc::Sender<()>,
     ) -> Result<(), GrpcError> {
         let rules = Arc::new(calls::Rules {
-            no_administration: self.no_administration(&listener),
+            door: self.door.clone(),
             request: Duration::from_secs_f64(self.config.request_s),
             stream_idle: Duration::from_secs_f64(self.config.stream_idle_s),
             gate: Arc::clone(&self.gate),
@@ -341,13 +351,15 @@ impl Server {
         let (deadlines, frames) = (serving::Deadlines::of(&self.config), self.config.control_frames_per_s);
         let accounts = Arc::clone(&self.accounts);
         let serve = |socket, connection: Arc<Connection>, place| {
-            let link = link::Link::new(socket, Arc::clone(&connection), frames);
-            let calls = calls::Calls { routes: routes.clone(), connection, rules: Arc::clone(&rules) };
-            let accepted = serving::Accepted { link, calls, turns: self.turnstile.turns() };
-            let serving = serving::serve(http.clone(), accepted, deadlines, stop.clone());
-            let open = open.clone();
+            let (routes, rules, turns) = (routes.clone(), Arc::clone(&rules), self.turnstile.turns());
+            let (http, stop, open) = (http.clone(), stop.clone(), open.clone());
             tokio::spawn(async move {
-                serving.await;
+                if let Some((socket, who)) = rules.door.let_in(socket, &connection, deadlines.handshake).await
+                {
+                    let link = link::Link::new(socket, Arc::clone(&connection), frames);
+                    let calls = calls::Calls { routes, connection, rules, who };
+                    serving::serve(http, serving::Accepted { link, calls, turns }, deadlines, stop).await;
+                }
                 drop((place, open));
             });
         };
@@ -356,18 +368,6 @@ impl Server {
             () = stopped(stop.clone()) => {}
         }
         Ok(())
-    }
-
-    /// Whoever can open the Unix socket is the user that runs the server; over TCP anybody on this machine could ask.
-    fn no_administration(&self, listener: &Listener) -> Option<String> {
-        let refused = matches!(listener, Listener::Tcp(_)) && !self.config.admin_over_tcp;
-        let path = &self.config.unix_socket;
-        let way = if path.as_os_str().is_empty() {
-            "set grpc.unix_socket".to_owned()
-        } else {
-            format!("ask unix:{}", path.display())
-        };
-        refused.then(|| format!("{way}, or set grpc.admin_over_tcp = true where everybody may ask"))
     }
 }
 

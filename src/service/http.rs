@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use tokio::runtime::Handle;
 use tokio::sync::watch;
 
+use super::access::Door;
 use super::accounts::Accounts;
 use super::health::Health;
 use super::intake::{Listener, listen_on_tcp};
@@ -36,6 +37,8 @@ use rejection::Rejection;
 pub struct Config {
     /// TCP address; an empty string turns HTTP off.
     pub listen: String,
+    /// Whether it is served without TLS, on whatever address and although there is a certificate.
+    pub insecure: bool,
     /// Names of this machine under which the page and queries are served, beside localhost and plain addresses.
     pub hosts: Vec<String>,
     /// Most connections at a time.
@@ -50,6 +53,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             listen: "127.0.0.1:9464".into(),
+            insecure: false,
             hosts: Vec::new(),
             max_connections: 256,
             request_s: 5.0,
@@ -103,6 +107,8 @@ pub struct Shared {
     pub accounts: Arc<Accounts>,
     /// Which transports answer.
     pub health: Arc<Health>,
+    /// Who may do what.
+    pub door: Door,
 }
 
 /// Serves until `stop` turns true: probes on this thread, everything else on that of `work`, so that no query and no hull

@@ -13,6 +13,7 @@ use std::time::Duration;
 use rustix::net::sockopt::{set_socket_recv_buffer_size, set_socket_send_buffer_size};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio_rustls::TlsStream;
 
 use super::accounts::{Accounts, Closed, Connection, Peer, Place};
 use crate::metrics::Resource;
@@ -34,6 +35,8 @@ const SOCKET_BUFFER: usize = 256 << 10;
 pub enum Socket {
     /// TCP, without delay.
     Tcp(TcpStream),
+    /// The same, encrypted.
+    Tls(Box<TlsStream<TcpStream>>),
     /// The Unix socket.
     Unix(UnixStream),
 }
@@ -153,6 +156,7 @@ macro_rules! either {
     ($self:ident, $call:ident ( $($argument:expr),* )) => {
         match $self.get_mut() {
             Self::Tcp(stream) => Pin::new(stream).$call($($argument),*),
+            Self::Tls(stream) => Pin::new(stream.as_mut()).$call($($argument),*),
             Self::Unix(stream) => Pin::new(stream).$call($($argument),*),
         }
     };

@@ -1,5 +1,6 @@
 //! The server's transports: gRPC, HTTP and shared memory, administration, and the accounts of what clients hold.
 
+pub mod access;
 pub mod accounts;
 pub mod admin;
 pub mod answer;

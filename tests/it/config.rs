@@ -37,6 +37,41 @@ fn a_value_out_of_range_is_named() {
 }
 
 #[test]
+fn what_other_machines_reach_is_encrypted_or_said_to_be_insecure() {
+    for open in ["0.0.0.0:1", "[::]:1", "10.0.0.7:1", "[::ffff:10.0.0.7]:1"] {
+        let refused = refusal(|c| c.grpc.listen = open.into());
+        assert!(refused.contains("grpc.insecure") && refused.contains("tls.certificate"), "{refused}");
+        assert!(refusal(|c| c.http.listen = open.into()).contains("http.insecure"));
+        let mut config = Config::default();
+        (config.grpc.listen, config.http.listen) = (open.into(), open.into());
+        (config.grpc.insecure, config.http.insecure) = (true, true);
+        config.validate().expect("said to be insecure");
+    }
+    for inside in ["127.0.0.2:1", "[::1]:1", "[::ffff:127.0.0.1]:1"] {
+        let mut config = Config::default();
+        config.grpc.listen = inside.into();
+        config.validate().expect(inside);
+    }
+}
+
+#[test]
+fn settings_of_access_that_do_not_go_together_are_named() {
+    use wade::service::access::Role;
+    assert!(refusal(|c| c.tls.certificate = "c.pem".into()).contains("tls.key"));
+    assert!(refusal(|c| c.tls.key = "k.pem".into()).contains("tls.certificate"));
+    assert!(refusal(|c| c.tls.client_ca = "ca.pem".into()).contains("tls.certificate"));
+    let named = refusal(|c| {
+        c.access.certificates.insert("rig".into(), vec![Role::Query]);
+    });
+    assert!(named.contains("tls.client_ca"), "{named}");
+    let everybody = refusal(|c| {
+        c.access.tokens = "tokens.toml".into();
+        c.grpc.admin_over_tcp = true;
+    });
+    assert!(everybody.contains("grpc.admin_over_tcp"), "{everybody}");
+}
+
+#[test]
 fn a_physics_that_is_none_is_refused_with_file_key_and_what_there_is() {
     let folder = tempfile::TempDir::new().expect("a temporary folder");
     let path = folder.path().join("wade.toml");

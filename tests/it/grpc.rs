@@ -10,7 +10,7 @@ use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 use tonic_types::StatusExt;
-use wade_client::{GrpcClient, Method};
+use wade_client::{Credentials, GrpcClient, Method};
 use wade_wire::proto;
 use wade_wire::proto::hydrodynamics_client::HydrodynamicsClient;
 
@@ -97,7 +97,9 @@ fn a_client_that_finds_nobody_says_each_reason_once_with_the_way_out() {
     let socket = folder.path().join("wade.sock");
     let url = format!("unix:{}", socket.display());
     let of_client = GrpcClient::unix(socket, "husky", Method::Unary, PATIENCE).map(|_| ());
-    let of_reload = wade_client::reload(&url, proto::ReloadRequest::default(), PATIENCE).map(|_| ());
+    let of_reload =
+        wade_client::reload(&url, proto::ReloadRequest::default(), PATIENCE, &Credentials::default())
+            .map(|_| ());
     for error in [of_client.expect_err("nobody"), of_reload.expect_err("nobody")] {
         let text = error.to_string();
         assert_eq!(text.matches("No such file").count(), 1, "{text}");
@@ -475,9 +477,12 @@ fn an_administrators_call_over_tcp_is_refused_with_the_way_out_and_answered_on_t
     let served = Served::start();
     let socket = format!("unix:{}", served.config.grpc.unix_socket.display());
     let husky = || proto::ReloadRequest { vehicle: "husky".into(), ..Default::default() };
-    let refused = wade_client::reload(&served.url(), husky(), PATIENCE).expect_err("refused").to_string();
+    let refused = wade_client::reload(&served.url(), husky(), PATIENCE, &Credentials::default())
+        .expect_err("refused")
+        .to_string();
     assert!(refused.contains(&socket) && refused.contains("grpc.admin_over_tcp"), "{refused}");
-    let reloaded = wade_client::reload(&socket, husky(), PATIENCE).expect("answered");
+    let reloaded =
+        wade_client::reload(&socket, husky(), PATIENCE, &Credentials::default()).expect("answered");
     assert_eq!((reloaded.len(), reloaded[0].refusal.as_str()), (1, ""));
     let unload = wade_wire::proto::inference::RepositoryModelUnloadRequest {
         model_name: "husky".into(),

@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod access;
 mod campaign;
 mod campaign_trials;
 mod cli;

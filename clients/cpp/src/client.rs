@@ -49,7 +49,7 @@ impl WadeClient {
             Address::Shm(namespace) => {
                 Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch, of_transport).ok()?)
             }
-            Address::Tcp(_) | Address::Unix(_) => {
+            Address::Tcp(_) | Address::Tls(_) | Address::Unix(_) => {
                 Transport::Grpc(Grpc::open(address.url()?, vehicle, max_batch, of_transport).ok()?)
             }
         };

@@ -103,7 +103,9 @@ pub fn status_of(error: &ClientError) -> WadeStatus {
         ClientError::UnknownVehicle { .. } => WadeStatus::UnknownVehicle,
         ClientError::Layout { .. } => WadeStatus::LayoutMismatch,
         ClientError::Invalid(_) => WadeStatus::InvalidState,
-        ClientError::MixedBatch | ClientError::BatchTooLong { .. } => WadeStatus::InvalidArgument,
+        ClientError::MixedBatch | ClientError::BatchTooLong { .. } | ClientError::Credentials { .. } => {
+            WadeStatus::InvalidArgument
+        }
         ClientError::Refused { code, .. } => match code {
             Code::NotFound => WadeStatus::UnknownVehicle,
             // a server without this service is of another version

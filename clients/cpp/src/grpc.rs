@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
-use wade_client::{ClientError, GrpcLink, Reply, replies};
+use wade_client::{ClientError, Credentials, GrpcLink, Reply, replies};
 use wade_core::vehicle::PerWheel;
 use wade_wire::{DERIVATIVES, Field, InvalidState, Problem, State, proto};
 
@@ -308,7 +308,8 @@ impl Shared {
 
     /// Connects, and sees that the server has the vehicle.
     async fn connect(&self) -> Result<GrpcLink, ClientError> {
-        let mut link = GrpcLink::connect(&self.url, &self.vehicle, LOST_AFTER).await?;
+        let mut link =
+            GrpcLink::connect(&self.url, &self.vehicle, LOST_AFTER, &Credentials::default()).await?;
         let vehicle = link.vehicle().await?;
         let turns = |surface: &&proto::Surface| matches!(surface.kind.as_str(), "wheel" | "track");
         self.wheels.store(vehicle.surfaces.iter().filter(turns).count(), Ordering::Release);

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use wade_client::{Address, Client, ClientError, GrpcClient, InProcess, Method, Reply, ShmClient};
+use wade_client::{
+    Address, Client, ClientError, Credentials, GrpcClient, InProcess, Method, Reply, ShmClient,
+};
 use wade_core::bundle;
 use wade_core::frame::Vec3;
 use wade_core::model::COLUMNS;
@@ -366,9 +368,10 @@ impl Instance {
                 let client = ShmClient::new(vehicle, Wait::Block, timeout);
                 Client::Shm(Box::new(client.in_namespace(namespace).in_session(session)))
             }
-            Address::Tcp(_) | Address::Unix(_) => {
-                let url = parsed.url().unwrap_or_default();
-                Client::Grpc(Box::new(GrpcClient::tcp(&url, vehicle, Method::Stream, timeout)?))
+            Address::Tcp(_) | Address::Tls(_) | Address::Unix(_) => {
+                // a unit has no parameter for a secret, which would stand in the simulation's own files
+                let (url, shown) = (parsed.url().unwrap_or_default(), Credentials::from_environment()?);
+                Client::Grpc(Box::new(GrpcClient::connect(&url, vehicle, Method::Stream, timeout, &shown)?))
             }
         })
     }

@@ -4,11 +4,13 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Where a server answers, written `host:port`, `http://host:port`, `unix:PATH` or `shm:NAMESPACE`.
+/// Where a server answers, written `host:port`, `http://host:port`, `https://host:port`, `unix:PATH` or `shm:NAMESPACE`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Address {
     /// gRPC over TCP: host and port.
     Tcp(String),
+    /// The same, encrypted.
+    Tls(String),
     /// gRPC over a Unix socket: its path.
     Unix(PathBuf),
     /// Shared memory: its namespace.
@@ -17,7 +19,9 @@ pub enum Address {
 
 /// Why a text is no address.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("'{text}' is no address: {fault}; write host:port, http://host:port, unix:PATH or shm:NAMESPACE")]
+#[error(
+    "'{text}' is no address: {fault}; write host:port, http://host:port, https://host:port, unix:PATH or shm:NAMESPACE"
+)]
 pub struct AddressError {
     /// What was given.
     pub text: String,
@@ -49,10 +53,10 @@ impl FromStr for Address {
                 _ => Ok(Self::Shm(namespace.to_owned())),
             };
         }
-        if text.starts_with("https://") {
-            return Err(refused("the server speaks no TLS; put a proxy in front of it"));
-        }
-        let place = text.strip_prefix("http://").unwrap_or(text);
+        let (place, form): (_, fn(String) -> Self) = match text.strip_prefix("https://") {
+            Some(place) => (place, Self::Tls),
+            None => (text.strip_prefix("http://").unwrap_or(text), Self::Tcp),
+        };
         let place = place.strip_suffix('/').unwrap_or(place);
         if place.contains('/') {
             return Err(refused("a path of a socket stands behind unix:, and a URL ends after the port"));
@@ -63,7 +67,7 @@ impl FromStr for Address {
             return Err(refused("the host is missing, or an address of IPv6 lacks its brackets"));
         }
         match port.parse::<u16>() {
-            Ok(1..) => Ok(Self::Tcp(place.to_owned())),
+            Ok(1..) => Ok(form(place.to_owned())),
             _ => Err(refused("the port is no number from 1 to 65535")),
         }
     }
@@ -73,6 +77,7 @@ impl fmt::Display for Address {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Tcp(place) => f.write_str(place),
+            Self::Tls(place) => write!(f, "https://{place}"),
             Self::Unix(path) => write!(f, "unix:{}", path.display()),
             Self::Shm(namespace) => write!(f, "shm:{namespace}"),
         }
@@ -84,7 +89,7 @@ impl Address {
     pub fn url(&self) -> Option<String> {
         match self {
             Self::Tcp(place) => Some(format!("http://{place}")),
-            Self::Unix(_) => Some(self.to_string()),
+            Self::Tls(_) | Self::Unix(_) => Some(self.to_string()),
             Self::Shm(_) => None,
         }
     }
@@ -100,6 +105,7 @@ mod tests {
         for (text, expected, url) in [
             ("127.0.0.1:50051", Address::Tcp("127.0.0.1:50051".into()), Some("http://127.0.0.1:50051")),
             ("http://rig.lab:1/", Address::Tcp("rig.lab:1".into()), Some("http://rig.lab:1")),
+            ("https://rig.lab:1/", Address::Tls("rig.lab:1".into()), Some("https://rig.lab:1")),
             ("[::1]:50051", Address::Tcp("[::1]:50051".into()), Some("http://[::1]:50051")),
             ("unix:/run/wade.sock", Address::Unix("/run/wade.sock".into()), Some("unix:/run/wade.sock")),
             ("unix:///run/wade.sock", Address::Unix("/run/wade.sock".into()), Some("unix:/run/wade.sock")),
@@ -125,7 +131,7 @@ mod tests {
             "unix:",
             "shm:",
             "shm:a/b",
-            "https://host:1",
+            "https://host",
             "http://host:1/v1",
             "unix:unix:/x",
             "ftp://host:1",

@@ -37,6 +37,14 @@ pub enum ClientError {
         /// The server's.
         found: String,
     },
+    /// What the client believes or shows cannot be used.
+    #[error("{what}: {reason}")]
+    Credentials {
+        /// Which of it.
+        what: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// The server refused the request.
     #[error("{code:?}: {message}")]
     Refused {

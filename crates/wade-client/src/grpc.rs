@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
-use tonic::transport::Endpoint;
+use tonic::Request;
 
+use super::credentials::{Credentials, sign};
 use super::grpc_link::GrpcLink;
 use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply, nobody_at};
 use wade_core::domain::{Domain, Outside, Quantity, Range};
@@ -32,11 +33,22 @@ pub struct GrpcClient {
 }
 
 impl GrpcClient {
-    /// Connects over TCP to a URL such as `http://127.0.0.1:50051`.
-    pub fn tcp(url: &str, vehicle: &str, method: Method, timeout: Duration) -> Result<Self, ClientError> {
+    /// Connects to `http://HOST:PORT`, `https://HOST:PORT` or `unix:PATH`, with what is believed and shown there.
+    pub fn connect(
+        url: &str,
+        vehicle: &str,
+        method: Method,
+        timeout: Duration,
+        credentials: &Credentials,
+    ) -> Result<Self, ClientError> {
         let runtime = runtime(url)?;
-        let link = runtime.block_on(GrpcLink::connect(url, vehicle, timeout))?;
+        let link = runtime.block_on(GrpcLink::connect(url, vehicle, timeout, credentials))?;
         Ok(Self { runtime, link, method })
+    }
+
+    /// Connects over TCP to a URL such as `http://127.0.0.1:50051`, and shows nothing there.
+    pub fn tcp(url: &str, vehicle: &str, method: Method, timeout: Duration) -> Result<Self, ClientError> {
+        Self::connect(url, vehicle, method, timeout, &Credentials::default())
     }
 
     /// Connects to a Unix socket.
@@ -97,16 +109,18 @@ impl GrpcClient {
     }
 }
 
-/// Asks the server at a URL, `http://HOST:PORT` or `unix:PATH`, to read bundles again: what `request` names.
+/// Asks the server at a URL, as [`GrpcClient::connect`] takes it, to read bundles again: what `request` names.
 pub fn reload(
     url: &str,
     request: proto::ReloadRequest,
     timeout: Duration,
+    credentials: &Credentials,
 ) -> Result<Vec<proto::Reloaded>, ClientError> {
     let runtime = runtime(url)?;
-    let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| nobody_at(url, &error))?;
+    let endpoint = credentials.endpoint(url, timeout)?.timeout(timeout);
+    let mut request = Request::new(request);
+    sign(request.metadata_mut(), credentials.authorization()?.as_ref());
     runtime.block_on(async {
-        let endpoint = endpoint.connect_timeout(timeout).timeout(timeout);
         let mut client = AdminClient::new(endpoint.connect().await.map_err(|error| nobody_at(url, &error))?);
         let no_answer = |status: tonic::Status| {
             let message = status.message().to_owned();

@@ -4,9 +4,11 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::transport::{Channel, Endpoint};
+use tonic::metadata::{Ascii, MetadataValue};
+use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::credentials::{Credentials, sign};
 use super::grpc::{batch_message, message, shared};
 use super::{ClientError, nobody_at};
 use wade_wire::State;
@@ -20,6 +22,7 @@ pub struct GrpcLink {
     url: String,
     vehicle: String,
     timeout: Duration,
+    authorization: Option<MetadataValue<Ascii>>,
     stream: Option<Open>,
 }
 
@@ -30,13 +33,18 @@ struct Open {
 }
 
 impl GrpcLink {
-    /// Connects to `http://HOST:PORT` or `unix:PATH`. The timeout is for this and for every call.
-    pub async fn connect(url: &str, vehicle: &str, timeout: Duration) -> Result<Self, ClientError> {
-        let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|e| nobody_at(url, &e))?;
-        let endpoint = endpoint.connect_timeout(timeout).tcp_nodelay(true);
+    /// Connects to `http://HOST:PORT`, `https://HOST:PORT` or `unix:PATH`. The timeout is for this and for every call.
+    pub async fn connect(
+        url: &str,
+        vehicle: &str,
+        timeout: Duration,
+        credentials: &Credentials,
+    ) -> Result<Self, ClientError> {
+        let (endpoint, authorization) = (credentials.endpoint(url, timeout)?, credentials.authorization()?);
         let channel = endpoint.connect().await.map_err(|e| nobody_at(url, &e))?;
         let client = HydrodynamicsClient::new(channel).max_decoding_message_size(64 << 20);
-        Ok(Self { client, url: url.to_owned(), vehicle: vehicle.to_owned(), timeout, stream: None })
+        let (url, vehicle) = (url.to_owned(), vehicle.to_owned());
+        Ok(Self { client, url, vehicle, timeout, authorization, stream: None })
     }
 
     /// The forces in one state, in a call of its own.
@@ -52,11 +60,11 @@ impl GrpcLink {
         state: &State,
     ) -> Result<proto::EvaluateResponse, ClientError> {
         let query = self.query(state);
-        let Self { client, stream, timeout, .. } = self;
+        let Self { client, stream, timeout, authorization, .. } = self;
         let exchange = async {
             let open = match stream {
                 Some(open) => open,
-                None => stream.insert(open(client).await?),
+                None => stream.insert(open(client, authorization.as_ref()).await?),
             };
             if open.requests.send(query).await.is_err() {
                 tracing::debug!("the stream was closed by the server; its answer says why");
@@ -120,6 +128,7 @@ impl GrpcLink {
     fn request<T>(&self, message: T) -> Request<T> {
         let mut request = Request::new(message);
         request.set_timeout(self.timeout);
+        sign(request.metadata_mut(), self.authorization.as_ref());
         request
     }
 
@@ -128,18 +137,25 @@ impl GrpcLink {
     }
 
     fn error(&self, status: &Status) -> ClientError {
-        match status.code() {
-            Code::DeadlineExceeded | Code::Cancelled => ClientError::Timeout(self.timeout),
-            Code::Unavailable | Code::Unknown => {
+        match (status.code(), std::error::Error::source(status)) {
+            (Code::DeadlineExceeded | Code::Cancelled, _) => ClientError::Timeout(self.timeout),
+            // not the server's word: the connection
+            (_, Some(cause)) => nobody_at(&self.url, cause),
+            (Code::Unavailable | Code::Unknown, None) => {
                 ClientError::NoServer { at: self.url.clone(), reason: status.message().to_owned() }
             }
-            code => ClientError::Refused { code, message: status.message().to_owned() },
+            (code, None) => ClientError::Refused { code, message: status.message().to_owned() },
         }
     }
 }
 
-async fn open(client: &mut HydrodynamicsClient<Channel>) -> Result<Open, Status> {
+async fn open(
+    client: &mut HydrodynamicsClient<Channel>,
+    authorization: Option<&MetadataValue<Ascii>>,
+) -> Result<Open, Status> {
     let (requests, outgoing) = mpsc::channel(1);
-    let answers = client.stream(ReceiverStream::new(outgoing)).await?.into_inner();
+    let mut request = Request::new(ReceiverStream::new(outgoing));
+    sign(request.metadata_mut(), authorization);
+    let answers = client.stream(request).await?.into_inner();
     Ok(Open { requests, answers })
 }

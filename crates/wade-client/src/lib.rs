@@ -1,6 +1,7 @@
 //! Clients of the library's own: in process, gRPC, shared memory; one call and one reply for all.
 
 mod address;
+mod credentials;
 mod error;
 mod grpc;
 mod grpc_link;
@@ -11,6 +12,7 @@ pub use error::ClientError;
 use std::sync::Arc;
 
 pub use address::{Address, AddressError};
+pub use credentials::{Credentials, VARIABLES};
 pub use grpc::{GrpcClient, Method, reload, replies};
 pub use grpc_link::GrpcLink;
 pub use shm::ShmClient;
@@ -31,7 +33,10 @@ fn nobody_at(url: &str, error: &dyn std::error::Error) -> ClientError {
             reasons.push(cause);
         }
     }
-    let way_out = "is wade serve running, and is this its grpc.listen or grpc.unix_socket?";
+    let way_out = match url.starts_with("http://") {
+        true => "is wade serve running, is this its grpc.listen, and does it speak TLS (https://)?",
+        false => "is wade serve running, and is this its grpc.listen or grpc.unix_socket?",
+    };
     ClientError::NoServer { at: url.to_owned(), reason: format!("{}; {way_out}", reasons.join(": ")) }
 }
 

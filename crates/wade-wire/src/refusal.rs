@@ -106,6 +106,22 @@ pub enum Refusal {
         /// The way out.
         reason: String,
     },
+    /// The caller has not shown who it is.
+    #[error("this call needs the role {role}: {reason}")]
+    Unauthenticated {
+        /// The role.
+        role: &'static str,
+        /// What is missing or wrong.
+        reason: String,
+    },
+    /// The caller may not do this.
+    #[error("{caller} does not have the role {role}")]
+    MissingRole {
+        /// Who asks.
+        caller: String,
+        /// The role.
+        role: &'static str,
+    },
     /// Other jobs of an administrator are not done yet.
     #[error("another administrator's job runs and one more waits: ask again when they are done")]
     TooManyJobs,
@@ -149,7 +165,8 @@ impl Refusal {
             Self::Overloaded { .. } | Self::TooManyJobs | Self::MessageTooLong { .. } => {
                 Code::ResourceExhausted
             }
-            Self::NoAdministration { .. } => Code::PermissionDenied,
+            Self::NoAdministration { .. } | Self::MissingRole { .. } => Code::PermissionDenied,
+            Self::Unauthenticated { .. } => Code::Unauthenticated,
             Self::DeadlineExceeded { .. } => Code::DeadlineExceeded,
             Self::Invalid { .. }
             | Self::Tensor(_)
@@ -169,6 +186,7 @@ impl Refusal {
             Code::ResourceExhausted => "resource_exhausted",
             Code::DeadlineExceeded => "deadline_exceeded",
             Code::PermissionDenied => "permission_denied",
+            Code::Unauthenticated => "unauthenticated",
             _ => "invalid_argument",
         }
     }
@@ -192,9 +210,11 @@ impl Refusal {
                 ErrorDetails::with_retry_info(Some(RETRY_AFTER))
             }
             // the same message would be refused again, so there is no time to retry after
-            Self::DeadlineExceeded { .. } | Self::MessageTooLong { .. } | Self::NoAdministration { .. } => {
-                ErrorDetails::new()
-            }
+            Self::DeadlineExceeded { .. }
+            | Self::MessageTooLong { .. }
+            | Self::NoAdministration { .. }
+            | Self::Unauthenticated { .. }
+            | Self::MissingRole { .. } => ErrorDetails::new(),
             Self::Invalid { invalid, index } => {
                 let name = invalid.field.name();
                 let field = index.map_or_else(|| format!("state.{name}"), |i| format!("{name}[{i}]"));

@@ -2,6 +2,7 @@
 //! and whoever asks for it a thousand times must not get a thousand threads. One job runs and one waits; the same question as
 //! the one that waits is answered with it, any other is refused.
 
+use std::fmt;
 use std::io;
 use std::path::PathBuf;
 use std::sync::mpsc::{self, SyncSender, TrySendError};
@@ -12,7 +13,8 @@ use rustix::process::setpriority_process;
 use rustix::thread::gettid;
 use tokio::sync::oneshot;
 
-use super::Reloader;
+use super::{AUDIT, Reloader};
+use crate::service::access::Caller;
 use wade_wire::Refusal;
 use wade_wire::UnknownVehicle;
 use wade_wire::proto::Reloaded;
@@ -34,6 +36,19 @@ pub enum Job {
     },
     /// Serve a vehicle no more.
     Unload(String),
+}
+
+impl fmt::Display for Job {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Reload { vehicle, .. } if vehicle.is_empty() => f.write_str("reload every vehicle"),
+            Self::Reload { vehicle, bundle } if bundle.as_os_str().is_empty() => {
+                write!(f, "reload {vehicle}")
+            }
+            Self::Reload { vehicle, bundle } => write!(f, "reload {vehicle} from {}", bundle.display()),
+            Self::Unload(vehicle) => write!(f, "unload {vehicle}"),
+        }
+    }
 }
 
 impl Job {
@@ -94,8 +109,23 @@ impl Jobs {
         Ok(Arc::new(Self { reloader, queue, wake }))
     }
 
-    /// Has a job done, and waits for it.
-    pub async fn run(&self, job: Job) -> Result<Vec<Reloaded>, Refusal> {
+    /// Has a job done for a caller, and waits for it.
+    pub async fn run(&self, job: Job, caller: Option<&Caller>) -> Result<Vec<Reloaded>, Refusal> {
+        let by = caller.map_or_else(|| "nobody".to_owned(), ToString::to_string);
+        let said = job.to_string();
+        let outcome = self.done(job).await;
+        match &outcome {
+            Ok(vehicles) => {
+                let refused = vehicles.iter().filter(|one| !one.refusal.is_empty());
+                let refused: Vec<&str> = refused.map(|one| one.vehicle.as_str()).collect();
+                tracing::info!(target: AUDIT, by, job = said, refused = refused.join(" "), "administration");
+            }
+            Err(refusal) => tracing::info!(target: AUDIT, by, job = said, %refusal, "administration"),
+        }
+        outcome
+    }
+
+    async fn done(&self, job: Job) -> Result<Vec<Reloaded>, Refusal> {
         let asked = job.clone();
         let outcome = self.submit(job)?.await;
         let mut reloaded = outcome.map_err(|_| Refusal::TooManyJobs)??;

@@ -14,12 +14,13 @@ use tokio::time::Sleep;
 use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::Service;
-use tonic::codegen::http::{Request, Response};
+use tonic::codegen::http::{HeaderMap, Request, Response};
 use tonic::service::Routes;
 
 use super::handlers::Names;
 use super::name_the_size_limit;
 use crate::metrics::{Metrics, Resource, Transport};
+use crate::service::access::{Caller, Door, Role, Who};
 use crate::service::accounts::{Computing, Connection, Place, Sent};
 use crate::service::stopped;
 use wade_wire::Refusal;
@@ -29,12 +30,15 @@ use wade_wire::Refusal;
 struct Method {
     resource: Resource,
     transport: Transport,
-    administers: bool,
+    /// The role that it takes; probes take none.
+    role: Option<Role>,
 }
 
 impl Method {
     fn of(path: &str, names: &Names) -> Self {
-        let of = |resource, transport| Self { resource, transport, administers: false };
+        let of = |resource, transport| Self { resource, transport, role: Some(Role::Query) };
+        let observes = |method| Self { role: Some(Role::Observe), ..method };
+        let administers = |method| Self { role: Some(Role::Administer), ..method };
         let (request, stream, probe) = (Resource::requests, Resource::streams, Resource::probes);
         match path {
             "/wade.v1.Hydrodynamics/Evaluate" => of(request, names.unary),
@@ -44,18 +48,30 @@ impl Method {
             "/wade.v1.Hydrodynamics/Stream" => of(stream, names.stream),
             "/inference.GRPCInferenceService/ModelInfer" => of(request, names.infer),
             "/inference.GRPCInferenceService/ModelStreamInfer" => of(stream, names.infer),
-            "/grpc.health.v1.Health/Watch"
-            | "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo"
-            | "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo" => of(stream, names.other),
+            "/grpc.health.v1.Health/Watch" => Self { role: None, ..of(stream, names.other) },
+            "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo"
+            | "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo" => {
+                observes(of(stream, names.other))
+            }
             "/grpc.health.v1.Health/Check"
             | "/inference.GRPCInferenceService/ServerLive"
-            | "/inference.GRPCInferenceService/ServerReady" => of(probe, names.other),
+            | "/inference.GRPCInferenceService/ServerReady" => Self { role: None, ..of(probe, names.other) },
+            "/wade.v1.Hydrodynamics/GetLatency" | "/inference.GRPCInferenceService/ModelStatistics" => {
+                observes(of(request, names.other))
+            }
             "/inference.GRPCInferenceService/RepositoryModelLoad"
             | "/inference.GRPCInferenceService/RepositoryModelUnload" => {
-                Self { administers: true, ..of(request, names.other) }
+                administers(of(request, names.other))
             }
-            path => Self { administers: path.starts_with("/wade.v1.Admin/"), ..of(request, names.other) },
+            path if path.starts_with("/wade.v1.Admin/") => administers(of(request, names.other)),
+            _ => of(request, names.other),
         }
+    }
+}
+
+impl Method {
+    fn administers(&self) -> bool {
+        self.role == Some(Role::Administer)
     }
 }
 
@@ -64,8 +80,8 @@ impl Method {
 pub struct Rules {
     /// The names of its calls in the metrics.
     pub names: Names,
-    /// Why an administrator's calls are refused here, if they are.
-    pub no_administration: Option<String>,
+    /// Who may make them.
+    pub door: Door,
     /// Longest time for a request to arrive.
     pub request: Duration,
     /// Longest pause between two requests of a stream.
@@ -84,10 +100,12 @@ pub struct Rules {
 pub struct Calls {
     /// The services.
     pub routes: Routes,
-    /// Who asks.
+    /// The connection of who asks.
     pub connection: Arc<Connection>,
     /// What holds for all.
     pub rules: Arc<Rules>,
+    /// Who asks, as the connection tells.
+    pub who: Who,
 }
 
 impl hyper::service::Service<Request<Incoming>> for Calls {
@@ -102,14 +120,15 @@ impl hyper::service::Service<Request<Incoming>> for Calls {
 }
 
 impl Calls {
-    async fn answer(mut self, request: Request<Incoming>) -> Result<Response<Body>, Status> {
+    async fn answer(mut self, mut request: Request<Incoming>) -> Result<Response<Body>, Status> {
         let method = Method::of(request.uri().path(), &self.rules.names);
         self.connection.asks();
-        let place = match self.admit(method).await {
-            Ok(place) => {
+        let place = match self.admit(method, request.headers()).await {
+            Ok((caller, place)) => {
                 self.connection.moved();
-                if method.administers {
+                if let Some(caller) = caller.filter(|_| method.administers()) {
                     self.connection.pays_for_call();
+                    request.extensions_mut().insert(caller);
                 }
                 place
             }
@@ -131,12 +150,14 @@ impl Calls {
         Ok(response.map(|body| Body::new(Sent::new(body, connection, Some(place)))))
     }
 
-    async fn admit(&self, method: Method) -> Result<Place, Refusal> {
-        if method.administers
-            && let Some(reason) = &self.rules.no_administration
-        {
-            return Err(Refusal::NoAdministration { reason: reason.clone() });
-        }
+    async fn admit(&self, method: Method, headers: &HeaderMap) -> Result<(Option<Caller>, Place), Refusal> {
+        let access = self.rules.door.access();
+        let caller = method.role.map(|role| access.check(&self.who, headers, role)).transpose();
+        let caller = caller.inspect_err(|refusal| {
+            if method.administers() {
+                tracing::warn!(peer = %self.connection.peer(), %refusal, "an administrator's call was refused");
+            }
+        })?;
         let accounts = self.connection.accounts();
         let overloaded = |overloaded| Refusal::Overloaded { what: method.resource.name(), overloaded };
         // no request is admitted while the bytes of others fill the account
@@ -144,7 +165,8 @@ impl Calls {
             accounts.make_room(&self.connection, Resource::bytes, overloaded.of_peer);
             Refusal::Overloaded { what: Resource::bytes.name(), overloaded }
         })?;
-        accounts.admit(&self.connection, method.resource).await.map_err(overloaded)
+        let place = accounts.admit(&self.connection, method.resource).await.map_err(overloaded)?;
+        Ok((caller, place))
     }
 }
 
@@ -248,7 +270,7 @@ impl Received {
             deadline: None,
             stop: is_stream.then(|| Box::pin(stopped(rules.stop.clone())) as Later<()>),
             work: Arc::clone(work),
-            gate: (gated && !method.administers).then(|| Arc::clone(&rules.gate)),
+            gate: (gated && !method.administers()).then(|| Arc::clone(&rules.gate)),
             turn: None,
             last: None,
         }

@@ -161,8 +161,10 @@ impl Admin for AdminHandlers {
         &self,
         request: Request<proto::ReloadRequest>,
     ) -> Result<Response<proto::ReloadResponse>, Status> {
+        let caller = request.extensions().get().cloned();
         let proto::ReloadRequest { vehicle, bundle } = request.into_inner();
-        let vehicles = self.jobs.run(Job::Reload { vehicle, bundle: bundle.into() }).await?;
+        let job = Job::Reload { vehicle, bundle: bundle.into() };
+        let vehicles = self.jobs.run(job, caller.as_ref()).await?;
         Ok(Response::new(proto::ReloadResponse { vehicles }))
     }
 }

@@ -12,6 +12,7 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::handlers::Handlers;
 use crate::metrics::Transport;
+use crate::service::access::Caller;
 use crate::service::admin::{Job, Jobs};
 use crate::service::call::{Answered, Call};
 use inputs::{shape, short};
@@ -159,10 +160,11 @@ impl GrpcInferenceService for InferenceHandlers {
         &self,
         request: Request<RepositoryModelLoadRequest>,
     ) -> Result<Response<RepositoryModelLoadResponse>, Status> {
+        let caller = request.extensions().get().cloned();
         let RepositoryModelLoadRequest { repository_name, model_name, parameters } = request.into_inner();
         one_repository(&repository_name)?;
         only(parameters.keys(), "")?;
-        let reloaded = self.administer(Job::reload, model_name).await?;
+        let reloaded = self.administer(Job::reload, model_name, caller).await?;
         let refusal = reloaded.into_iter().map(|one| one.refusal).find(|refusal| !refusal.is_empty());
         refusal.map_or(Ok(Response::new(RepositoryModelLoadResponse {})), |refusal| {
             Err(Status::failed_precondition(refusal))
@@ -173,10 +175,11 @@ impl GrpcInferenceService for InferenceHandlers {
         &self,
         request: Request<RepositoryModelUnloadRequest>,
     ) -> Result<Response<RepositoryModelUnloadResponse>, Status> {
+        let caller = request.extensions().get().cloned();
         let RepositoryModelUnloadRequest { repository_name, model_name, parameters } = request.into_inner();
         one_repository(&repository_name)?;
         only(parameters.keys(), "unload_dependents")?;
-        self.administer(Job::Unload, model_name).await?;
+        self.administer(Job::Unload, model_name, caller).await?;
         Ok(Response::new(RepositoryModelUnloadResponse {}))
     }
 }
@@ -253,12 +256,17 @@ impl InferenceHandlers {
         Ok((response, answered))
     }
 
-    async fn administer(&self, job: fn(String) -> Job, vehicle: String) -> Result<Vec<Reloaded>, Refusal> {
+    async fn administer(
+        &self,
+        job: fn(String) -> Job,
+        vehicle: String,
+        caller: Option<Caller>,
+    ) -> Result<Vec<Reloaded>, Refusal> {
         if vehicle.is_empty() {
             // to the reloader an empty name is every vehicle
             self.model(&vehicle, "")?;
         }
-        self.jobs.run(job(vehicle)).await
+        self.jobs.run(job(vehicle), caller.as_ref()).await
     }
 }
 

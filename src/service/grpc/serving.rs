@@ -38,7 +38,8 @@ const MAX_FAULTS: usize = 64;
 /// The deadlines of a connection.
 #[derive(Debug, Clone, Copy)]
 pub struct Deadlines {
-    handshake: Duration,
+    /// For what HTTP/2 begins with, and before it for TLS.
+    pub handshake: Duration,
     first_request: Duration,
     idle: Duration,
     answer: Duration,

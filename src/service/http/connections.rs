@@ -23,7 +23,9 @@ use tokio::sync::watch;
 use tower::ServiceExt;
 
 use super::Shared;
-use crate::metrics::Resource;
+use super::rejection::Rejection;
+use crate::metrics::{Metrics, Resource, Transport};
+use crate::service::access::{Door, Role, Who};
 use crate::service::accounts::{Closed, Computing, Connection, Sent};
 use crate::service::intake::{self, Listener, Socket};
 use crate::service::stopped;
@@ -48,11 +50,16 @@ pub async fn serve(listener: Listener, routes: Routes, shared: &Shared, stop: wa
     http.timer(TokioTimer::new()).header_read_timeout(Duration::from_secs_f64(shared.config.request_s));
     let open = GracefulShutdown::new();
     let answer = Duration::from_secs_f64(shared.config.answer_s);
+    let handshake = Duration::from_secs_f64(shared.config.request_s);
     let serve = |socket, connection: Arc<Connection>, place| {
-        let service = Requests { routes: routes.clone(), connection: Arc::clone(&connection) };
-        let noted = Noted { socket, connection: Arc::clone(&connection) };
-        let served = open.watch(http.serve_connection(TokioIo::new(noted), service));
+        let (routes, door) = (routes.clone(), shared.door.clone());
+        let (http, watcher) = (http.clone(), open.watcher());
+        let metrics = Arc::clone(&shared.grpc.metrics);
         tokio::spawn(async move {
+            let Some((socket, who)) = door.let_in(socket, &connection, handshake).await else { return };
+            let service = Requests { routes, connection: Arc::clone(&connection), door, who, metrics };
+            let noted = Noted { socket, connection: Arc::clone(&connection) };
+            let served = watcher.watch(http.serve_connection(TokioIo::new(noted), service));
             tokio::select! {
                 // a client that breaks its own connection off is its own affair
                 _ = served => {}
@@ -80,6 +87,19 @@ async fn stalled(connection: &Connection, longest: Duration) {
 struct Requests {
     routes: Routes,
     connection: Arc<Connection>,
+    door: Door,
+    who: Who,
+    metrics: Arc<Metrics>,
+}
+
+/// The role that a path takes; probes take none.
+fn role(path: &str) -> Option<Role> {
+    match path {
+        "/livez" | "/readyz" => None,
+        "/metrics" | "/v1/latency" => Some(Role::Observe),
+        path if path.starts_with("/v1/streams") => Some(Role::Observe),
+        _ => Some(Role::Query),
+    }
 }
 
 impl hyper::service::Service<Request<Incoming>> for Requests {
@@ -91,6 +111,15 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
         let Routes { probes, browsed, work } = self.routes.clone();
         let connection = Arc::clone(&self.connection);
         connection.moved();
+        let checked = role(request.uri().path())
+            .map_or(Ok(()), |role| self.door.access().check(&self.who, request.headers(), role).map(drop));
+        if let Err(refusal) = checked {
+            self.metrics.refuse(Transport::http, refusal.reason());
+            let response = Rejection::from(refusal).into_response();
+            return Box::pin(
+                async move { Ok(response.map(|body| Body::new(Sent::new(body, connection, None)))) },
+            );
+        }
         Box::pin(async move {
             // a request with a body is the client's to complete: who reads it says when it is there
             let _computing = request.body().is_end_stream().then(|| Computing::begin(&connection));

@@ -89,6 +89,7 @@ impl Rejection {
     fn status(&self) -> (StatusCode, &'static str) {
         match self.code() {
             Code::NotFound => (StatusCode::NOT_FOUND, "NOT_FOUND"),
+            Code::Unauthenticated => (StatusCode::UNAUTHORIZED, "UNAUTHENTICATED"),
             Code::PermissionDenied => (StatusCode::FORBIDDEN, "PERMISSION_DENIED"),
             Code::FailedPrecondition => (StatusCode::BAD_REQUEST, "FAILED_PRECONDITION"),
             Code::Unavailable => (StatusCode::SERVICE_UNAVAILABLE, "UNAVAILABLE"),
@@ -126,6 +127,13 @@ impl IntoResponse for Rejection {
         let mut response =
             (status, [(header::CONTENT_TYPE, "application/json")], json!({"error": error}).to_string())
                 .into_response();
+        if status == StatusCode::UNAUTHORIZED {
+            // a browser asks its user for a password, which is the token
+            response.headers_mut().insert(
+                header::WWW_AUTHENTICATE,
+                HeaderValue::from_static("Basic realm=\"wade: any name, and a token as password\""),
+            );
+        }
         if matches!(status, StatusCode::TOO_MANY_REQUESTS | StatusCode::SERVICE_UNAVAILABLE) {
             // whole seconds are all that the header can say
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
