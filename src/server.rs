@@ -23,7 +23,7 @@ use watchdog::Watchdog;
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::metrics::Metrics;
-use crate::service::access::{Access, Door, FileError, Protocol};
+use crate::service::access::{Acceptor, Access, FileError, Protocol};
 use crate::service::accounts::Accounts;
 use crate::service::admin::{LoadError, Reloader};
 use crate::service::grpc::{self, GrpcError, Listeners};
@@ -67,8 +67,8 @@ pub struct Running {
     grpc: Arc<grpc::Server>,
     listeners: Arc<Listeners>,
     access: Arc<Access>,
-    http_door: Door,
-    grpc_door: Door,
+    http_acceptor: Acceptor,
+    grpc_acceptor: Acceptor,
     http_address: Option<SocketAddr>,
     health: Arc<Health>,
     stop: watch::Sender<bool>,
@@ -109,9 +109,9 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     let accounts = Accounts::new(&config.limits(), Arc::clone(&metrics));
     // handshakes are computed there, where nobody waits for an answer
     let (runtime, handshakes) = (runtime()?, runtime()?);
-    let door = |protocol, insecure| Door::new(&access, protocol, insecure, handshakes.handle());
-    let grpc_door = door(Protocol::Http2, config.grpc.insecure);
-    let http_door = door(Protocol::Http1, config.http.insecure);
+    let acceptor = |protocol, insecure| Acceptor::new(&access, protocol, insecure, handshakes.handle());
+    let grpc_acceptor = acceptor(Protocol::Http2, config.grpc.insecure);
+    let http_acceptor = acceptor(Protocol::Http1, config.http.insecure);
     let (stop, stopped) = watch::channel(false);
     let (stop_http, http_stopped) = watch::channel(false);
     let mut running = Running {
@@ -119,7 +119,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
             config.grpc.clone(),
             shared.clone(),
             Arc::clone(&accounts),
-            grpc_door.clone(),
+            grpc_acceptor.clone(),
         ))?),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         health: Arc::clone(&health),
@@ -131,8 +131,8 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         metrics,
         listeners,
         access,
-        http_door: http_door.clone(),
-        grpc_door,
+        http_acceptor: http_acceptor.clone(),
+        grpc_acceptor,
         stop,
         stop_http,
         runtime,
@@ -154,7 +154,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         grpc: shared,
         accounts,
         health: Arc::clone(&health),
-        door: http_door,
+        acceptor: http_acceptor,
     };
     running.spawn_housekeeping(http_listener, shared, window, http_stopped)?;
     running.reloader.load_all()?;
@@ -204,7 +204,7 @@ impl Running {
 
     /// Whether gRPC over TCP is encrypted, and HTTP.
     pub fn is_encrypted(&self) -> [bool; 2] {
-        [&self.grpc_door, &self.http_door].map(Door::is_encrypted)
+        [&self.grpc_acceptor, &self.http_acceptor].map(Acceptor::is_encrypted)
     }
 
     /// What is counted.
@@ -348,8 +348,8 @@ impl Running {
             tcp: self.grpc_address(),
             unix: self.unix_path().map(Path::to_owned),
             http: self.http_address,
-            grpc_door: self.grpc_door.clone(),
-            http_door: self.http_door.clone(),
+            grpc_acceptor: self.grpc_acceptor.clone(),
+            http_acceptor: self.http_acceptor.clone(),
         };
         let runtime = runtime()?;
         let thread = self.spawn("wade-watchdog", move || {

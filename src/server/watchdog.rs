@@ -14,7 +14,7 @@ use tonic::codegen::http::Uri;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Status};
 
-use crate::service::access::Door;
+use crate::service::access::Acceptor;
 use crate::service::health::{Health, Part, State};
 use crate::service::{grpc, stopped};
 use wade_wire::proto::ListVehiclesRequest;
@@ -34,8 +34,8 @@ pub(super) struct Watchdog {
     pub tcp: Option<SocketAddr>,
     pub unix: Option<PathBuf>,
     pub http: Option<SocketAddr>,
-    pub grpc_door: Door,
-    pub http_door: Door,
+    pub grpc_acceptor: Acceptor,
+    pub http_acceptor: Acceptor,
 }
 
 impl Watchdog {
@@ -59,11 +59,11 @@ impl Watchdog {
             tokio::select! {
                 _ = ticks.tick() => {
                     for asked in &mut grpc {
-                        let answer = ask_grpc(asked, &self.grpc_door).await;
+                        let answer = ask_grpc(asked, &self.grpc_acceptor).await;
                         asked.note(answer);
                     }
                     if let Some(asked) = &mut http {
-                        let answer = ask_http(&asked.at, &self.http_door).await;
+                        let answer = ask_http(&asked.at, &self.http_acceptor).await;
                         asked.note(answer);
                     }
                     self.say(Part::Grpc, &grpc);
@@ -141,10 +141,10 @@ async fn within<T>(work: impl Future<Output = Result<T, String>>) -> Result<T, S
     tokio::time::timeout(PATIENCE, work).await.unwrap_or_else(|_| late())
 }
 
-async fn ask_grpc(asked: &mut Asked<Channel>, door: &Door) -> Result<(), String> {
+async fn ask_grpc(asked: &mut Asked<Channel>, acceptor: &Acceptor) -> Result<(), String> {
     let channel = match asked.connection.take() {
         Some(channel) => channel,
-        None => within(connect(&asked.at, door)).await?,
+        None => within(connect(&asked.at, acceptor)).await?,
     };
     let mut client = HydrodynamicsClient::new(channel.clone());
     let answer = within(async { Ok(client.list_vehicles(ListVehiclesRequest {}).await) }).await?;
@@ -158,17 +158,17 @@ async fn ask_grpc(asked: &mut Asked<Channel>, door: &Door) -> Result<(), String>
     }
 }
 
-async fn connect(at: &str, door: &Door) -> Result<Channel, String> {
+async fn connect(at: &str, acceptor: &Acceptor) -> Result<Channel, String> {
     let endpoint = Endpoint::from_shared(at.to_owned()).map_err(|error| error.to_string())?;
-    let connected = match at.strip_prefix("http://").filter(|_| door.is_encrypted()) {
+    let connected = match at.strip_prefix("http://").filter(|_| acceptor.is_encrypted()) {
         None => endpoint.connect().await,
         Some(address) => {
-            // gRPC sees the bytes inside: the door makes the connection
-            let (door, address) = (door.clone(), address.to_owned());
+            // gRPC sees the bytes inside: the acceptor makes the connection
+            let (acceptor, address) = (acceptor.clone(), address.to_owned());
             let connector = tower::service_fn(move |_: Uri| {
-                let (door, address) = (door.clone(), address.clone());
+                let (acceptor, address) = (acceptor.clone(), address.clone());
                 async move {
-                    let socket = door.connect(TcpStream::connect(address).await?).await?;
+                    let socket = acceptor.connect(TcpStream::connect(address).await?).await?;
                     Ok::<_, std::io::Error>(TokioIo::new(socket))
                 }
             });
@@ -182,9 +182,9 @@ fn is_answer(status: &Status) -> bool {
     !matches!(status.code(), Code::Unavailable | Code::Unknown | Code::Internal | Code::Cancelled)
 }
 
-async fn ask_http(at: &str, door: &Door) -> Result<(), String> {
+async fn ask_http(at: &str, acceptor: &Acceptor) -> Result<(), String> {
     let exchange = async {
-        let mut stream = door.connect(TcpStream::connect(at).await?).await?;
+        let mut stream = acceptor.connect(TcpStream::connect(at).await?).await?;
         stream.write_all(b"GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").await?;
         let mut line = [0; 12];
         stream.read_exact(&mut line).await?;

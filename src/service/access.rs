@@ -145,7 +145,7 @@ pub struct Access {
     tokens: ArcSwap<Tokens>,
     /// Whether anybody on the network may administer, where nobody has to show who they are.
     anybody_administers: bool,
-    /// What an administrator is told who asks where none is answered.
+    /// The way out for an administrator who asks where none is answered.
     way_to_administer: String,
     metrics: Arc<Metrics>,
 }
@@ -301,14 +301,14 @@ fn token_in(header: &str) -> Option<String> {
 
 /// How one listener lets peers in.
 #[derive(Debug, Clone)]
-pub struct Door {
+pub struct Acceptor {
     access: Arc<Access>,
     protocol: Protocol,
     /// Where handshakes are computed, away from the threads that answer; none where the listener speaks without TLS.
     handshakes: Option<Handle>,
 }
 
-impl Door {
+impl Acceptor {
     /// That of a listener: encrypted where there are keys and it is not said to be insecure.
     pub fn new(access: &Arc<Access>, protocol: Protocol, insecure: bool, handshakes: &Handle) -> Self {
         let encrypted = access.keys.is_some() && !insecure;

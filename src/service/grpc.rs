@@ -27,7 +27,7 @@ use tonic_health::pb::health_server::HealthServer;
 use tonic_health::server::{HealthReporter, HealthService};
 
 use self::turns::Turnstile;
-use super::access::Door;
+use super::access::Acceptor;
 use super::accounts::{Accounts, Connection};
 use super::admin::Jobs;
 use super::call::Shared;
@@ -232,7 +232,7 @@ pub struct Server {
     gate: Arc<Semaphore>,
     turnstile: Turnstile,
     health: HealthReporter,
-    door: Door,
+    acceptor: Acceptor,
 }
 
 impl Server {
@@ -241,12 +241,12 @@ impl Server {
         config: Config,
         shared: Shared,
         accounts: Arc<Accounts>,
-        door: Door,
+        acceptor: Acceptor,
     ) -> std::io::Result<Self> {
         let jobs = Jobs::start(Arc::clone(&shared.reloader))?;
         let gate = Arc::new(Semaphore::new(config.threads));
         let (turnstile, health) = (Turnstile::new(), HealthReporter::new());
-        let server = Self { config, shared, accounts, jobs, gate, turnstile, health, door };
+        let server = Self { config, shared, accounts, jobs, gate, turnstile, health, acceptor };
         // the crate registers the empty name as SERVING, and nothing is served yet
         for service in HEALTH_NAMES {
             server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
@@ -339,7 +339,7 @@ impl Server {
         open: &mpsc::Sender<()>,
     ) -> Result<(), GrpcError> {
         let rules = Arc::new(calls::Rules {
-            door: self.door.clone(),
+            acceptor: self.acceptor.clone(),
             request: Duration::from_secs_f64(self.config.request_s),
             stream_idle: Duration::from_secs_f64(self.config.stream_idle_s),
             gate: Arc::clone(&self.gate),
@@ -354,7 +354,8 @@ impl Server {
             let (routes, rules, turns) = (routes.clone(), Arc::clone(&rules), self.turnstile.turns());
             let (http, stop, open) = (http.clone(), stop.clone(), open.clone());
             tokio::spawn(async move {
-                if let Some((socket, who)) = rules.door.let_in(socket, &connection, deadlines.handshake).await
+                if let Some((socket, who)) =
+                    rules.acceptor.let_in(socket, &connection, deadlines.handshake).await
                 {
                     let link = link::Link::new(socket, Arc::clone(&connection), frames);
                     let calls = calls::Calls { routes, connection, rules, who };

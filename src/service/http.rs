@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use tokio::runtime::Handle;
 use tokio::sync::watch;
 
-use super::access::Door;
+use super::access::Acceptor;
 use super::accounts::Accounts;
 use super::health::Health;
 use super::intake::{Listener, listen_on_tcp};
@@ -108,7 +108,7 @@ pub struct Shared {
     /// Which transports answer.
     pub health: Arc<Health>,
     /// Who may do what.
-    pub door: Door,
+    pub acceptor: Acceptor,
 }
 
 /// Serves until `stop` turns true: probes on this thread, everything else on that of `work`, so that no query and no hull

@@ -77,6 +77,7 @@ fn alerts_and_dashboard_ask_for_metrics_that_exist() {
     metrics.set_bundle_version("husky", 1);
     metrics.count_reload(false);
     metrics.set_transport_up("grpc", true);
+    metrics.set_certificate_end(Path::new("server.pem"), std::time::Duration::from_secs(1));
     let rendered = metrics.render();
     for name in ["alerts.yml", "grafana/wade.json"] {
         let file = text(name);
@@ -114,6 +115,55 @@ fn systemd_has_nothing_to_say_about_the_unit() {
     assert!(output.status.success() && about_ours == 0, "{}", printed(&output));
 }
 
+/// Starts a server with these arguments, its files in a folder of its own, and waits until it says that it is ready.
+fn starts(arguments: &[String]) -> String {
+    let folder = tempfile::TempDir::new().expect("a temporary folder");
+    let log = folder.path().join("log");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
+    command.args(arguments).arg("--with-parent").current_dir(folder.path()).env_remove("WADE_CONFIG");
+    command.args(["--namespace", &crate::common::namespace()]);
+    let mut server = command.stderr(std::fs::File::create(&log).expect("a file")).spawn().expect("started");
+    let start = std::time::Instant::now();
+    let read = || std::fs::read_to_string(&log).expect("read");
+    while !read().contains("ready in") && server.try_wait().expect("asked").is_none() {
+        assert!(start.elapsed() < crate::common::PATIENCE, "{}", read());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let _ = server.kill();
+    server.wait().expect("reaped");
+    read()
+}
+
+/// The arguments of `wade` in a file of deploy/, on ports that the system chooses and with files of the test's own.
+fn rehearsed<'a>(arguments: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let file = |argument: &str| match argument {
+        "/etc/wade/wade.toml" => deploy("wade.toml").display().to_string(),
+        _ => argument.replace("/run/wade/", "").replace(":50051", ":0").replace(":9464", ":0"),
+    };
+    arguments.map(file).collect()
+}
+
+#[test]
+fn the_server_starts_as_the_unit_and_the_image_start_it() {
+    let unit = text("wade.service");
+    let line =
+        unit.lines().find_map(|line| line.strip_prefix("ExecStart=/usr/local/bin/wade ")).expect("a line");
+    let mut unit = rehearsed(line.split(' '));
+    unit.extend(["--listen", "127.0.0.1:0", "--http", "127.0.0.1:0"].map(str::to_owned));
+    let log = starts(&unit);
+    assert!(log.contains("ready in") && log.contains("address=unix:wade.sock"), "{log}");
+    let image = text("Dockerfile");
+    let line = image.lines().find_map(|line| line.strip_prefix("CMD ")).expect("a line");
+    let arguments: Vec<String> = serde_json::from_str(line).expect("a list");
+    let log = starts(&rehearsed(arguments.iter().map(String::as_str)));
+    assert!(log.contains("ready in"), "{log}");
+    // on all addresses of the container, and says so
+    assert!(log.matches("is not encrypted").count() == 2, "{log}");
+    let exposed: Vec<String> = arguments.into_iter().filter(|argument| argument != "--insecure").collect();
+    let refused = starts(&rehearsed(exposed.iter().map(String::as_str)));
+    assert!(refused.contains("tls.certificate") && !refused.contains("ready in"), "{refused}");
+}
+
 #[test]
 fn the_unit_and_the_containers_wait_longer_than_the_drain() {
     let seconds = |file: &str, key: &str| -> f64 {
@@ -141,7 +191,8 @@ fn prometheus_accepts_its_settings_and_the_alerts_fire() {
 }
 
 /// Server a is well. Server b has every trouble there is: half of its single requests take 2 ms to 5 ms, it refuses
-/// four requests a second, its shared memory does not answer, and it refuses a bundle at minute 5. Server c has no vehicle,
+/// four requests a second, its shared memory does not answer, its certificate has a day left,
+/// and it refuses a bundle at minute 5. Server c has no vehicle,
 /// server d does not answer.
 const STORY: &str = r#"
 rule_files: [RULES]
@@ -167,11 +218,14 @@ tests:
       - {series: 'wade_transport_up{instance="a", transport="shared_memory"}', values: '1x40'}
       - {series: 'wade_transport_up{instance="b", transport="shared_memory"}', values: '0x40'}
       - {series: 'wade_transport_up{instance="b", transport="grpc"}', values: '1x40'}
+      - {series: 'wade_certificate_end_seconds{instance="a", file="server.pem"}', values: '7776000x40'}
+      - {series: 'wade_certificate_end_seconds{instance="b", file="server.pem"}', values: '86400x40'}
       - {series: 'wade_reloads_total{instance="a", outcome="accepted"}', values: '0x20 1x20'}
       - {series: 'wade_reloads_total{instance="b", outcome="refused"}', values: '0x20 1x20'}
     promql_expr_test:
       - {expr: 'count by (alertname, instance) (ALERTS{alertstate="firing"})', eval_time: 4m, exp_samples: [
           {labels: '{alertname="WadeSlow", instance="b"}', value: 1},
+          {labels: '{alertname="WadeCertificateEnds", instance="b"}', value: 1},
           {labels: '{alertname="WadeRefuses", instance="b"}', value: 1},
           {labels: '{alertname="WadeTransportDown", instance="b"}', value: 1},
           {labels: '{alertname="WadeNotReady", instance="c"}', value: 1},

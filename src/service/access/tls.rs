@@ -1,7 +1,7 @@
 //! TLS 1.3, and nothing older: every client of this server has it, and what is not spoken cannot be negotiated down to.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
@@ -78,9 +78,9 @@ fn provider() -> Arc<CryptoProvider> {
 }
 
 /// The certificates in a file, of which there is at least one.
-fn certificates(key: &'static str, path: &PathBuf) -> Result<Vec<CertificateDer<'static>>, FileError> {
+fn certificates(key: &'static str, path: &Path) -> Result<Vec<CertificateDer<'static>>, FileError> {
     let bytes = read(key, path)?;
-    let error = |reason: String| FileError { key, path: path.clone(), reason };
+    let error = |reason: String| FileError { key, path: path.to_owned(), reason };
     let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&bytes).collect();
     let found = found.map_err(|fault| error(format!("not PEM: {fault}")))?;
     if found.is_empty() { Err(error("holds no certificate in PEM".into())) } else { Ok(found) }

@@ -20,7 +20,7 @@ use tonic::service::Routes;
 use super::handlers::Names;
 use super::name_the_size_limit;
 use crate::metrics::{Metrics, Resource, Transport};
-use crate::service::access::{Caller, Door, Role, Who};
+use crate::service::access::{Acceptor, Caller, Role, Who};
 use crate::service::accounts::{Computing, Connection, Place, Sent};
 use crate::service::stopped;
 use wade_wire::Refusal;
@@ -81,7 +81,7 @@ pub struct Rules {
     /// The names of its calls in the metrics.
     pub names: Names,
     /// Who may make them.
-    pub door: Door,
+    pub acceptor: Acceptor,
     /// Longest time for a request to arrive.
     pub request: Duration,
     /// Longest pause between two requests of a stream.
@@ -151,7 +151,7 @@ impl Calls {
     }
 
     async fn admit(&self, method: Method, headers: &HeaderMap) -> Result<(Option<Caller>, Place), Refusal> {
-        let access = self.rules.door.access();
+        let access = self.rules.acceptor.access();
         let caller = method.role.map(|role| access.check(&self.who, headers, role)).transpose();
         let caller = caller.inspect_err(|refusal| {
             if method.administers() {

@@ -25,7 +25,7 @@ use tower::ServiceExt;
 use super::Shared;
 use super::rejection::Rejection;
 use crate::metrics::{Metrics, Resource, Transport};
-use crate::service::access::{Door, Role, Who};
+use crate::service::access::{Acceptor, Role, Who};
 use crate::service::accounts::{Closed, Computing, Connection, Sent};
 use crate::service::intake::{self, Listener, Socket};
 use crate::service::stopped;
@@ -52,12 +52,12 @@ pub async fn serve(listener: Listener, routes: Routes, shared: &Shared, stop: wa
     let answer = Duration::from_secs_f64(shared.config.answer_s);
     let handshake = Duration::from_secs_f64(shared.config.request_s);
     let serve = |socket, connection: Arc<Connection>, place| {
-        let (routes, door) = (routes.clone(), shared.door.clone());
+        let (routes, acceptor) = (routes.clone(), shared.acceptor.clone());
         let (http, watcher) = (http.clone(), open.watcher());
         let metrics = Arc::clone(&shared.grpc.metrics);
         tokio::spawn(async move {
-            let Some((socket, who)) = door.let_in(socket, &connection, handshake).await else { return };
-            let service = Requests { routes, connection: Arc::clone(&connection), door, who, metrics };
+            let Some((socket, who)) = acceptor.let_in(socket, &connection, handshake).await else { return };
+            let service = Requests { routes, connection: Arc::clone(&connection), acceptor, who, metrics };
             let noted = Noted { socket, connection: Arc::clone(&connection) };
             let served = watcher.watch(http.serve_connection(TokioIo::new(noted), service));
             tokio::select! {
@@ -87,7 +87,7 @@ async fn stalled(connection: &Connection, longest: Duration) {
 struct Requests {
     routes: Routes,
     connection: Arc<Connection>,
-    door: Door,
+    acceptor: Acceptor,
     who: Who,
     metrics: Arc<Metrics>,
 }
@@ -111,8 +111,9 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
         let Routes { probes, browsed, work } = self.routes.clone();
         let connection = Arc::clone(&self.connection);
         connection.moved();
-        let checked = role(request.uri().path())
-            .map_or(Ok(()), |role| self.door.access().check(&self.who, request.headers(), role).map(drop));
+        let checked = role(request.uri().path()).map_or(Ok(()), |role| {
+            self.acceptor.access().check(&self.who, request.headers(), role).map(drop)
+        });
         if let Err(refusal) = checked {
             self.metrics.refuse(Transport::http, refusal.reason());
             let response = Rejection::from(refusal).into_response();
