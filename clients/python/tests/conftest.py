@@ -38,6 +38,13 @@ class Awaited:
         self._loop.run_until_complete(self._awaited.__aexit__(*exception))
 
 
+@pytest.fixture(autouse=True)
+def without_credentials(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the developer shows to servers is not what a test shows."""
+    for variable in ("WADE_CA", "WADE_CERTIFICATE", "WADE_KEY", "WADE_TOKEN_FILE"):
+        monkeypatch.delenv(variable, raising=False)
+
+
 @pytest.fixture(scope="session")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One that nobody may harm."""

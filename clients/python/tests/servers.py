@@ -64,6 +64,8 @@ class Server:
         self.namespace = f"test_{uuid.uuid4().hex[:12]}"
         self.vehicles = VEHICLES
         self.process: subprocess.Popen[bytes] | None = None
+        # where TCP is encrypted, the socket is not
+        self._health_at = f"unix:{self.socket}" if "[tls]" in settings else self.address
         (folder / "wade.toml").write_text(
             f'[grpc]\nlisten = "{self.address}"\nunix_socket = "{self.socket}"\n{settings}'
             f'[shm]\nnamespace = "{self.namespace}"\n[http]\nlisten = ""\n'
@@ -85,7 +87,7 @@ class Server:
             time.sleep(0.05)
 
     def _is_healthy(self) -> bool:
-        with grpc.insecure_channel(self.address) as channel:
+        with grpc.insecure_channel(self._health_at, [("grpc.default_authority", "localhost")]) as channel:
             check = channel.unary_unary("/grpc.health.v1.Health/Check")
             try:
                 # an empty request means the server as a whole, the other names shared memory; the answer's one field

@@ -32,7 +32,8 @@ def test_every_form_reaches_the_server_and_answers_the_same(server: Server) -> N
         ("::1:50051", "brackets"),
         ("/tmp/wade.sock", "missing"),
         ("http://host:1/v1", "missing"),
-        ("https://host:1", "tls"),
+        ("https://host", "missing"),
+        ("https://http://host:1", "missing"),
         ("unix:", "socket"),
         ("shm:", "namespace"),
         ("shm:a/b", "namespace"),
@@ -45,7 +46,8 @@ def test_what_is_no_address_is_named(address: str, fault: str) -> None:
 
 
 def test_settings_of_the_other_transport_are_refused() -> None:
-    with pytest.raises(ValueError, match="tls"):
-        wade.connect("shm:wade", tls=wade.Tls())
+    for setting in ({"tls": wade.Tls()}, {"token": "secret"}):
+        with pytest.raises(ValueError, match="tls and token are for gRPC"):
+            wade.connect("shm:wade", **setting)
     with pytest.raises(ValueError, match="ShmClient"):
         wade.GrpcClient("shm:wade")

@@ -8,7 +8,7 @@ from typing import Any
 import grpc
 
 from . import messages
-from .channel import DEFAULT_ADDRESS, Tls, open_channel, target
+from .channel import DEFAULT_ADDRESS, Endpoint, Tls
 from .client import DEFAULT_TIMEOUT_S, check_query, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
@@ -25,9 +25,16 @@ _NOT_WRITTEN = "Internal error from Core"
 class GrpcClient:
     """As `wade.GrpcClient`, with every call a coroutine and `async with` for `with`."""
 
-    def __init__(self, address: str = DEFAULT_ADDRESS, *, tls: Tls | None = None, timeout_s: float = DEFAULT_TIMEOUT_S):
-        self.address = target(address)
-        self._tls = tls
+    def __init__(
+        self,
+        address: str = DEFAULT_ADDRESS,
+        *,
+        tls: Tls | None = None,
+        token: str | None = None,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+    ):
+        self._endpoint = Endpoint.from_arguments(address, tls, token)
+        self.address = self._endpoint.address
         self._timeout_s = checked_timeout(timeout_s)
         self._channel: Any = None
         self._calls: dict[str, Any] = {}
@@ -90,7 +97,7 @@ class GrpcClient:
         timeout_s = self._timeout(timeout_s)
         calls = self._connected()
         try:
-            return await calls[method](request, timeout=timeout_s)
+            return await calls[method](request, timeout=timeout_s, metadata=self._endpoint.metadata)
         except grpc.RpcError as failure:
             raise self._failed(calls, failure, timeout_s) from None
 
@@ -103,12 +110,12 @@ class GrpcClient:
 
     def _connected(self) -> dict[str, Any]:
         if not self._calls:
-            self._channel = open_channel(grpc.aio, self.address, self._tls)
+            self._channel = self._endpoint.open(grpc.aio)
             self._calls = messages.calls(self._channel)
         return self._calls
 
     def _failed(self, calls: dict[str, Any], failure: Any, timeout_s: float) -> WadeError:
-        error = messages.error(failure, self.address, timeout_s)
+        error = messages.error(failure, self._endpoint, timeout_s)
         if isinstance(error, ServerUnavailable) and self._calls is calls:
             # dropped rather than closed: closing would cancel what other tasks still wait for
             self._channel, self._calls = None, {}
@@ -137,7 +144,7 @@ class GrpcStream:
         begins = self._call is None
         if begins:
             self._calls = self._client._connected()
-            self._call = self._calls["Stream"]()
+            self._call = self._calls["Stream"](metadata=self._client._endpoint.metadata)
         call = self._call
         expired = False
 

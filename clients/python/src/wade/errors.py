@@ -81,3 +81,17 @@ class Refused(WadeError):
     def __init__(self, code: str, message: str):
         self.code = code
         super().__init__(f"{code}: {message}")
+
+
+class Unauthenticated(Refused, PermissionError):
+    """The server asks for a token or a client certificate, and got none that it knows."""
+
+    def __init__(self, message: str):
+        super().__init__("UNAUTHENTICATED", message)
+
+
+class PermissionDenied(Refused, PermissionError):
+    """The token or the certificate has not the role that the call needs."""
+
+    def __init__(self, message: str):
+        super().__init__("PERMISSION_DENIED", message)

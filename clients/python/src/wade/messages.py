@@ -17,12 +17,15 @@ from google.protobuf.descriptor import FieldDescriptor, FileDescriptor
 from google.protobuf.message import Message
 from google.rpc import error_details_pb2, status_pb2
 
+from .channel import Endpoint
 from .errors import (
     DeadlineExceeded,
     InvalidState,
+    PermissionDenied,
     Refused,
     ResourceExhausted,
     ServerUnavailable,
+    Unauthenticated,
     UnknownVehicle,
     Violation,
     WadeError,
@@ -409,13 +412,17 @@ def reloaded(response: Any) -> tuple[Reloaded, ...]:
     return tuple(Reloaded(found.vehicle, found.bundle_version, found.refusal) for found in response.vehicles)
 
 
-def error(failure: Any, at: str, timeout_s: float) -> WadeError:
+def error(failure: Any, endpoint: Endpoint, timeout_s: float) -> WadeError:
     """The error that a failed call stands for, with what the server attached to it."""
     code, message = failure.code(), failure.details() or ""
     if code is grpc.StatusCode.UNAVAILABLE:
-        return ServerUnavailable(at, message)
+        return ServerUnavailable(endpoint.address, endpoint.explained(message))
     if code is grpc.StatusCode.OK:
-        return ServerUnavailable(at, "the server ended the stream")
+        return ServerUnavailable(endpoint.address, "the server ended the stream")
+    if code is grpc.StatusCode.UNAUTHENTICATED:
+        return Unauthenticated(message)
+    if code is grpc.StatusCode.PERMISSION_DENIED:
+        return PermissionDenied(message)
     if code is grpc.StatusCode.DEADLINE_EXCEEDED:
         return DeadlineExceeded(timeout_s)
     for detail in _details(failure):

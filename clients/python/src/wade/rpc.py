@@ -10,7 +10,7 @@ from typing import Any
 import grpc
 
 from . import messages
-from .channel import DEFAULT_ADDRESS, Tls, open_channel, target
+from .channel import DEFAULT_ADDRESS, Endpoint, Tls
 from .client import DEFAULT_TIMEOUT_S, check_query, checked_timeout
 from .errors import DeadlineExceeded, ServerUnavailable, WadeError
 from .forces import Forces
@@ -22,17 +22,27 @@ from .vehicle import Reloaded, Vehicle
 
 
 class GrpcClient:
-    """Asks a server at `host:port`, `http://host:port` or `unix:PATH`; connects with the first call.
+    """Asks a server at `host:port`, `http[s]://host:port` or `unix:PATH`; connects with the first call.
 
     Several threads may share it.
+
+    `https://` or `tls` encrypts. Every call shows the `token`, by default that of the file WADE_TOKEN_FILE; without
+    encryption it goes to this machine alone.
 
     A call that finds no server fails at once, or as soon as the connection breaks, with `ServerUnavailable`; the next
     one connects anew.
     """
 
-    def __init__(self, address: str = DEFAULT_ADDRESS, *, tls: Tls | None = None, timeout_s: float = DEFAULT_TIMEOUT_S):
-        self.address = target(address)
-        self._tls = tls
+    def __init__(
+        self,
+        address: str = DEFAULT_ADDRESS,
+        *,
+        tls: Tls | None = None,
+        token: str | None = None,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+    ):
+        self._endpoint = Endpoint.from_arguments(address, tls, token)
+        self.address = self._endpoint.address
         self._timeout_s = checked_timeout(timeout_s)
         self._lock = threading.Lock()
         self._channel: Any = None
@@ -97,7 +107,7 @@ class GrpcClient:
         timeout_s = self._timeout(timeout_s)
         calls = self._connected()
         try:
-            return calls[method](request, timeout=timeout_s)
+            return calls[method](request, timeout=timeout_s, metadata=self._endpoint.metadata)
         except grpc.RpcError as failure:
             raise self._failed(calls, failure, timeout_s) from None
 
@@ -111,12 +121,12 @@ class GrpcClient:
     def _connected(self) -> dict[str, Any]:
         with self._lock:
             if not self._calls:
-                self._channel = open_channel(grpc, self.address, self._tls)
+                self._channel = self._endpoint.open(grpc)
                 self._calls = messages.calls(self._channel)
             return self._calls
 
     def _failed(self, calls: dict[str, Any], failure: Any, timeout_s: float) -> WadeError:
-        error = messages.error(failure, self.address, timeout_s)
+        error = messages.error(failure, self._endpoint, timeout_s)
         if isinstance(error, ServerUnavailable):
             # dropped rather than closed: closing would cancel what other threads still wait for
             with self._lock:
@@ -181,7 +191,7 @@ class GrpcStream:
     def _open(self) -> None:
         self._calls = self._client._connected()
         self._requests, self._answers = SimpleQueue(), SimpleQueue()
-        self._call = self._calls["Stream"](iter(self._requests.get, None))
+        self._call = self._calls["Stream"](iter(self._requests.get, None), metadata=self._client._endpoint.metadata)
         # grpcio can wait for an answer without end only; a queue can be waited for in time
         reader = threading.Thread(target=_read, args=(self._call, self._answers), daemon=True)
         reader.start()
