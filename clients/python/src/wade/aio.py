@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Coroutine
 from typing import Any
 
 import grpc
@@ -18,8 +19,10 @@ from .stability import Ford, Stability
 from .state import State
 from .vehicle import Reloaded, Vehicle
 
-#: What grpc.aio puts in the place of a call's status where it could not write a message.
+#: What grpc.aio puts in the place of a call's status where it could not write a message, before or after the status.
 _NOT_WRITTEN = "Internal error from Core"
+#: How long the status may take from then on: it has been received, and waits in this process [s].
+_STATUS_ARRIVES_S = 0.2
 
 
 class GrpcClient:
@@ -132,6 +135,7 @@ class GrpcStream:
         self._client, self._vehicle = client, vehicle
         self._calls: dict[str, Any] = {}
         self._call: Any = None
+        self._statuses: list[tuple[Any, ...]] = []
 
     async def evaluate(self, state: State, *, timeout_s: float | None = None) -> Forces:
         """The forces in one state."""
@@ -145,6 +149,9 @@ class GrpcStream:
         if begins:
             self._calls = self._client._connected()
             self._call = self._calls["Stream"](metadata=self._client._endpoint.metadata)
+            # as each of them comes: a later one takes the place of the one before
+            self._statuses = statuses = []
+            self._call.add_done_callback(lambda call: statuses.append(_without_waiting(_status(call))))
         call = self._call
         expired = False
 
@@ -153,7 +160,9 @@ class GrpcStream:
             expired = True
             call.cancel()
 
-        timer = asyncio.get_running_loop().call_later(timeout_s, expire)
+        loop = asyncio.get_running_loop()
+        end = loop.time() + timeout_s
+        timer = loop.call_at(end, expire)
         try:
             await call.write(request)
             answer = await call.read()
@@ -168,7 +177,7 @@ class GrpcStream:
         finally:
             timer.cancel()
         if answer is grpc.aio.EOF:
-            raise await self._ended(call, timeout_s)
+            raise await self._ended(timeout_s, end)
         return messages.forces(answer, begins)
 
     def close(self) -> None:
@@ -183,15 +192,31 @@ class GrpcStream:
     async def __aexit__(self, *exception: object) -> None:
         self.close()
 
-    async def _ended(self, call: Any, timeout_s: float) -> WadeError:
-        """What ended a call, by its status."""
+    async def _ended(self, timeout_s: float, end: float) -> WadeError:
+        """What ended the call, by its status."""
         self._call = None
-        status = (
-            await call.code(),
-            await call.initial_metadata(),
-            await call.trailing_metadata(),
-            await call.details(),
-        )
-        if status[-1] == _NOT_WRITTEN:
-            status = (grpc.StatusCode.UNAVAILABLE, *status[1:-1], "the connection broke")
-        return self._client._failed(self._calls, grpc.aio.AioRpcError(*status), timeout_s)
+        loop = asyncio.get_running_loop()
+        end = min(end, loop.time() + _STATUS_ARRIVES_S)
+        while True:
+            for status in self._statuses:
+                if status[-1] != _NOT_WRITTEN:
+                    return self._client._failed(self._calls, grpc.aio.AioRpcError(*status), timeout_s)
+            if loop.time() >= end:
+                break
+            await asyncio.sleep(0.001)
+        broken = (grpc.StatusCode.UNAVAILABLE, grpc.aio.Metadata(), grpc.aio.Metadata(), "the connection broke")
+        return self._client._failed(self._calls, grpc.aio.AioRpcError(*broken), timeout_s)
+
+
+async def _status(call: Any) -> tuple[Any, ...]:
+    return await call.code(), await call.initial_metadata(), await call.trailing_metadata(), await call.details()
+
+
+def _without_waiting(coroutine: Coroutine[Any, Any, Any]) -> Any:
+    """What a coroutine returns that has nothing to wait for."""
+    try:
+        coroutine.send(None)
+    except StopIteration as returned:
+        return returned.value
+    coroutine.close()
+    raise RuntimeError("the coroutine waits")
