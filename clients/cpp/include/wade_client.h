@@ -113,6 +113,9 @@ typedef enum {
   WADE_STATUS_ABI_MISMATCH = 9,
   // A fault in this library; nothing was written. Please report it.
   WADE_STATUS_INTERNAL = 10,
+  // A file of `wade_credentials` cannot be used, which the reason names; it is read again each second. The forces are the last
+  // ones.
+  WADE_STATUS_CREDENTIALS = 11,
 } wade_status;
 
 // How a call over shared memory waits for its answer.
@@ -161,11 +164,31 @@ typedef struct {
   // 0
   uint32_t reserved;
   // "shm:NAMESPACE" for shared memory ("shm:wade" unless the server's shm.namespace says otherwise), "HOST:PORT" or
-  // "http://HOST:PORT" for gRPC over TCP, "unix:PATH" for gRPC over a Unix socket. Copied.
+  // "http://HOST:PORT" for gRPC over TCP, "https://HOST:PORT" for the same over TLS, "unix:PATH" for gRPC over a Unix socket.
+  // Copied.
   const char *address;
   // Name of the vehicle. Copied.
   const char *vehicle;
 } wade_options;
+
+// Which servers a client believes and what it shows them over TCP. Begin with `wade_default_credentials()`.
+//
+// Paths of files, each null or empty for none, and copied. The files are read at each connection, so that a client finds what was
+// renewed when it connects again. Over shared memory and a Unix socket none is read: there the server knows its own user.
+typedef struct {
+  // sizeof(wade_credentials)
+  uint32_t size;
+  // 0
+  uint32_t reserved;
+  // PEM of the authorities whose servers are believed. None: those of the system.
+  const char *ca_file;
+  // PEM of the client's certificate, followed by those between it and its authority. With `key_file` alone.
+  const char *certificate_file;
+  // PEM of the private key of the certificate.
+  const char *key_file;
+  // A token, as `wade token` prints it. It is sent to another machine over "https://" alone.
+  const char *token_file;
+} wade_credentials;
 
 // The state of a vehicle in the water. Begin with `wade_default_state()`.
 typedef struct {
@@ -378,6 +401,14 @@ extern "C" {
 // Otherwise (WADE_STATUS_ABI_MISMATCH, WADE_STATUS_INVALID_ARGUMENT, WADE_STATUS_INTERNAL) it is null.
 wade_status wade_client_open(const wade_options *options, wade_client **client);
 
+// As `wade_client_open`, for a server that is reached over TLS or asks who calls. Null credentials name no file.
+//
+// A file that cannot be used does not keep the client from opening: it is not connected then, with WADE_STATUS_CREDENTIALS, and
+// `wade_client_reason` names the file.
+wade_status wade_client_open_with_credentials(const wade_options *options,
+                                              const wade_credentials *credentials,
+                                              wade_client **client);
+
 // Waits until the client is connected to its server, or the time is over: then says why it is not.
 wade_status wade_client_wait(const wade_client *client, uint64_t timeout_ns);
 
@@ -429,6 +460,16 @@ wade_status wade_get_vehicle(const char *address,
                              uint64_t timeout_ns,
                              wade_vehicle *out);
 
+// As `wade_get_vehicle`, for a server that is reached over TLS or asks who calls. Null credentials name no file. Where there is no
+// answer, `reason` gets what fits of a sentence with its end that says why; it may be null.
+wade_status wade_get_vehicle_with_credentials(const char *address,
+                                              const char *vehicle,
+                                              const wade_credentials *credentials,
+                                              uint64_t timeout_ns,
+                                              wade_vehicle *out,
+                                              char *reason,
+                                              size_t reason_size);
+
 // Unit vector along gravity of a body with this roll and pitch [rad]: positive roll lowers the right side, positive pitch the
 // nose (REP-103).
 void wade_gravity_from_roll_pitch(float roll_rad, float pitch_rad, float *gravity_direction);
@@ -465,6 +506,14 @@ static inline wade_options wade_default_options(void) {
   options.forces_size = (uint32_t)sizeof(wade_forces);
   options.wait = WADE_WAIT_BLOCK;
   return options;
+}
+
+// Credentials that name no file.
+static inline wade_credentials wade_default_credentials(void) {
+  wade_credentials credentials;
+  memset(&credentials, 0, sizeof credentials);
+  credentials.size = (uint32_t)sizeof(wade_credentials);
+  return credentials;
 }
 
 // A vehicle at rest and level, in fresh water of no depth.

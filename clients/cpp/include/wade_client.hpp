@@ -34,6 +34,7 @@ enum class Status : std::int32_t {
   invalid_argument = WADE_STATUS_INVALID_ARGUMENT,
   abi_mismatch = WADE_STATUS_ABI_MISMATCH,
   internal = WADE_STATUS_INTERNAL,
+  credentials = WADE_STATUS_CREDENTIALS,
 };
 
 // A sentence for a status.
@@ -143,16 +144,46 @@ struct Jacobian {
   return {vehicle.surfaces, vehicle.surface_count};
 }
 
-// What a server says of a vehicle, over gRPC.
+// Files that a client reads at each connection; see `wade_credentials`.
+struct Credentials {
+  const char *ca_file = nullptr;
+  const char *certificate_file = nullptr;
+  const char *key_file = nullptr;
+  const char *token_file = nullptr;
+
+  [[nodiscard]] wade_credentials as_c() const noexcept {
+    wade_credentials credentials = wade_default_credentials();
+    credentials.ca_file = ca_file;
+    credentials.certificate_file = certificate_file;
+    credentials.key_file = key_file;
+    credentials.token_file = token_file;
+    return credentials;
+  }
+};
+
+// What a server says of a vehicle.
 [[nodiscard]] inline Status get_vehicle(const char *address, const char *name, nanoseconds timeout, Vehicle &vehicle) noexcept {
   const auto limit = timeout.count() < 0 ? 0 : static_cast<std::uint64_t>(timeout.count());
   return static_cast<Status>(wade_get_vehicle(address, name, limit, &vehicle));
 }
 
-// How a client waits, and how many states a batch may have.
+// The same with credentials, and why there is no answer.
+[[nodiscard]] inline Status get_vehicle(const char *address, const char *name, const Credentials &shown, nanoseconds timeout,
+                                        Vehicle &vehicle, std::string &reason) {
+  const auto limit = timeout.count() < 0 ? 0 : static_cast<std::uint64_t>(timeout.count());
+  const wade_credentials credentials = shown.as_c();
+  char text[1024];
+  const wade_status status =
+      wade_get_vehicle_with_credentials(address, name, &credentials, limit, &vehicle, text, sizeof text);
+  reason = text;
+  return static_cast<Status>(status);
+}
+
+// How a client waits, how many states a batch may have, and the files with which it connects.
 struct Options {
   wade_wait wait = WADE_WAIT_BLOCK;
   std::uint32_t max_batch = 0;
+  Credentials credentials = {};
 };
 
 // A client of one vehicle of one server; see `wade_client`. Any number of threads may call it.
@@ -176,7 +207,8 @@ class Client {
     options.vehicle = vehicle;
     options.wait = static_cast<std::uint32_t>(chosen.wait);
     options.max_batch = chosen.max_batch;
-    return static_cast<Status>(wade_client_open(&options, &client_));
+    const wade_credentials credentials = chosen.credentials.as_c();
+    return static_cast<Status>(wade_client_open_with_credentials(&options, &credentials, &client_));
   }
 
   // Closes it; no call may be under way.

@@ -1,6 +1,7 @@
 //! What crosses the boundary: plain numbers of fixed size. The header is made from these.
 //!
-//! Names are those of the wire (`proto/wade/v1/hydrodynamics.proto`). A change to any of them raises [`WADE_ABI_VERSION`].
+//! Names are those of the wire (`proto/wade/v1/hydrodynamics.proto`). A change to any of them raises [`WADE_ABI_VERSION`]; what is
+//! added beside them does not.
 
 use std::ffi::c_char;
 
@@ -87,6 +88,9 @@ pub enum WadeStatus {
     AbiMismatch = 9,
     /// A fault in this library; nothing was written. Please report it.
     Internal = 10,
+    /// A file of `wade_credentials` cannot be used, which the reason names; it is read again each second. The forces are the last
+    /// ones.
+    Credentials = 11,
 }
 
 /// How a call over shared memory waits for its answer.
@@ -100,7 +104,7 @@ pub enum WadeWait {
 }
 
 impl WadeStatus {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::Ok,
         Self::Timeout,
         Self::NoServer,
@@ -112,6 +116,7 @@ impl WadeStatus {
         Self::InvalidArgument,
         Self::AbiMismatch,
         Self::Internal,
+        Self::Credentials,
     ];
 
     /// The status of a number.
@@ -136,10 +141,31 @@ pub struct WadeOptions {
     /// 0
     pub reserved: u32,
     /// "shm:NAMESPACE" for shared memory ("shm:wade" unless the server's shm.namespace says otherwise), "HOST:PORT" or
-    /// "http://HOST:PORT" for gRPC over TCP, "unix:PATH" for gRPC over a Unix socket. Copied.
+    /// "http://HOST:PORT" for gRPC over TCP, "https://HOST:PORT" for the same over TLS, "unix:PATH" for gRPC over a Unix socket.
+    /// Copied.
     pub address: *const c_char,
     /// Name of the vehicle. Copied.
     pub vehicle: *const c_char,
+}
+
+/// Which servers a client believes and what it shows them over TCP. Begin with `wade_default_credentials()`.
+///
+/// Paths of files, each null or empty for none, and copied. The files are read at each connection, so that a client finds what was
+/// renewed when it connects again. Over shared memory and a Unix socket none is read: there the server knows its own user.
+#[repr(C)]
+pub struct WadeCredentials {
+    /// sizeof(wade_credentials)
+    pub size: u32,
+    /// 0
+    pub reserved: u32,
+    /// PEM of the authorities whose servers are believed. None: those of the system.
+    pub ca_file: *const c_char,
+    /// PEM of the client's certificate, followed by those between it and its authority. With `key_file` alone.
+    pub certificate_file: *const c_char,
+    /// PEM of the private key of the certificate.
+    pub key_file: *const c_char,
+    /// A token, as `wade token` prints it. It is sent to another machine over "https://" alone.
+    pub token_file: *const c_char,
 }
 
 /// The state of a vehicle in the water. Begin with `wade_default_state()`.

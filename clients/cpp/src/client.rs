@@ -11,6 +11,7 @@ use crate::abi::{WADE_MAX_BATCH, WADE_NEVER, WadeBatch, WadeForces, WadeState, W
 use crate::bounded::Budget;
 use crate::connection::Connection;
 use crate::convert::checked;
+use crate::credentials::CredentialFiles;
 use crate::grpc::Grpc;
 use crate::known::Known;
 use crate::last::nanoseconds_since;
@@ -38,7 +39,13 @@ enum Transport {
 
 impl WadeClient {
     /// Starts to look for the server. None where an option is wrong or the system gives no thread.
-    pub fn open(address: &Address, vehicle: &str, wait: Wait, max_batch: u32) -> Option<Self> {
+    pub fn open(
+        address: &Address,
+        vehicle: &str,
+        credentials: CredentialFiles,
+        wait: Wait,
+        max_batch: u32,
+    ) -> Option<Self> {
         if vehicle.is_empty() || max_batch > WADE_MAX_BATCH {
             return None;
         }
@@ -49,9 +56,9 @@ impl WadeClient {
             Address::Shm(namespace) => {
                 Transport::Shm(Shm::open(namespace, vehicle, wait, max_batch, of_transport).ok()?)
             }
-            Address::Tcp(_) | Address::Tls(_) | Address::Unix(_) => {
-                Transport::Grpc(Grpc::open(address.url()?, vehicle, max_batch, of_transport).ok()?)
-            }
+            Address::Tcp(_) | Address::Tls(_) | Address::Unix(_) => Transport::Grpc(
+                Grpc::open(address.url()?, vehicle, credentials, max_batch, of_transport).ok()?,
+            ),
         };
         Some(Self { transport, known, max_batch, batch_asked: Mutex::default() })
     }

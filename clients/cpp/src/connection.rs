@@ -12,6 +12,8 @@ use crate::bounded::lock;
 
 /// Pause between two attempts to connect.
 pub const RETRY: Duration = Duration::from_millis(100);
+/// The same where a file or the server's settings have to change first.
+pub const RETRY_REFUSED: Duration = Duration::from_secs(1);
 
 /// The state of a connection, and the wish to end it.
 pub struct Connection {
@@ -103,9 +105,8 @@ pub fn status_of(error: &ClientError) -> WadeStatus {
         ClientError::UnknownVehicle { .. } => WadeStatus::UnknownVehicle,
         ClientError::Layout { .. } => WadeStatus::LayoutMismatch,
         ClientError::Invalid(_) => WadeStatus::InvalidState,
-        ClientError::MixedBatch | ClientError::BatchTooLong { .. } | ClientError::Credentials { .. } => {
-            WadeStatus::InvalidArgument
-        }
+        ClientError::MixedBatch | ClientError::BatchTooLong { .. } => WadeStatus::InvalidArgument,
+        ClientError::Credentials { .. } => WadeStatus::Credentials,
         ClientError::Refused { code, .. } => match code {
             Code::NotFound => WadeStatus::UnknownVehicle,
             // a server without this service is of another version

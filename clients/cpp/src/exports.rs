@@ -4,8 +4,10 @@
 //! Of all of them: a pointer is null or valid for what its type and name say, a text has its end, and a client is null or open.
 #![allow(unsafe_code, clippy::missing_safety_doc, reason = "a C ABI, whose contract is said once")]
 
-use std::ffi::{CStr, CString, c_char};
+use std::ffi::{CStr, CString, OsStr, c_char};
+use std::os::unix::ffi::OsStrExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::slice;
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -18,10 +20,13 @@ use wade_wire::Field;
 use wade_wire::shm::Wait;
 
 use crate::abi::{
-    WADE_ABI_VERSION, WadeBatch, WadeForces, WadeOptions, WadeState, WadeStatus, WadeVehicle, WadeWait,
+    WADE_ABI_VERSION, WadeBatch, WadeCredentials, WadeForces, WadeOptions, WadeState, WadeStatus,
+    WadeVehicle, WadeWait,
 };
 use crate::client::{Jacobian, WadeClient};
 use crate::connection::status_of;
+use crate::convert::write_text;
+use crate::credentials::CredentialFiles;
 use crate::pool::InCall;
 use crate::vehicle;
 
@@ -44,11 +49,66 @@ fn parsed(text: &str) -> Option<Address> {
     text.parse().ok()
 }
 
+/// The path at a pointer; none where it is null or the path is empty.
+///
+/// # Safety
+/// The pointer is null or that of a text with its end.
+unsafe fn path(pointer: *const c_char) -> Option<PathBuf> {
+    // SAFETY: as above.
+    let bytes = (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })?.to_bytes();
+    (!bytes.is_empty()).then(|| OsStr::from_bytes(bytes).into())
+}
+
+/// The files that a caller names; null names none.
+///
+/// # Safety
+/// The pointer is null or valid, and so are its texts.
+unsafe fn files(credentials: *const WadeCredentials) -> Result<CredentialFiles, WadeStatus> {
+    if credentials.is_null() {
+        return Ok(CredentialFiles::default());
+    }
+    // SAFETY: not null, so valid. The size is the first field whatever the size is.
+    if unsafe { credentials.cast::<u32>().read() } as usize != size_of::<WadeCredentials>() {
+        return Err(WadeStatus::AbiMismatch);
+    }
+    // SAFETY: of this size, so the fields are these; the texts are null or have their ends.
+    let [ca, certificate, key, token] = unsafe {
+        let given = &*credentials;
+        [given.ca_file, given.certificate_file, given.key_file, given.token_file].map(|file| path(file))
+    };
+    Ok(CredentialFiles { ca, certificate, key, token })
+}
+
+/// Writes what fits of a text with its end.
+///
+/// # Safety
+/// `buffer` is null or has room for `size` bytes.
+unsafe fn write(text: &str, buffer: *mut c_char, size: usize) {
+    if !buffer.is_null() && size > 0 {
+        // SAFETY: as above.
+        write_text(unsafe { slice::from_raw_parts_mut(buffer, size) }, text);
+    }
+}
+
 /// Opens a client and begins to look for the server; does not wait for it. On WADE_STATUS_OK `*client` must be closed.
 /// Otherwise (WADE_STATUS_ABI_MISMATCH, WADE_STATUS_INVALID_ARGUMENT, WADE_STATUS_INTERNAL) it is null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wade_client_open(
     options: *const WadeOptions,
+    client: *mut *mut WadeClient,
+) -> WadeStatus {
+    // SAFETY: as of the caller.
+    unsafe { wade_client_open_with_credentials(options, std::ptr::null(), client) }
+}
+
+/// As `wade_client_open`, for a server that is reached over TLS or asks who calls. Null credentials name no file.
+///
+/// A file that cannot be used does not keep the client from opening: it is not connected then, with WADE_STATUS_CREDENTIALS, and
+/// `wade_client_reason` names the file.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wade_client_open_with_credentials(
+    options: *const WadeOptions,
+    credentials: *const WadeCredentials,
     client: *mut *mut WadeClient,
 ) -> WadeStatus {
     guarded(|| {
@@ -79,7 +139,12 @@ pub unsafe extern "C" fn wade_client_open(
         let (Some(address), Some(vehicle)) = (address.and_then(parsed), vehicle) else {
             return WadeStatus::InvalidArgument;
         };
-        let Some(opened) = WadeClient::open(&address, vehicle, wait, options.max_batch) else {
+        // SAFETY: null or valid.
+        let files = match unsafe { files(credentials) } {
+            Ok(files) => files,
+            Err(status) => return status,
+        };
+        let Some(opened) = WadeClient::open(&address, vehicle, files, wait, options.max_batch) else {
             return WadeStatus::InvalidArgument;
         };
         // SAFETY: not null, so valid.
@@ -125,10 +190,8 @@ pub unsafe extern "C" fn wade_client_reason(
         let Some(client) = (unsafe { client.as_ref() }) else { return WadeStatus::InvalidArgument };
         let reason = client.connection().reason();
         length = reason.len();
-        if !buffer.is_null() && size > 0 {
-            // SAFETY: there is room for `size` bytes.
-            crate::convert::write_text(unsafe { slice::from_raw_parts_mut(buffer, size) }, &reason);
-        }
+        // SAFETY: null, or with room for `size` bytes.
+        unsafe { write(&reason, buffer, size) };
         WadeStatus::Ok
     });
     length
@@ -228,17 +291,48 @@ pub unsafe extern "C" fn wade_get_vehicle(
     timeout_ns: u64,
     out: *mut WadeVehicle,
 ) -> WadeStatus {
+    let none = std::ptr::null();
+    // SAFETY: as of the caller.
+    unsafe {
+        wade_get_vehicle_with_credentials(address, vehicle, none, timeout_ns, out, std::ptr::null_mut(), 0)
+    }
+}
+
+/// As `wade_get_vehicle`, for a server that is reached over TLS or asks who calls. Null credentials name no file. Where there is no
+/// answer, `reason` gets what fits of a sentence with its end that says why; it may be null.
+#[allow(clippy::too_many_arguments, reason = "C has no owned text to give back")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wade_get_vehicle_with_credentials(
+    address: *const c_char,
+    vehicle: *const c_char,
+    credentials: *const WadeCredentials,
+    timeout_ns: u64,
+    out: *mut WadeVehicle,
+    reason: *mut c_char,
+    reason_size: usize,
+) -> WadeStatus {
     guarded(|| {
+        // SAFETY: null, or with room for so many bytes.
+        let explain = |text: &str| unsafe { write(text, reason, reason_size) };
+        explain("");
         // SAFETY: the texts are null or have their ends; `out` is null or valid.
         let given = unsafe { (text(address).and_then(parsed), text(vehicle), out.as_mut()) };
         let (Some(address), Some(vehicle), Some(out)) = given else { return WadeStatus::InvalidArgument };
+        // SAFETY: null or valid.
+        let files = match unsafe { files(credentials) } {
+            Ok(files) => files,
+            Err(status) => return status,
+        };
         // connecting and asking have half of it each
-        match vehicle::get(address, vehicle.to_owned(), Duration::from_nanos(timeout_ns / 2)) {
+        match vehicle::get(address, vehicle.to_owned(), files, Duration::from_nanos(timeout_ns / 2)) {
             Ok(vehicle) => {
                 *out = *vehicle;
                 WadeStatus::Ok
             }
-            Err(error) => status_of(&error),
+            Err(error) => {
+                explain(&error.to_string());
+                status_of(&error)
+            }
         }
     })
 }
@@ -298,6 +392,7 @@ pub extern "C" fn wade_status_message(status: i32) -> *const c_char {
             c"the program was compiled with a header of another version than the library"
         }
         Some(WadeStatus::Internal) => c"a fault in the client library",
+        Some(WadeStatus::Credentials) => c"a file of the credentials cannot be used",
         None => c"no status of this library",
     };
     message.as_ptr()

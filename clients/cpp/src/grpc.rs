@@ -5,14 +5,16 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::io::unix::AsyncFd;
-use wade_client::{ClientError, Credentials, GrpcLink, Reply, replies};
+use tonic::Code;
+use wade_client::{ClientError, GrpcLink, Reply, replies};
 use wade_core::vehicle::PerWheel;
 use wade_wire::{DERIVATIVES, Field, InvalidState, Problem, State, proto};
 
 use crate::abi::{WADE_SESSION_BEGINS, WadeBatch, WadeForces, WadeState, WadeStatus};
 use crate::bounded::{Budget, lock, lock_until};
 use crate::client::Jacobian;
-use crate::connection::{RETRY, status_of};
+use crate::connection::{RETRY, RETRY_REFUSED, status_of};
+use crate::credentials::CredentialFiles;
 use crate::event::Event;
 use crate::known::Known;
 use crate::skipped::Skipped;
@@ -30,6 +32,7 @@ pub struct Grpc {
 struct Shared {
     url: String,
     vehicle: String,
+    credentials: CredentialFiles,
     known: Arc<Known>,
     turn: Mutex<Turn>,
     /// The question for the worker, of which `asked` tells it.
@@ -85,12 +88,19 @@ struct Batch {
 }
 
 impl Grpc {
-    /// Starts to connect to `http://HOST:PORT` or `unix:PATH`.
-    pub fn open(url: String, vehicle: &str, max_batch: usize, known: Arc<Known>) -> std::io::Result<Self> {
+    /// Starts to connect to `http://HOST:PORT`, `https://HOST:PORT` or `unix:PATH`.
+    pub fn open(
+        url: String,
+        vehicle: &str,
+        credentials: CredentialFiles,
+        max_batch: usize,
+        known: Arc<Known>,
+    ) -> std::io::Result<Self> {
         let batch = Batch { states: Vec::with_capacity(max_batch), forces: Vec::with_capacity(max_batch) };
         let shared = Arc::new(Shared {
             url,
             vehicle: vehicle.to_owned(),
+            credentials,
             known,
             turn: Mutex::default(),
             question: Mutex::default(),
@@ -286,7 +296,14 @@ impl Shared {
                 }
                 Err(error) => {
                     self.known.connection.failed(&error);
-                    tokio::time::sleep(RETRY).await;
+                    let pause = match status_of(&error) {
+                        WadeStatus::Credentials | WadeStatus::Refused => RETRY_REFUSED,
+                        _ => RETRY,
+                    };
+                    tokio::select! {
+                        () = tokio::time::sleep(pause) => {}
+                        stopped = self.stopped(&asked) => return stopped,
+                    }
                 }
             }
         }
@@ -308,8 +325,7 @@ impl Shared {
 
     /// Connects, and sees that the server has the vehicle.
     async fn connect(&self) -> Result<GrpcLink, ClientError> {
-        let mut link =
-            GrpcLink::connect(&self.url, &self.vehicle, LOST_AFTER, &Credentials::default()).await?;
+        let mut link = self.credentials.connect(&self.url, &self.vehicle, LOST_AFTER).await?;
         let vehicle = link.vehicle().await?;
         let turns = |surface: &&proto::Surface| matches!(surface.kind.as_str(), "wheel" | "track");
         self.wheels.store(vehicle.surfaces.iter().filter(turns).count(), Ordering::Release);
@@ -343,9 +359,9 @@ impl Shared {
                 }
             };
             let status = answer.as_ref().map_or_else(status_of, |()| WadeStatus::Ok);
-            let lost = answer.err().filter(|_| {
+            let lost = answer.err().filter(|error| {
                 use WadeStatus::{LayoutMismatch, NoServer, Timeout, UnknownVehicle};
-                matches!(status, Timeout | NoServer | UnknownVehicle | LayoutMismatch)
+                matches!(status, Timeout | NoServer | UnknownVehicle | LayoutMismatch) || is_unwelcome(error)
             });
             // told before the caller goes on
             if let Some(error) = &lost {
@@ -368,6 +384,11 @@ impl Shared {
         batch.forces.extend(answer?.iter().map(WadeForces::from));
         Ok(())
     }
+}
+
+/// Whether the server does not accept what was shown to it: a renewed token or certificate is shown to the next connection.
+fn is_unwelcome(error: &ClientError) -> bool {
+    matches!(error, ClientError::Refused { code: Code::Unauthenticated | Code::PermissionDenied, .. })
 }
 
 /// The forces in a state, and their derivatives where it asks for them: in the stream where it belongs to a session, which has a

@@ -10,6 +10,7 @@ mod bounded;
 mod client;
 mod connection;
 mod convert;
+mod credentials;
 mod event;
 mod exports;
 mod grpc;

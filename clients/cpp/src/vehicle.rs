@@ -3,22 +3,29 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use wade_client::{Address, ClientError, GrpcClient, Method, ShmClient};
+use wade_client::{Address, ClientError, ShmClient};
 use wade_core::effects::Effect;
 use wade_wire::proto;
 use wade_wire::shm::Wait;
 
 use crate::abi::{WADE_MAX_EFFECTS, WADE_MAX_SURFACES, WADE_NAME_SIZE, WadeRange, WadeSurface, WadeVehicle};
 use crate::convert::write_text;
+use crate::credentials::CredentialFiles;
 use crate::worker::Worker;
 
-/// Asks the server at an address, on a thread of its own: whoever calls is not to get a signal.
-pub fn get(address: Address, vehicle: String, timeout: Duration) -> Result<Box<WadeVehicle>, ClientError> {
+/// Asks the server at an address, on a thread of its own: whoever calls is not to get a signal. Connecting has the timeout, and
+/// the answer too.
+pub fn get(
+    address: Address,
+    vehicle: String,
+    credentials: CredentialFiles,
+    timeout: Duration,
+) -> Result<Box<WadeVehicle>, ClientError> {
     let (answer, answered) = channel();
     let failed = |reason: &str| ClientError::NoServer { at: address.to_string(), reason: reason.to_owned() };
     let at = address.clone();
     let ask = move || {
-        let response = described(&at, &vehicle, timeout);
+        let response = described(&at, &vehicle, &credentials, timeout);
         // nobody waits any more where it took too long
         let _ = answer.send(response.map(|response| Box::new(WadeVehicle::from(&response))));
     };
@@ -31,13 +38,21 @@ pub fn get(address: Address, vehicle: String, timeout: Duration) -> Result<Box<W
 fn described(
     address: &Address,
     vehicle: &str,
+    credentials: &CredentialFiles,
     timeout: Duration,
 ) -> Result<proto::GetVehicleResponse, ClientError> {
     if let Address::Shm(namespace) = address {
         return ShmClient::new(vehicle, Wait::Block, timeout).in_namespace(namespace).vehicle();
     }
     let url = address.url().unwrap_or_default();
-    GrpcClient::tcp(&url, vehicle, Method::Unary, timeout)?.vehicle()
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime =
+        runtime.map_err(|error| ClientError::NoServer { at: url.clone(), reason: error.to_string() })?;
+    let answer =
+        runtime.block_on(async { credentials.connect(&url, vehicle, timeout).await?.vehicle().await });
+    // a name that is being looked up is not waited for
+    runtime.shutdown_background();
+    answer
 }
 
 fn vector(vector: &Option<proto::Vector3>) -> [f32; 3] {
