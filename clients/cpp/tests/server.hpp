@@ -59,8 +59,7 @@ class Server {
     tcp_ = "127.0.0.1:" + std::to_string(free_port());
     unix_ = (folder_ / "wade.sock").string();
     namespace_ = "cpp_" + folder_.filename().string().substr(9) + "_" + std::to_string(getpid());
-    std::ofstream(folder_ / "wade.toml") << "[grpc]\nlisten = \"" << tcp_ << "\"\nunix_socket = \"" << unix_
-                                         << "\"\n[shm]\nnamespace = \"" << namespace_ << "\"\n[http]\nlisten = \"\"\n";
+    configure("");
   }
 
   ~Server() {
@@ -71,6 +70,15 @@ class Server {
 
   Server(const Server &) = delete;
   Server &operator=(const Server &) = delete;
+
+  // Has these settings beside its places from the next start on.
+  void configure(const std::string &settings) {
+    std::ofstream(folder_ / "wade.toml") << "[grpc]\nlisten = \"" << tcp_ << "\"\nunix_socket = \"" << unix_
+                                         << "\"\n[shm]\nnamespace = \"" << namespace_ << "\"\n[http]\nlisten = \"\"\n"
+                                         << settings;
+    // over TCP it may ask for more than a test of something else has
+    probe_ = settings.empty() ? tcp_ : "unix:" + unix_;
+  }
 
   // Returns when it answers for a vehicle of the folder.
   void start(const std::filesystem::path &vehicles, const char *vehicle) {
@@ -89,7 +97,7 @@ class Server {
     }
     static wade::Vehicle told;
     const auto end = clock::now() + patience;
-    while (wade::get_vehicle(tcp_.c_str(), vehicle, 2s, told) != wade::Status::ok) {
+    while (wade::get_vehicle(probe_.c_str(), vehicle, 2s, told) != wade::Status::ok) {
       if (clock::now() > end || waitpid(process_, nullptr, WNOHANG) != 0) {
         std::ifstream text(log);
         fail(__FILE__, __LINE__, "no server: " + std::string(std::istreambuf_iterator<char>(text), {}));
@@ -144,10 +152,11 @@ class Server {
 
   const std::filesystem::path &folder() const { return folder_; }
   const std::string &tcp() const { return tcp_; }
+  std::string socket() const { return "unix:" + unix_; }
   std::string shm() const { return "shm:" + namespace_; }
 
   // Every way to it.
-  std::vector<std::string> addresses() const { return {shm(), tcp_, "unix:" + unix_}; }
+  std::vector<std::string> addresses() const { return {shm(), tcp_, socket()}; }
 
  private:
   // The process that serves shared memory.
@@ -161,7 +170,7 @@ class Server {
   }
 
   std::filesystem::path folder_, binary_ = environment("WADE_BIN");
-  std::string tcp_, unix_, namespace_;
+  std::string tcp_, unix_, namespace_, probe_;
   pid_t process_ = 0;
 };
 
