@@ -191,7 +191,7 @@ def plan(body: Body, most: int = 60) -> tuple[Array, float, int]:
 def main(arguments: list[str] | None = None) -> list[dict[str, Any]]:
     """Plans with derivatives and with differences, and tells what each took."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--address", default="127.0.0.1:50051", help="host:port or unix:PATH of a server")
+    parser.add_argument("--address", default="127.0.0.1:50051", help="http[s]://host:port or unix:PATH of a server")
     options = parser.parse_args(arguments)
     results = []
     with wade.GrpcClient(options.address) as client:
