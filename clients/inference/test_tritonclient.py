@@ -9,6 +9,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -35,30 +36,37 @@ def binary() -> Path:
     return max((path for path in built if path.is_file()), key=lambda path: path.stat().st_mtime).resolve()
 
 
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A server of gRPC alone."""
-    folder = tmp_path_factory.mktemp("server")
+@contextmanager
+def served(folder: Path, settings: str, **ssl: object) -> Iterator[str]:
+    """The address of a server of gRPC alone, which tritonclient reaches with such options."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
     (folder / "wade.toml").write_text(
-        f'vehicles = "{ROOT / "vehicles"}"\n[grpc]\nlisten = "{address}"\nunix_socket = ""\nadmin_over_tcp = true\n'
-        '[shm]\nenabled = false\n[http]\nlisten = ""\n'
+        f'vehicles = "{ROOT / "vehicles"}"\n[shm]\nenabled = false\n[http]\nlisten = ""\n'
+        f'[grpc]\nlisten = "{address}"\nunix_socket = ""\n{settings}'
     )
     with (folder / "log").open("wb") as log:
         process = subprocess.Popen([binary(), "serve", "--config", folder / "wade.toml"], stderr=log)
     end = time.monotonic() + 30
-    while not is_ready(address):
-        assert process.poll() is None and time.monotonic() < end, (folder / "log").read_text()
-        time.sleep(0.1)
-    yield address
-    process.terminate()
-    process.wait(20)
+    try:
+        while not is_ready(address, **ssl):
+            assert process.poll() is None and time.monotonic() < end, (folder / "log").read_text()
+            time.sleep(0.1)
+        yield address
+    finally:
+        process.terminate()
+        process.wait(20)
 
 
-def is_ready(address: str) -> bool:
-    with triton.InferenceServerClient(address) as client:
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with served(tmp_path_factory.mktemp("server"), "admin_over_tcp = true\n") as address:
+        yield address
+
+
+def is_ready(address: str, **ssl: object) -> bool:
+    with triton.InferenceServerClient(address, **ssl) as client:
         try:
             return client.is_server_ready()
         except InferenceServerException:
@@ -167,3 +175,32 @@ def test_an_administrator_unloads_and_loads(client: triton.InferenceServerClient
     assert client.is_model_ready("warthog")
     with pytest.raises(InferenceServerException, match="tank"):
         client.load_model("tank")
+
+
+def test_over_tls_a_token_in_a_header_is_answered(client: triton.InferenceServerClient, tmp_path: Path) -> None:
+    def run(*command: str | Path) -> str:
+        return subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path).stdout.strip()
+
+    request = ["-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2"]
+    request += ["-subj", "/CN=wade", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", "key.pem", "-out", "ca.pem"]
+    run("openssl", "req", *request)
+    rig, watcher = (
+        {"authorization": f"Bearer {run(binary(), 'token', role, '--roles', role, '--file', 'tokens.toml')}"}
+        for role in ("query", "observe")
+    )
+    settings = f'[tls]\ncertificate = "{tmp_path}/ca.pem"\nkey = "{tmp_path}/key.pem"\n'
+    settings += f'[access]\ntokens = "{tmp_path}/tokens.toml"\n'
+    ssl = {"ssl": True, "root_certificates": str(tmp_path / "ca.pem")}
+    inputs = [tensor("depth_m", np.linspace(0.06, 0.2, 5))]
+    expected = client.infer("husky", inputs).as_numpy("force_n")
+    with served(tmp_path, settings, **ssl) as address, triton.InferenceServerClient(address, **ssl) as encrypted:
+        # who asks only whether it is there shows nothing
+        assert encrypted.is_server_live() and encrypted.is_server_ready()
+        np.testing.assert_array_equal(encrypted.infer("husky", inputs, headers=rig).as_numpy("force_n"), expected)
+        assert encrypted.get_inference_statistics("husky", headers=watcher).model_stats
+        for headers, status in [(None, "UNAUTHENTICATED"), (watcher, "PERMISSION_DENIED")]:
+            with pytest.raises(InferenceServerException, match="query") as raised:
+                encrypted.infer("husky", inputs, headers=headers)
+            assert status in raised.value.status()
+        with pytest.raises(InferenceServerException, match="administer"):
+            encrypted.unload_model("husky", headers=rig)
