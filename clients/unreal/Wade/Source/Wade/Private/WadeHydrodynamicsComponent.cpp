@@ -16,6 +16,7 @@
 
 #include <limits>
 #include <optional>
+#include <string>
 
 namespace
 {
@@ -71,7 +72,7 @@ void UWadeHydrodynamicsComponent::BeginPlay()
 	}
 	const UWadeSettings* Settings = GetDefault<UWadeSettings>();
 	const TSharedRef<FWadeLink, ESPMode::ThreadSafe> Link =
-		MakeShared<FWadeLink, ESPMode::ThreadSafe>(Settings->Address(), Vehicle, Settings->bPollForAnswers);
+		MakeShared<FWadeLink, ESPMode::ThreadSafe>(WadeConnection(Settings->Address(), Vehicle), Settings->bPollForAnswers);
 	UWadeWorld* WadeWorld = FindWadeWorld();
 	if (!Link->IsOpen() || WadeWorld == nullptr)
 	{
@@ -115,6 +116,11 @@ void UWadeHydrodynamicsComponent::TickComponent(float DeltaTime, ELevelTick Tick
 		return;
 	}
 	TakeOutput();
+	FString Reason;
+	if (Acting->Link->HasNewReason(DeltaTime, Reason))
+	{
+		UE_LOG(LogWade, Warning, TEXT("%s (%s): %s"), *GetOwner()->GetName(), *Vehicle, *Reason);
+	}
 	GiveInput();
 	if (bDrawDebug && Latest.IsValid())
 	{
@@ -311,10 +317,10 @@ void UWadeHydrodynamicsComponent::ReadFromServer()
 		return;
 	}
 	wade_vehicle Answer{};
-	const wade_status Status = wade_get_vehicle(TCHAR_TO_UTF8(*Endpoint), TCHAR_TO_UTF8(*Vehicle), VehicleTimeoutNs, &Answer);
-	if (Status != WADE_STATUS_OK)
+	std::string Reason;
+	if (wade::ask_vehicle(WadeConnection(Endpoint, Vehicle), VehicleTimeoutNs, Answer, Reason) != WADE_STATUS_OK)
 	{
-		UE_LOG(LogWade, Error, TEXT("%s of %s: %s"), *Vehicle, *Endpoint, UTF8_TO_TCHAR(wade_status_message(Status)));
+		UE_LOG(LogWade, Error, TEXT("%s of %s: %s"), *Vehicle, *Endpoint, UTF8_TO_TCHAR(Reason.c_str()));
 		return;
 	}
 	Modify();

@@ -2,6 +2,7 @@
 
 #include "Async/Async.h"
 #include "WadeModule.h"
+#include "WadeSettings.h"
 
 #include <algorithm>
 #include <vector>
@@ -13,22 +14,10 @@ namespace
 	/** States of one request for the table: short enough that the server's other clients do not notice. */
 	constexpr int32 TableBatch = 16;
 
-	wade_status Open(const FString& Address, const FString& Vehicle, uint32 Wait, uint32 MaxBatch, wade_client*& Client)
-	{
-		const FTCHARToUTF8 AddressUtf8(*Address);
-		const FTCHARToUTF8 VehicleUtf8(*Vehicle);
-		wade_options Options = wade_default_options();
-		Options.address = AddressUtf8.Get();
-		Options.vehicle = VehicleUtf8.Get();
-		Options.wait = Wait;
-		Options.max_batch = MaxBatch;
-		return wade_client_open(&Options, &Client);
-	}
-
-	std::shared_ptr<const wade::RestTable> AskForTable(const FString& Address, const FString& Vehicle, const wade::Hull& Hull)
+	std::shared_ptr<const wade::RestTable> AskForTable(const wade::Connection& Connection, const wade::Hull& Hull)
 	{
 		wade_client* Client = nullptr;
-		wade_status Status = Open(Address, Vehicle, WADE_WAIT_BLOCK, TableBatch, Client);
+		wade_status Status = wade::open_client(Connection, WADE_WAIT_BLOCK, TableBatch, Client);
 		if (Status != WADE_STATUS_OK)
 		{
 			return nullptr;
@@ -46,17 +35,30 @@ namespace
 	}
 }
 
-FWadeLink::FWadeLink(const FString& InAddress, const FString& InVehicle, bool bPoll)
-	: Address(InAddress)
-	, Vehicle(InVehicle)
-	, GroupName(TCHAR_TO_UTF8(*(InAddress + TEXT(" ") + InVehicle)))
-	, bBatches(InAddress.StartsWith(TEXT("shm:")))
+wade::Connection WadeConnection(const FString& Address, const FString& Vehicle)
+{
+	const UWadeSettings* Settings = GetDefault<UWadeSettings>();
+	wade::Connection Connection;
+	Connection.address = TCHAR_TO_UTF8(*Address);
+	Connection.vehicle = TCHAR_TO_UTF8(*Vehicle);
+	Connection.ca_file = TCHAR_TO_UTF8(*Settings->CaFile);
+	Connection.certificate_file = TCHAR_TO_UTF8(*Settings->CertificateFile);
+	Connection.key_file = TCHAR_TO_UTF8(*Settings->KeyFile);
+	Connection.token_file = TCHAR_TO_UTF8(*Settings->TokenFile);
+	return Connection;
+}
+
+FWadeLink::FWadeLink(const wade::Connection& InConnection, bool bPoll)
+	: Connection(InConnection)
+	, GroupName(InConnection.address + " " + InConnection.vehicle)
+	, bBatches(InConnection.address.rfind("shm:", 0) == 0)
 {
 	const uint32 MaxBatch = bBatches ? uint32(wade::Fleet::most_in_batch) : 0;
-	const wade_status Status = Open(Address, Vehicle, bPoll ? WADE_WAIT_SPIN : WADE_WAIT_BLOCK, MaxBatch, Client);
+	const wade_status Status = wade::open_client(Connection, bPoll ? WADE_WAIT_SPIN : WADE_WAIT_BLOCK, MaxBatch, Client);
 	if (Status != WADE_STATUS_OK)
 	{
-		UE_LOG(LogWade, Error, TEXT("%s at %s: %s"), *Vehicle, *Address, UTF8_TO_TCHAR(wade_status_message(Status)));
+		UE_LOG(LogWade, Error, TEXT("%s at %s: %s"), UTF8_TO_TCHAR(Connection.vehicle.c_str()),
+			UTF8_TO_TCHAR(Connection.address.c_str()), UTF8_TO_TCHAR(wade_status_message(Status)));
 	}
 }
 
@@ -78,11 +80,20 @@ wade_status FWadeLink::EvaluateBatch(const wade_state* States, size_t Count, uin
 	return wade_evaluate_batch(Client, States, Count, BudgetNs, Forces, nullptr);
 }
 
-FString FWadeLink::Reason() const
+FString FWadeLink::Reason()
 {
-	char Text[256] = {};
-	wade_client_reason(Client, Text, sizeof(Text));
-	return FString(UTF8_TO_TCHAR(Text));
+	return FString(UTF8_TO_TCHAR(LastReason.read(Client).c_str()));
+}
+
+bool FWadeLink::HasNewReason(double Time, FString& NewReason)
+{
+	const std::string* Changed = LastReason.changes(Client, Time);
+	if (Changed == nullptr)
+	{
+		return false;
+	}
+	NewReason = FString(UTF8_TO_TCHAR(Changed->c_str()));
+	return true;
 }
 
 void FWadeLink::RefreshTable(uint32 BundleVersion, const wade::Hull& Hull)
@@ -91,9 +102,9 @@ void FWadeLink::RefreshTable(uint32 BundleVersion, const wade::Hull& Hull)
 	{
 		return;
 	}
-	Asked = Async(EAsyncExecution::ThreadPool, [Where = Address, Whom = Vehicle, Hull]
+	Asked = Async(EAsyncExecution::ThreadPool, [Where = Connection, Hull]
 	{
-		return AskForTable(Where, Whom, Hull);
+		return AskForTable(Where, Hull);
 	});
 }
 

@@ -4,16 +4,20 @@
 
 #include "CoreMinimal.h"
 #include "Async/Future.h"
+#include "core/connection.h"
 #include "core/fleet.h"
 
 #include <memory>
 #include <string>
 
+/** A vehicle at an address, with the files of the project's settings. */
+wade::Connection WadeConnection(const FString& Address, const FString& Vehicle);
+
 class FWadeLink
 {
 public:
 	/** Opens the client; does not wait for the server. On failure the log says why and `IsOpen` is false. */
-	FWadeLink(const FString& Address, const FString& Vehicle, bool bPoll);
+	FWadeLink(const wade::Connection& Connection, bool bPoll);
 	/** Closes in the background: closing may take as long as opening a connection does. */
 	~FWadeLink();
 
@@ -31,8 +35,12 @@ public:
 	/** Vehicles of one group are one name on one server. */
 	const std::string& Group() const { return GroupName; }
 
-	/** Why there is no connection. */
-	FString Reason() const;
+	/** Why there is no connection. Game thread. */
+	FString Reason();
+
+	/** Whether there is another reason than the last that was read, looked at once a second. `Time`: since the call before [s]. Game
+	 *  thread. */
+	bool HasNewReason(double Time, FString& NewReason);
 
 	/** Asks, in the background, for the rest loads of the bundle that answers now, unless that is known or under way. Game thread. */
 	void RefreshTable(uint32 BundleVersion, const wade::Hull& Hull);
@@ -41,8 +49,8 @@ public:
 	std::shared_ptr<const wade::RestTable> Table();
 
 private:
-	FString Address;
-	FString Vehicle;
+	wade::Connection Connection;
+	wade::ConnectionReason LastReason;
 	std::string GroupName;
 	bool bBatches = false;
 	wade_client* Client = nullptr;

@@ -31,13 +31,30 @@ public:
 	UPROPERTY(EditAnywhere, Config, Category = "Server", meta = (EditCondition = "Transport == EWadeTransport::SharedMemory"))
 	FString Namespace = TEXT("wade");
 
-	/** Host and port of gRPC; also asked for a vehicle's dimensions in the editor, whatever the transport. */
+	/** Host and port of gRPC, with https:// before them where the server speaks TLS; also asked for a vehicle's dimensions in the editor, whatever the transport. */
 	UPROPERTY(EditAnywhere, Config, Category = "Server")
 	FString Endpoint = TEXT("127.0.0.1:50051");
 
 	/** Path of the Unix socket. */
 	UPROPERTY(EditAnywhere, Config, Category = "Server", meta = (EditCondition = "Transport == EWadeTransport::UnixSocket"))
 	FString SocketPath = TEXT("/tmp/wade.sock");
+
+	/** For the endpoint: absolute path of a PEM file of the authorities whose servers are believed. Empty: those of the system. */
+	UPROPERTY(EditAnywhere, Config, Category = "Security")
+	FString CaFile;
+
+	/** For the endpoint: absolute path of a PEM file of this client's certificate, with those between it and its authority. Empty:
+	 *  none. */
+	UPROPERTY(EditAnywhere, Config, Category = "Security")
+	FString CertificateFile;
+
+	/** Absolute path of the PEM file of the certificate's private key. */
+	UPROPERTY(EditAnywhere, Config, Category = "Security")
+	FString KeyFile;
+
+	/** For the endpoint: absolute path of a file with a token, as `wade token` prints it. Empty: none. */
+	UPROPERTY(EditAnywhere, Config, Category = "Security")
+	FString TokenFile;
 
 	/** Polls for an answer instead of sleeping: faster by the time it takes to wake up, for the price of a core. */
 	UPROPERTY(EditAnywhere, Config, Category = "Server", meta = (EditCondition = "Transport == EWadeTransport::SharedMemory"))
