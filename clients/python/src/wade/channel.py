@@ -25,6 +25,9 @@ _MAX_FILE = 1 << 20
 
 _HTTP, _HTTPS = "http://", "https://"
 
+#: What versions of grpcio say where the server closed a connection instead of beginning with HTTP/2.
+_CLOSED = ("Socket closed", "Connection reset", "Unwrap failed", "Secure read failed")
+
 #: What a header carries: visible ASCII.
 _TOKEN = re.compile(r"[!-~]+")
 
@@ -183,7 +186,7 @@ class Endpoint:
         return reason if meaning is None else f"{meaning} ({reason})"
 
     def _meaning(self, reason: str) -> str | None:
-        closed = any(sign in reason for sign in ("Socket closed", "Connection reset", "TSI_DATA_CORRUPTED"))
+        closed = any(sign in reason for sign in _CLOSED)
         if not reason.startswith("failed to connect"):
             return None
         if self.tls is None:
