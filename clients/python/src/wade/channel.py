@@ -27,6 +27,8 @@ _HTTP, _HTTPS = "http://", "https://"
 
 #: What versions of grpcio say where the server closed a connection instead of beginning with HTTP/2.
 _CLOSED = ("Socket closed", "Connection reset", "Unwrap failed", "Secure read failed")
+#: What they say where the certificates or the key cannot be used.
+_NO_CREDENTIALS = ("empty address list", "create security handshaker")
 
 #: What a header carries: visible ASCII.
 _TOKEN = re.compile(r"[!-~]+")
@@ -187,7 +189,7 @@ class Endpoint:
 
     def _meaning(self, reason: str) -> str | None:
         closed = any(sign in reason for sign in _CLOSED)
-        if not reason.startswith("failed to connect"):
+        if not reason.startswith(("failed to connect", _NO_CREDENTIALS[0])):
             return None
         if self.tls is None:
             tcp = not self.address.startswith("unix:")
@@ -200,7 +202,7 @@ class Endpoint:
             return "its certificate is of no trusted authority; Tls(root_certificates=) or WADE_CA names one"
         if "WRONG_VERSION_NUMBER" in reason:
             return f"it does not speak TLS; http://{self.address} is not encrypted"
-        if "create security handshaker" in reason:
+        if any(sign in reason for sign in _NO_CREDENTIALS):
             return "the certificates or the key given are not PEM, or the key is of another certificate"
         if closed and self.tls.certificate_chain is not None:
             return "it may not accept this client's certificate"
