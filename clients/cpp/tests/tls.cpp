@@ -182,7 +182,7 @@ void files_that_cannot_be_used(const Server &server, const Authority &authority)
   wrong({ca, "", "", missing}, {"token", missing, "No such file"});
   wrong({ca, "", "", empty}, {"token", empty});
   wrong({ca, "", "", ca}, {"token", ca});
-  // 192.0.2.1 is nobody's: nothing is sent there
+  // 192.0.2.1 has no host: nothing is sent there
   const std::string elsewhere = "192.0.2.1:50051";
   refused(elsewhere, {"", "", "", token}, Status::credentials, {"token", token, "https://"});
   refused(elsewhere, {ca, "", "", ""}, Status::credentials, {"CA", ca, "https://"});
