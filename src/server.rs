@@ -26,6 +26,7 @@ use crate::metrics::Metrics;
 use crate::service::access::{Acceptor, Access, FileError, Protocol};
 use crate::service::accounts::Accounts;
 use crate::service::admin::{LoadError, Reloader};
+use crate::service::bulk::{Bulk, give_way};
 use crate::service::grpc::{self, GrpcError, Listeners};
 use crate::service::health::{Health, Part, State};
 use crate::service::http::{self, HttpError};
@@ -112,6 +113,8 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     let acceptor = |protocol, insecure| Acceptor::new(&access, protocol, insecure, handshakes.handle());
     let grpc_acceptor = acceptor(Protocol::Http2, config.grpc.insecure);
     let http_acceptor = acceptor(Protocol::Http1, config.http.insecure);
+    let workers = (0..config.grpc.threads).map(|_| self::runtime()).collect::<std::io::Result<Vec<_>>>()?;
+    let bulk = Arc::new(Bulk::new(workers.iter().map(|worker| worker.handle().clone()).collect()));
     let (stop, stopped) = watch::channel(false);
     let (stop_http, http_stopped) = watch::channel(false);
     let mut running = Running {
@@ -120,6 +123,7 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
             shared.clone(),
             Arc::clone(&accounts),
             grpc_acceptor.clone(),
+            bulk,
         ))?),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         health: Arc::clone(&health),
@@ -139,6 +143,9 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         failed: Arc::new(AtomicBool::new(false)),
     };
     running.spawn_handshakes(handshakes, http_stopped.clone())?;
+    for worker in workers {
+        running.spawn_bulk(worker, http_stopped.clone())?;
+    }
     for _ in 0..config.grpc.threads {
         running.spawn_grpc(stopped.clone())?;
     }
@@ -274,6 +281,17 @@ impl Running {
         Ok(())
     }
 
+    /// A thread of long work, which goes on until the calls that wait for it have their answers.
+    fn spawn_bulk(&mut self, worker: Runtime, stop: watch::Receiver<bool>) -> Result<(), StartError> {
+        let thread = self.spawn("wade-bulk", move || {
+            give_way();
+            worker.block_on(stopped(stop));
+            worker.shutdown_background();
+        })?;
+        self.housekeeping.push(thread);
+        Ok(())
+    }
+
     /// HTTP and the turning of the latency windows, away from the threads that answer queries.
     fn spawn_housekeeping(
         &mut self,
@@ -288,6 +306,7 @@ impl Running {
         // queries are answered until the last connection has its answer
         let (ended, end) = watch::channel(false);
         let thread = self.spawn("wade-http", move || {
+            give_way();
             let rotating = async {
                 let mut ticks = tokio::time::interval(window);
                 ticks.tick().await;

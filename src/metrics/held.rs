@@ -18,6 +18,7 @@ wade_core::named_enum! {
         connections,
         http_connections,
         requests,
+        batches,
         probes,
         streams,
         bytes,

@@ -24,6 +24,7 @@ pub use tls::{Config as TlsConfig, Protocol};
 pub use tokens::{Token, TokenFileError};
 
 use super::accounts::{Closed, Connection};
+use super::bulk::Owned;
 use super::intake::Socket;
 use super::{grpc, stopped};
 use crate::metrics::Metrics;
@@ -332,7 +333,7 @@ impl Acceptor {
             (Socket::Tcp(stream), Some(handshakes), Some(keys)) => {
                 let accepting = keys.load().accept(self.protocol, stream);
                 // dropped with the wait, the handshake ends too
-                let mut task = AbortOnDrop(handshakes.spawn(accepting));
+                let mut task = Owned(handshakes.spawn(accepting));
                 let stream = (&mut task.0).await.map_err(std::io::Error::other)??;
                 let leaf = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
                 let names = leaf.map(|leaf| names::names_in(leaf)).unwrap_or_default();
@@ -378,14 +379,6 @@ impl Acceptor {
             }
             _ => Ok(Socket::Tcp(stream)),
         }
-    }
-}
-
-struct AbortOnDrop<T>(tokio::task::JoinHandle<T>);
-
-impl<T> Drop for AbortOnDrop<T> {
-    fn drop(&mut self) {
-        self.0.abort();
     }
 }
 

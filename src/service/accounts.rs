@@ -79,8 +79,8 @@ impl Limits {
         match resource {
             Resource::connections => self.connections,
             Resource::http_connections => self.http_connections,
-            // probes are short; those who ask must not wait behind queries, nor take their places
-            Resource::requests | Resource::probes => self.requests,
+            // each has places of its own: probes and single queries are short, and must not wait behind batches
+            Resource::requests | Resource::batches | Resource::probes => self.requests,
             Resource::streams => self.streams,
             Resource::bytes => self.bytes,
         }

@@ -59,6 +59,10 @@ pub(super) fn answer_state(
     })
 }
 
+/// When a request arrived that is answered by another thread than that which read it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrived(pub(super) Instant);
+
 /// One request from its arrival to its answer: deadline, metrics and, where asked for, a line in the log.
 pub(super) struct Call<'s> {
     shared: &'s Shared,
@@ -69,7 +73,7 @@ pub(super) struct Call<'s> {
 
 impl<'s> Call<'s> {
     pub(super) fn begin<T>(shared: &'s Shared, transport: Transport, request: &Request<T>) -> Self {
-        let arrived = Instant::now();
+        let arrived = request.extensions().get().map_or_else(Instant::now, |Arrived(arrived)| *arrived);
         let header = request.metadata().get("grpc-timeout").and_then(|header| header.to_str().ok());
         let deadline = header.and_then(timeout).and_then(|timeout| arrived.checked_add(timeout));
         Self { shared, transport, arrived, deadline }

@@ -4,6 +4,7 @@ mod authority;
 mod calls;
 mod frames;
 mod handlers;
+mod heavy;
 mod inference;
 mod link;
 mod serving;
@@ -30,6 +31,7 @@ use self::turns::Turnstile;
 use super::access::Acceptor;
 use super::accounts::{Accounts, Connection};
 use super::admin::Jobs;
+use super::bulk::Bulk;
 use super::call::Shared;
 use super::health::{Health, Part, State};
 use super::intake::{self, Listener};
@@ -51,7 +53,7 @@ pub struct Config {
     pub insecure: bool,
     /// Path of the Unix socket; an empty string turns it off.
     pub unix_socket: PathBuf,
-    /// Threads, each with a runtime of its own that computes where it reads.
+    /// Threads, each with a runtime of its own that computes where it reads, and as many for long work.
     pub threads: usize,
     /// Largest request [bytes].
     pub max_message_bytes: usize,
@@ -59,7 +61,7 @@ pub struct Config {
     pub max_batch: usize,
     /// Most connections at a time.
     pub max_connections: usize,
-    /// Most requests at a time, from their first byte until the last byte of their answers has left.
+    /// Most requests at a time, from their first byte until the last byte of their answers has left; and most batches.
     pub max_requests: usize,
     /// Most streams open at a time.
     pub max_streams: usize,
@@ -233,6 +235,7 @@ pub struct Server {
     turnstile: Turnstile,
     health: HealthReporter,
     acceptor: Acceptor,
+    bulk: Arc<Bulk>,
 }
 
 impl Server {
@@ -242,11 +245,12 @@ impl Server {
         shared: Shared,
         accounts: Arc<Accounts>,
         acceptor: Acceptor,
+        bulk: Arc<Bulk>,
     ) -> std::io::Result<Self> {
         let jobs = Jobs::start(Arc::clone(&shared.reloader))?;
         let gate = Arc::new(Semaphore::new(config.threads));
         let (turnstile, health) = (Turnstile::new(), HealthReporter::new());
-        let server = Self { config, shared, accounts, jobs, gate, turnstile, health, acceptor };
+        let server = Self { config, shared, accounts, jobs, gate, turnstile, health, acceptor, bulk };
         // the crate registers the empty name as SERVING, and nothing is served yet
         for service in HEALTH_NAMES {
             server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
@@ -273,7 +277,11 @@ impl Server {
         }
     }
 
-    fn routes(&self, names: handlers::Names, stop: &watch::Receiver<bool>) -> Result<Routes, GrpcError> {
+    fn routes(
+        &self,
+        names: handlers::Names,
+        stop: &watch::Receiver<bool>,
+    ) -> Result<(Routes, heavy::HeavyCalls), GrpcError> {
         let limit = self.config.max_message_bytes;
         let handlers = handlers::Handlers {
             shared: self.shared.clone(),
@@ -284,6 +292,8 @@ impl Server {
         let admin = AdminServer::new(handlers::AdminHandlers { jobs: Arc::clone(&self.jobs) });
         let inference =
             inference::InferenceHandlers { handlers: handlers.clone(), jobs: Arc::clone(&self.jobs) };
+        let bulk = Arc::clone(&self.bulk);
+        let heavy = heavy::HeavyCalls { handlers: inference.clone(), bulk, limit };
         let health = HealthServer::new(HealthService::from_health_reporter(self.health.clone()));
         let reflection = || {
             tonic_reflection::server::Builder::configure()
@@ -302,7 +312,7 @@ impl Server {
             .add_service(limited!(health))
             .add_service(limited!(reflection().build_v1()?))
             .add_service(limited!(reflection().build_v1alpha()?));
-        Ok(routes.prepare())
+        Ok((routes.prepare(), heavy))
     }
 
     /// Serves the listeners on the current runtime until `stop` turns true and what is in flight is answered.
@@ -338,8 +348,10 @@ impl Server {
         stop: &watch::Receiver<bool>,
         open: &mpsc::Sender<()>,
     ) -> Result<(), GrpcError> {
+        let (routes, heavy) = self.routes(names, stop)?;
         let rules = Arc::new(calls::Rules {
             acceptor: self.acceptor.clone(),
+            heavy,
             request: Duration::from_secs_f64(self.config.request_s),
             stream_idle: Duration::from_secs_f64(self.config.stream_idle_s),
             gate: Arc::clone(&self.gate),
@@ -347,7 +359,7 @@ impl Server {
             stop: stop.clone(),
             names,
         });
-        let (routes, http) = (self.routes(names, stop)?, serving::builder(&self.config));
+        let http = serving::builder(&self.config);
         let (deadlines, frames) = (serving::Deadlines::of(&self.config), self.config.control_frames_per_s);
         let accounts = Arc::clone(&self.accounts);
         let serve = |socket, connection: Arc<Connection>, place| {

@@ -5,6 +5,7 @@ pub mod accounts;
 pub mod admin;
 pub mod answer;
 mod batch;
+pub(crate) mod bulk;
 pub mod call;
 pub mod grpc;
 pub mod health;

@@ -164,7 +164,7 @@ def test_what_is_wrong_with_the_environment_is_named(tmp_path: Path, monkeypatch
         wade.Tls(certificate_chain=b"")
 
 
-def test_who_is_not_known_or_has_not_the_role_is_told(guarded: Guarded, opened: Any) -> None:
+def test_an_unknown_caller_or_one_without_the_role_is_refused(guarded: Guarded, opened: Any) -> None:
     tls = guarded.authority.tls()
     for settings, says in [({}, "show a token"), ({"token": UNKNOWN}, "not known")]:
         with opened(guarded.url, tls=tls, **settings) as client:
@@ -184,9 +184,7 @@ def test_who_is_not_known_or_has_not_the_role_is_told(guarded: Guarded, opened: 
         answers(client)
 
 
-def test_whom_tls_does_not_let_through_is_told_why(
-    guarded: Guarded, opened: Any, server: Server, tmp_path: Path
-) -> None:
+def test_a_handshake_that_fails_says_why(guarded: Guarded, opened: Any, server: Server, tmp_path: Path) -> None:
     authority, other = guarded.authority, Authority(tmp_path)
     roots, (rig, rig_key), (_, guest_key) = authority.ca.read_bytes(), authority.files("rig"), authority.files("guest")
     swapped = wade.Tls(roots, rig.read_bytes(), guest_key.read_bytes())

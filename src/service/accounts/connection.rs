@@ -145,7 +145,9 @@ impl Connection {
 
     /// Whether a call is open.
     pub fn has_calls(&self) -> bool {
-        [Resource::requests, Resource::streams, Resource::probes].iter().any(|&r| self.held.get(r) > 0)
+        [Resource::requests, Resource::batches, Resource::streams, Resource::probes]
+            .iter()
+            .any(|&r| self.held.get(r) > 0)
     }
 
     /// Whether the server is at work for this connection, so that it is not the peer that lets others wait.

@@ -9,18 +9,15 @@ use std::sync::mpsc::{self, SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use rustix::process::setpriority_process;
-use rustix::thread::gettid;
 use tokio::sync::oneshot;
 
 use super::{AUDIT, Reloader};
 use crate::service::access::Caller;
+use crate::service::bulk::give_way;
 use wade_wire::Refusal;
 use wade_wire::UnknownVehicle;
 use wade_wire::proto::Reloaded;
 
-/// Niceness of the thread: a tenth of the weight of a query's.
-const NICE: i32 = 10;
 /// Longest pause between two jobs.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
@@ -99,9 +96,7 @@ impl Jobs {
         let worker = Worker { reloader: Arc::clone(&reloader), queue: Arc::default() };
         let queue = Arc::clone(&worker.queue);
         std::thread::Builder::new().name("wade-admin".into()).spawn(move || {
-            if let Err(error) = setpriority_process(Some(gettid()), NICE) {
-                tracing::warn!(%error, "the administrator's jobs run with the priority of queries");
-            }
+            give_way();
             while woken.recv().is_ok() {
                 worker.work();
             }

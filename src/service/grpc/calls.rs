@@ -18,6 +18,7 @@ use tonic::codegen::http::{HeaderMap, Request, Response};
 use tonic::service::Routes;
 
 use super::handlers::Names;
+use super::heavy::{Heavy, HeavyCalls};
 use super::name_the_size_limit;
 use crate::metrics::{Metrics, Resource, Transport};
 use crate::service::access::{Acceptor, Caller, Role, Who};
@@ -32,21 +33,23 @@ struct Method {
     transport: Transport,
     /// The role that it takes; probes take none.
     role: Option<Role>,
+    /// Whether it takes milliseconds.
+    heavy: Option<Heavy>,
 }
 
 impl Method {
     fn of(path: &str, names: &Names) -> Self {
-        let of = |resource, transport| Self { resource, transport, role: Some(Role::Query) };
+        let of = |resource, transport| Self { resource, transport, role: Some(Role::Query), heavy: None };
+        let heavy = |call, transport| Self { heavy: Some(call), ..of(Resource::batches, transport) };
         let observes = |method| Self { role: Some(Role::Observe), ..method };
         let administers = |method| Self { role: Some(Role::Administer), ..method };
         let (request, stream, probe) = (Resource::requests, Resource::streams, Resource::probes);
         match path {
             "/wade.v1.Hydrodynamics/Evaluate" => of(request, names.unary),
-            "/wade.v1.Hydrodynamics/EvaluateBatch" | "/wade.v1.Hydrodynamics/GetStability" => {
-                of(request, names.batch)
-            }
+            "/wade.v1.Hydrodynamics/EvaluateBatch" => heavy(Heavy::Batch, names.batch),
+            "/wade.v1.Hydrodynamics/GetStability" => heavy(Heavy::Stability, names.batch),
             "/wade.v1.Hydrodynamics/Stream" => of(stream, names.stream),
-            "/inference.GRPCInferenceService/ModelInfer" => of(request, names.infer),
+            "/inference.GRPCInferenceService/ModelInfer" => heavy(Heavy::Infer, names.infer),
             "/inference.GRPCInferenceService/ModelStreamInfer" => of(stream, names.infer),
             "/grpc.health.v1.Health/Watch" => Self { role: None, ..of(stream, names.other) },
             "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo"
@@ -82,6 +85,8 @@ pub struct Rules {
     pub names: Names,
     /// Who may make them.
     pub acceptor: Acceptor,
+    /// Who answers what takes milliseconds.
+    pub heavy: HeavyCalls,
     /// Longest time for a request to arrive.
     pub request: Duration,
     /// Longest pause between two requests of a stream.
@@ -142,10 +147,14 @@ impl Calls {
         let request = request.map(|body| Body::new(Received::new(body, &self, method, &computing)));
         // a call that is given up is not computed either
         let _ends = EndsComputing(&computing);
-        let response = match self.routes.call(request).await {
-            Ok(response) => name_the_size_limit(response),
-            Err(never) => match never {},
+        let response = match method.heavy {
+            Some(call) => self.rules.heavy.answer(call, self.connection.peer(), request).await,
+            None => match self.routes.call(request).await {
+                Ok(response) => response,
+                Err(never) => match never {},
+            },
         };
+        let response = name_the_size_limit(response);
         let connection = Arc::clone(&self.connection);
         Ok(response.map(|body| Body::new(Sent::new(body, connection, Some(place)))))
     }

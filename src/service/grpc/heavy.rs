@@ -1,0 +1,187 @@
+//! Calls that take milliseconds, away from the thread that reads: their messages are decoded, answered and encoded where long
+//! work is done. One of a few states is answered at once, as a single query is: the way there and back would take longer.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Instant;
+
+use prost::Message;
+use prost::bytes::{Buf, BufMut, Bytes};
+use tonic::body::Body;
+use tonic::codec::{
+    Codec, CompressionEncoding, DecodeBuf, Decoder, EnabledCompressionEncodings, EncodeBuf, Encoder,
+};
+use tonic::codegen::http;
+use tonic::server::{Grpc, UnaryService};
+use tonic::{Request, Response, Status};
+
+use super::inference::InferenceHandlers;
+use crate::service::accounts::Peer;
+use crate::service::bulk::Bulk;
+use crate::service::call::Arrived;
+use wade_wire::proto;
+use wade_wire::proto::hydrodynamics_server::Hydrodynamics;
+use wade_wire::proto::inference::ModelInferRequest;
+use wade_wire::proto::inference::grpc_inference_service_server::GrpcInferenceService;
+
+/// Longest request that is looked at where it was read [bytes]: decoding it takes a few microseconds.
+const SHORT: usize = 2 << 10;
+/// Most states that are answered where they were read: they take what waiting for another thread may take.
+const FEW_STATES: usize = 16;
+
+/// The calls that take milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Heavy {
+    /// `EvaluateBatch`.
+    Batch,
+    /// `GetStability`.
+    Stability,
+    /// `ModelInfer`.
+    Infer,
+}
+
+/// Who answers them.
+#[derive(Debug, Clone)]
+pub struct HeavyCalls {
+    pub(super) handlers: InferenceHandlers,
+    pub(super) bulk: Arc<Bulk>,
+    /// Longest message [bytes].
+    pub(super) limit: usize,
+}
+
+impl HeavyCalls {
+    /// Answers a call of this peer.
+    pub async fn answer(
+        &self,
+        call: Heavy,
+        peer: Peer,
+        request: http::Request<Body>,
+    ) -> http::Response<Body> {
+        let mut accepted = EnabledCompressionEncodings::default();
+        accepted.enable(CompressionEncoding::Gzip);
+        let mut grpc = Grpc::new(Raw)
+            .apply_compression_config(accepted, EnabledCompressionEncodings::default())
+            .apply_max_message_size_config(Some(self.limit), None);
+        let calls = self.clone();
+        match call {
+            Heavy::Batch => {
+                let answer = |calls: HeavyCalls, request| {
+                    Box::pin(async move { calls.handlers.handlers.evaluate_batch(request).await })
+                        as Answer<_>
+                };
+                grpc.unary(Service { calls, peer, answer }, request).await
+            }
+            Heavy::Stability => {
+                let answer = |calls: HeavyCalls, request| {
+                    Box::pin(async move { calls.handlers.handlers.get_stability(request).await }) as Answer<_>
+                };
+                grpc.unary(Service { calls, peer, answer }, request).await
+            }
+            Heavy::Infer => {
+                let answer = |calls: HeavyCalls, request| {
+                    Box::pin(async move { calls.handlers.model_infer(request).await }) as Answer<_>
+                };
+                grpc.unary(Service { calls, peer, answer }, request).await
+            }
+        }
+    }
+}
+
+type Answer<T> = Pin<Box<dyn Future<Output = Result<Response<T>, Status>> + Send>>;
+
+/// A request that may ask for many states.
+trait States: Message + Default + 'static {
+    /// How many it asks for.
+    fn states(&self) -> usize;
+}
+
+impl States for proto::EvaluateBatchRequest {
+    fn states(&self) -> usize {
+        self.depth_m.len()
+    }
+}
+
+impl States for proto::GetStabilityRequest {
+    fn states(&self) -> usize {
+        self.depth_m.len().saturating_mul(self.speed_mps.len())
+    }
+}
+
+impl States for ModelInferRequest {
+    fn states(&self) -> usize {
+        let rows = self.inputs.iter().filter_map(|input| input.shape.first()).max();
+        rows.map_or(0, |&rows| usize::try_from(rows).unwrap_or(usize::MAX))
+    }
+}
+
+/// One of the calls.
+struct Service<M, R> {
+    calls: HeavyCalls,
+    peer: Peer,
+    answer: fn(HeavyCalls, Request<M>) -> Answer<R>,
+}
+
+impl<M: States, R: Message + 'static> UnaryService<Bytes> for Service<M, R> {
+    type Response = Bytes;
+    type Future = Answer<Bytes>;
+
+    fn call(&mut self, mut request: Request<Bytes>) -> Self::Future {
+        request.extensions_mut().insert(Arrived(Instant::now()));
+        let (calls, peer, answer) = (self.calls.clone(), self.peer, self.answer);
+        Box::pin(async move {
+            let (metadata, extensions, bytes) = request.into_parts();
+            // the bytes are shared, not copied
+            let decode = |bytes: Bytes| M::decode(bytes).map_err(|error| Status::internal(error.to_string()));
+            let known = (bytes.len() <= SHORT).then(|| decode(bytes.clone())).transpose()?;
+            let is_light = known.as_ref().is_some_and(|message| message.states() <= FEW_STATES);
+            let bulk = Arc::clone(&calls.bulk);
+            let work = async move {
+                let message = known.map_or_else(|| decode(bytes), Ok)?;
+                let response = answer(calls, Request::from_parts(metadata, extensions, message)).await?;
+                Ok(response.map(|message| Bytes::from(message.encode_to_vec())))
+            };
+            if is_light {
+                return work.await;
+            }
+            bulk.run(peer, work).await.map_err(|error| Status::unavailable(error.to_string()))?
+        })
+    }
+}
+
+/// Passes messages on as they are.
+struct Raw;
+
+impl Codec for Raw {
+    type Encode = Bytes;
+    type Decode = Bytes;
+    type Encoder = Self;
+    type Decoder = Self;
+
+    fn encoder(&mut self) -> Self {
+        Self
+    }
+
+    fn decoder(&mut self) -> Self {
+        Self
+    }
+}
+
+impl Encoder for Raw {
+    type Item = Bytes;
+    type Error = Status;
+
+    fn encode(&mut self, message: Bytes, buffer: &mut EncodeBuf<'_>) -> Result<(), Status> {
+        buffer.put(message);
+        Ok(())
+    }
+}
+
+impl Decoder for Raw {
+    type Item = Bytes;
+    type Error = Status;
+
+    fn decode(&mut self, buffer: &mut DecodeBuf<'_>) -> Result<Option<Bytes>, Status> {
+        Ok(Some(buffer.copy_to_bytes(buffer.remaining())))
+    }
+}
