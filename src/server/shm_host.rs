@@ -20,17 +20,14 @@ use crate::service::health::{Health, Part, State};
 /// The hidden command that serves shared memory.
 pub(super) const COMMAND: &str = "serve-shm";
 
-/// Pause before the process is started again: the first, and the longest after it was doubled at each failure.
+/// Pause before the process is started again: the first, and the longest after it was doubled at each start that failed.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LAST_PAUSE: Duration = Duration::from_secs(5);
-
-/// A process that has served for this long did not fail at its start.
-const STEADY: Duration = Duration::from_secs(3);
 
 /// How often deadlines are looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// A process that has not opened its services, or answered its own question, for this long is ended; it asks once a second.
+/// A process that has not opened its services, or answered its own question, for this long is ended; it asks four times a second.
 const SILENCE: Duration = Duration::from_secs(6);
 
 /// Longest wait of a reload for the process.
@@ -93,7 +90,12 @@ enum End {
     /// It could not serve.
     Unavailable(String),
     /// It should not have ended.
-    Crashed(String),
+    Crashed {
+        /// Whether it served before.
+        opened: bool,
+        /// What is known of the reason.
+        reason: String,
+    },
 }
 
 /// A process that runs.
@@ -127,22 +129,20 @@ impl Keeper {
     pub(super) fn run(mut self) {
         let (mut pause, mut crashed) = (FIRST_PAUSE, false);
         loop {
-            let start = Instant::now();
             let end = self.serve(crashed);
             self.waiting.clear();
             let reason = match end {
                 End::Stopped => return,
                 End::Unavailable(reason) => reason,
-                End::Crashed(reason) => {
+                End::Crashed { opened, reason } => {
+                    // what others wrote ended it: that costs its clients no more than once
+                    pause = if opened { FIRST_PAUSE } else { pause };
                     crashed = true;
                     reason
                 }
             };
             self.health.set(Part::Shm, State::Unavailable(reason));
             self.metrics.count_shm_restart();
-            if start.elapsed() >= STEADY {
-                pause = FIRST_PAUSE;
-            }
             if self.stops_within(pause) {
                 return;
             }
@@ -201,13 +201,14 @@ impl Keeper {
         }
         // it left everything as it was
         self.former.push(number);
-        End::Crashed(if let Some(reason) = running.unavailable {
+        let reason = if let Some(reason) = running.unavailable {
             reason
         } else if silent {
             "its process did not answer its own question and was ended; it is started again".to_owned()
         } else {
             format!("its process ended{}; it is started again", described(status.ok()))
-        })
+        };
+        End::Crashed { opened: running.opened, reason }
     }
 
     fn start(&self, crashed: bool) -> std::io::Result<Running> {

@@ -17,18 +17,20 @@ use crate::metrics::{Metrics, Transport};
 use crate::service::admin::Reloader;
 use crate::service::shm::{Opening, ShmServer};
 use crate::service::shm_owner::Owner;
-use crate::service::shm_probe::{Own, Probe};
+use crate::service::shm_probe::{Own, Probe, Probed, Pulse, Stall};
 use crate::service::shm_remains::{self, Remains, ServiceFiles};
 use wade_core::model::kernel::Isa;
 use wade_wire::shm::room;
 
 /// How often requests are reported.
 const REPORT: Duration = Duration::from_millis(100);
-/// How often the server is asked by its own client, and how long that waits.
-const ASK: Duration = Duration::from_secs(1);
-const PATIENCE: Duration = Duration::from_secs(1);
+/// How often the thread that answers is looked at.
+const LOOK: Duration = Duration::from_millis(50);
+/// Looks between two questions of the server's own client, and how long it waits where nothing else tells.
+const LOOKS_PER_QUESTION: u32 = 5;
+const PATIENCE: Duration = Duration::from_secs(2);
 /// Questions without an answer, one after the other, after which the services are opened again.
-const UNANSWERED: u32 = 3;
+const UNANSWERED: u32 = 2;
 
 /// Why requests are refused over shared memory, as metrics have it.
 const INVALID: &str = "invalid_argument";
@@ -94,7 +96,8 @@ impl Worker {
         owner.forget_former(server);
         let owner = Arc::new(owner);
         let remains = Remains { crashed, former };
-        let (stop, own) = (Arc::new(AtomicBool::new(false)), Own::default());
+        let (stop, own, pulse) =
+            (Arc::new(AtomicBool::new(false)), Own::default(), Arc::new(Pulse::default()));
         let watching: Arc<Mutex<Option<Watching>>> = Arc::default();
         let counts = Arc::new(Counts::new(Arc::clone(&metrics)));
         let serving = {
@@ -105,7 +108,8 @@ impl Worker {
                 // a panic must not leave a process that serves nothing
                 let _end = EndOfServing(Arc::clone(&stop));
                 let open = |remains| {
-                    let opening = Opening { metrics: Arc::clone(&metrics), remains, own: Arc::clone(&own) };
+                    let (metrics, own, pulse) = (Arc::clone(&metrics), Arc::clone(&own), Arc::clone(&pulse));
+                    let opening = Opening { metrics, remains, own, pulse };
                     ShmServer::new(settings.clone(), Arc::clone(&engine), opening)
                 };
                 let opened = open(remains.clone()).or_else(|error| {
@@ -116,7 +120,7 @@ impl Worker {
                 let server = opened.unwrap_or_else(|error| unavailable(&error));
                 say(&Report::Opened);
                 let (namespace, files) = (settings.namespace, server.files());
-                let thread = start_watching(Watched { namespace, engine, owner, files, own });
+                let thread = start_watching(Watched { namespace, engine, owner, files, own, pulse });
                 *watch.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
                 start_reporting(counts);
                 if !crashed {
@@ -250,6 +254,7 @@ struct Watched {
     owner: Arc<Owner>,
     files: ServiceFiles,
     own: Own,
+    pulse: Arc<Pulse>,
 }
 
 /// A thread that ends, and is waited for, when this is dropped.
@@ -272,15 +277,21 @@ fn start_watching(watched: Watched) -> Watching {
     let (stop, stopped) = channel::<()>();
     let (connected, is_connected) = channel::<()>();
     let thread = start("wade-shm-watch", move || {
-        let mut asking = Asking { probe: None, unanswered: 0 };
+        let stall = Stall::new(Arc::clone(&watched.pulse));
+        let mut asking = Asking { probe: None, unanswered: 0, stall };
         asking.connect(&watched);
         drop(connected);
-        loop {
-            if !watched.owner.is_in_place() || !watched.files.are_in_place() {
-                unavailable(&"its files were removed or replaced by somebody else; they are made again");
+        for look in 0_u32.. {
+            if look.is_multiple_of(LOOKS_PER_QUESTION) {
+                if !watched.owner.is_in_place() || !watched.files.are_in_place() {
+                    unavailable(&"its files were removed or replaced by somebody else; they are made again");
+                }
+                asking.ask(&watched);
             }
-            asking.ask(&watched);
-            if stopped.recv_timeout(ASK) != Err(RecvTimeoutError::Timeout) {
+            if asking.stall.is_there() {
+                std::process::exit(BROKEN);
+            }
+            if stopped.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout) {
                 break;
             }
         }
@@ -293,6 +304,7 @@ fn start_watching(watched: Watched) -> Watching {
 struct Asking {
     probe: Option<(String, Probe)>,
     unanswered: u32,
+    stall: Stall,
 }
 
 impl Asking {
@@ -318,19 +330,21 @@ impl Asking {
     }
 
     fn ask(&mut self, watched: &Watched) {
-        if !self.connect(watched) {
-            return say(&Report::Answered);
+        while self.connect(watched) {
+            let start = Instant::now();
+            let (stall, probe) = (&mut self.stall, self.probe.as_mut());
+            let probed = probe.map_or(Probed::Lost, |(_, probe)| probe.ask(PATIENCE, stall));
+            if probed == Probed::Answered {
+                break;
+            }
+            tracing::debug!(elapsed = ?start.elapsed(), ?probed, "the server's own client has no answer");
+            self.probe = None;
+            self.unanswered += 1;
+            if probed == Probed::Stalled || self.unanswered >= UNANSWERED {
+                std::process::exit(BROKEN);
+            }
         }
-        let start = Instant::now();
-        if self.probe.as_mut().is_some_and(|(_, probe)| probe.is_answered(PATIENCE)) {
-            self.unanswered = 0;
-            return say(&Report::Answered);
-        }
-        tracing::debug!(elapsed = ?start.elapsed(), "the server's own client has no answer");
-        self.probe = None;
-        self.unanswered += 1;
-        if self.unanswered >= UNANSWERED {
-            std::process::exit(BROKEN);
-        }
+        self.unanswered = 0;
+        say(&Report::Answered);
     }
 }

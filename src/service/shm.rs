@@ -18,7 +18,7 @@ use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, MessagingPatt
 use iceoryx2::service::port_factory::event;
 use serde::{Deserialize, Serialize};
 
-use super::shm_probe::Own;
+use super::shm_probe::{Own, Pulse};
 use super::shm_remains::{self, Remains, ServiceFiles};
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
@@ -72,6 +72,9 @@ const ROUNDS_PER_LOOK: u32 = 1 << 10;
 /// Rounds of polling after which the core is offered to others.
 const ROUNDS_PER_YIELD: u32 = 1 << 12;
 
+/// Most requests of a service in one round: more than its clients can have open, which only a forged queue has.
+const MOST_A_ROUND: usize = 1024;
+
 /// Pause after a wait that failed, so that a lasting failure does not spin.
 const PAUSE: Duration = Duration::from_millis(1);
 
@@ -120,6 +123,8 @@ pub(crate) struct Opening {
     pub remains: Remains,
     /// Whose requests are not counted.
     pub own: Own,
+    /// What shows that the server goes on.
+    pub pulse: Arc<Pulse>,
 }
 
 type Request<Q, A> = ActiveRequest<ipc::Service, Q, (), A, ()>;
@@ -166,7 +171,9 @@ where
 
     /// Takes what is waiting; true where there is anything.
     fn take(&mut self) -> bool {
-        while let Some(request) = taken(self.server.receive()) {
+        while self.waiting.len() < MOST_A_ROUND
+            && let Some(request) = taken(self.server.receive())
+        {
             self.waiting.push((Instant::now(), request));
         }
         !self.waiting.is_empty()
@@ -241,12 +248,13 @@ struct Responder {
     /// Listeners of the clients that sleep, by wake key.
     sleepers: HashMap<u64, ListenerKey>,
     own: Own,
+    pulse: Arc<Pulse>,
 }
 
 impl ShmServer {
     /// Opens the services of every vehicle that is served, for the owner of the namespace.
     pub(crate) fn new(config: Config, engine: Arc<Engine>, opening: Opening) -> Result<Self, ShmError> {
-        let Opening { metrics, remains, own } = opening;
+        let Opening { metrics, remains, own, pulse } = opening;
         let names = Names::new(&config.namespace);
         shm_remains::prepare(&names, engine.vehicles().keys(), &remains);
         let node = node().or_else(|_| {
@@ -264,6 +272,7 @@ impl ShmServer {
             done: done.map_err(|error| ShmError::new("the notifier")(&error))?,
             sleepers: HashMap::new(),
             own,
+            pulse,
         };
         let wake = wake.map_err(|error| ShmError::new("the listener")(&error))?;
         let files = ServiceFiles::default();
@@ -320,8 +329,10 @@ impl ShmServer {
     pub fn run(mut self, stop: &AtomicBool) {
         let mut next_housekeeping = Instant::now() + HOUSEKEEPING;
         let mut round = 0_u32;
+        self.responder.pulse.begin();
         while !stop.load(Ordering::Relaxed) {
             round = round.wrapping_add(1);
+            self.responder.pulse.round();
             let idle = !self.answer_round();
             if idle {
                 self.wait(round);
@@ -444,6 +455,7 @@ impl Responder {
         query: &Query,
         page: &mut P,
     ) -> Result<(), InvalidState> {
+        self.pulse.step();
         let run = Run { asker, ports: at.ports, session: query.session };
         let (answer, mut room) = page.parts();
         let asked = query.state().and_then(|state| match (&room, state.jacobian) {

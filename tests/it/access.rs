@@ -165,6 +165,16 @@ fn nothing_older_than_tls_1_3_and_nothing_without_tls_is_answered() {
 }
 
 #[test]
+fn a_listener_that_never_shakes_hands_costs_a_client_its_timeout() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let url = format!("https://{}", listener.local_addr().expect("an address"));
+    let patience = Duration::from_millis(200);
+    let credentials = Authority::new().credentials(None);
+    let error = GrpcClient::connect(&url, "husky", Method::Unary, patience, &credentials).map(drop);
+    assert_eq!(error, Err(ClientError::Timeout(patience)));
+}
+
+#[test]
 fn a_certificate_allows_what_its_names_were_given() {
     let authority = Authority::new();
     authority.signs("server", 2, OURS);
