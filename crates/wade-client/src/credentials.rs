@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use tonic::metadata::{Ascii, MetadataMap, MetadataValue};
-use tonic::transport::{Certificate, ClientTlsConfig, Endpoint, Identity};
+use tonic::transport::{Certificate, Channel, ClientTlsConfig, Endpoint, Identity};
 
 use super::{ClientError, nobody_at};
 
@@ -84,8 +84,15 @@ impl Credentials {
         )
     }
 
-    /// How to connect to `http://HOST:PORT`, `https://HOST:PORT` or `unix:PATH`.
-    pub(crate) fn endpoint(&self, url: &str, timeout: Duration) -> Result<Endpoint, ClientError> {
+    /// Connects to `http://HOST:PORT`, `https://HOST:PORT` or `unix:PATH`, within this time with the handshake of TLS.
+    pub(crate) async fn connect(&self, url: &str, timeout: Duration) -> Result<Channel, ClientError> {
+        let endpoint = self.endpoint(url, timeout)?;
+        let connected = tokio::time::timeout(timeout, endpoint.connect()).await;
+        connected.map_err(|_| ClientError::Timeout(timeout))?.map_err(|error| nobody_at(url, &error))
+    }
+
+    /// How to connect.
+    fn endpoint(&self, url: &str, timeout: Duration) -> Result<Endpoint, ClientError> {
         let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| nobody_at(url, &error))?;
         let endpoint = endpoint.connect_timeout(timeout).tcp_nodelay(true);
         if !url.starts_with("https://") {

@@ -8,7 +8,7 @@ use tonic::Request;
 
 use super::credentials::{Credentials, sign};
 use super::grpc_link::GrpcLink;
-use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply, nobody_at};
+use super::{BaseReply, ClientError, EffectReply, Reply, SurfaceReply};
 use wade_core::domain::{Domain, Outside, Quantity, Range};
 use wade_core::effects::{BoxQuantity, Effect, LeftOut, OutsideBox};
 use wade_wire::proto;
@@ -117,11 +117,11 @@ pub fn reload(
     credentials: &Credentials,
 ) -> Result<Vec<proto::Reloaded>, ClientError> {
     let runtime = runtime(url)?;
-    let endpoint = credentials.endpoint(url, timeout)?.timeout(timeout);
     let mut request = Request::new(request);
+    request.set_timeout(timeout);
     sign(request.metadata_mut(), credentials.authorization()?.as_ref());
     runtime.block_on(async {
-        let mut client = AdminClient::new(endpoint.connect().await.map_err(|error| nobody_at(url, &error))?);
+        let mut client = AdminClient::new(credentials.connect(url, timeout).await?);
         let no_answer = |status: tonic::Status| {
             let message = status.message().to_owned();
             match status.code() {

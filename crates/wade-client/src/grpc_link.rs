@@ -40,8 +40,8 @@ impl GrpcLink {
         timeout: Duration,
         credentials: &Credentials,
     ) -> Result<Self, ClientError> {
-        let (endpoint, authorization) = (credentials.endpoint(url, timeout)?, credentials.authorization()?);
-        let channel = endpoint.connect().await.map_err(|e| nobody_at(url, &e))?;
+        let authorization = credentials.authorization()?;
+        let channel = credentials.connect(url, timeout).await?;
         let client = HydrodynamicsClient::new(channel).max_decoding_message_size(64 << 20);
         let (url, vehicle) = (url.to_owned(), vehicle.to_owned());
         Ok(Self { client, url, vehicle, timeout, authorization, stream: None })
