@@ -17,7 +17,7 @@ use tokio::sync::Notify;
 
 pub use crate::metrics::Closed;
 use crate::metrics::{Metrics, Resource};
-pub use connection::{Computing, Connection};
+pub use connection::{Computing, Connection, Heavy};
 pub use sent::Sent;
 use wade_wire::Overloaded;
 

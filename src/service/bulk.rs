@@ -87,9 +87,13 @@ impl Bulk {
         let right = self.right_of(peer);
         // it is never closed
         let _piece = right.pieces.acquire().await.map_err(io::Error::other)?;
-        let thread = self.next.fetch_add(1, Relaxed) % self.threads.len();
-        let mut task = Owned(self.threads[thread].spawn(work));
+        let mut task = Owned(self.thread().spawn(work));
         (&mut task.0).await.map_err(io::Error::other)
+    }
+
+    /// One of the threads, each in its turn.
+    pub fn thread(&self) -> Handle {
+        self.threads[self.next.fetch_add(1, Relaxed) % self.threads.len()].clone()
     }
 }
 

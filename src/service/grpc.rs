@@ -7,6 +7,7 @@ mod handlers;
 mod heavy;
 mod inference;
 mod link;
+mod moving;
 mod serving;
 mod stream;
 mod turns;
@@ -19,6 +20,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, mpsc, watch};
 use tonic::codec::CompressionEncoding;
 use tonic::codegen::http;
@@ -359,13 +361,15 @@ impl Server {
             stop: stop.clone(),
             names,
         });
-        let http = serving::builder(&self.config);
+        let reading = moving::Reading(Handle::current());
+        let http = serving::builder(&self.config, reading.clone());
         let (deadlines, frames) = (serving::Deadlines::of(&self.config), self.config.control_frames_per_s);
         let accounts = Arc::clone(&self.accounts);
         let serve = |socket, connection: Arc<Connection>, place| {
             let (routes, rules, turns) = (routes.clone(), Arc::clone(&rules), self.turnstile.turns());
             let (http, stop, open) = (http.clone(), stop.clone(), open.clone());
-            tokio::spawn(async move {
+            let of = Arc::clone(&connection);
+            let serving = async move {
                 if let Some((socket, who)) =
                     rules.acceptor.let_in(socket, &connection, deadlines.handshake).await
                 {
@@ -374,7 +378,8 @@ impl Server {
                     serving::serve(http, serving::Accepted { link, calls, turns }, deadlines, stop).await;
                 }
                 drop((place, open));
-            });
+            };
+            moving::spawn(serving, of, reading.clone(), Arc::clone(&self.bulk));
         };
         tokio::select! {
             () = intake::accept_all(listener, accounts, Resource::connections, serve) => {}

@@ -10,6 +10,9 @@ use super::{Accounts, Closed, Held, Peer, Place};
 use crate::metrics::Resource;
 use wade_wire::Overloaded;
 
+/// How long a connection counts as heavy after its last heavy call: longer than the pause between two of a loop.
+const HEAVY_FOR: Duration = Duration::from_secs(1);
+
 /// One connection.
 #[derive(Debug)]
 pub struct Connection {
@@ -31,6 +34,9 @@ pub struct Connection {
     called: AtomicBool,
     dear_calls: AtomicU32,
     stands_back: AtomicBool,
+    /// Heavy calls under way, and when one last began or ended [ms].
+    heavy: AtomicUsize,
+    heavy_ms: AtomicU64,
     closed: OnceLock<Closed>,
     closing: Notify,
 }
@@ -53,6 +59,8 @@ impl Connection {
             called: AtomicBool::new(false),
             dear_calls: AtomicU32::new(0),
             stands_back: AtomicBool::new(false),
+            heavy: AtomicUsize::new(0),
+            heavy_ms: AtomicU64::new(0),
             closed: OnceLock::new(),
             closing: Notify::new(),
         }
@@ -138,6 +146,12 @@ impl Connection {
         self.stands_back.load(Relaxed)
     }
 
+    /// Whether calls that take milliseconds are under way, or were a moment ago.
+    pub fn is_heavy(&self) -> bool {
+        let last = self.heavy_ms.load(Relaxed);
+        self.heavy.load(Relaxed) > 0 || (last > 0 && self.since(last) < HEAVY_FOR)
+    }
+
     /// Whether anything was ever asked.
     pub fn has_called(&self) -> bool {
         self.called.load(Relaxed)
@@ -213,6 +227,25 @@ impl Connection {
 impl Drop for Connection {
     fn drop(&mut self) {
         self.accounts.forget(self.id, self.peer);
+    }
+}
+
+/// Says while it lives that a call which takes milliseconds is under way.
+#[derive(Debug)]
+pub struct Heavy(Arc<Connection>);
+
+impl Heavy {
+    /// The call begins.
+    pub fn begin(connection: &Arc<Connection>) -> Self {
+        connection.heavy.fetch_add(1, Relaxed);
+        Self(Arc::clone(connection))
+    }
+}
+
+impl Drop for Heavy {
+    fn drop(&mut self) {
+        self.0.heavy_ms.store(self.0.accounts.now_ms().max(1), Relaxed);
+        self.0.heavy.fetch_sub(1, Relaxed);
     }
 }
 

@@ -148,7 +148,7 @@ impl Calls {
         // a call that is given up is not computed either
         let _ends = EndsComputing(&computing);
         let response = match method.heavy {
-            Some(call) => self.rules.heavy.answer(call, self.connection.peer(), request).await,
+            Some(call) => self.rules.heavy.answer(call, &self.connection, request).await,
             None => match self.routes.call(request).await {
                 Ok(response) => response,
                 Err(never) => match never {},

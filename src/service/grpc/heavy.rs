@@ -4,10 +4,12 @@
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Instant;
 
+use hyper::body::{Body as HttpBody, Frame};
 use prost::Message;
-use prost::bytes::{Buf, BufMut, Bytes};
+use prost::bytes::{Buf, BufMut, Bytes, BytesMut};
 use tonic::body::Body;
 use tonic::codec::{
     Codec, CompressionEncoding, DecodeBuf, Decoder, EnabledCompressionEncodings, EncodeBuf, Encoder,
@@ -17,7 +19,7 @@ use tonic::server::{Grpc, UnaryService};
 use tonic::{Request, Response, Status};
 
 use super::inference::InferenceHandlers;
-use crate::service::accounts::Peer;
+use crate::service::accounts::{Connection, Heavy as UnderWay};
 use crate::service::bulk::Bulk;
 use crate::service::call::Arrived;
 use wade_wire::proto;
@@ -51,11 +53,11 @@ pub struct HeavyCalls {
 }
 
 impl HeavyCalls {
-    /// Answers a call of this peer.
+    /// Answers a call of this connection.
     pub async fn answer(
         &self,
         call: Heavy,
-        peer: Peer,
+        connection: &Arc<Connection>,
         request: http::Request<Body>,
     ) -> http::Response<Body> {
         let mut accepted = EnabledCompressionEncodings::default();
@@ -63,27 +65,31 @@ impl HeavyCalls {
         let mut grpc = Grpc::new(Raw)
             .apply_compression_config(accepted, EnabledCompressionEncodings::default())
             .apply_max_message_size_config(Some(self.limit), None);
-        let calls = self.clone();
-        match call {
+        let (calls, connection) = (self.clone(), Arc::clone(connection));
+        let mut response = match call {
             Heavy::Batch => {
                 let answer = |calls: HeavyCalls, request| {
                     Box::pin(async move { calls.handlers.handlers.evaluate_batch(request).await })
                         as Answer<_>
                 };
-                grpc.unary(Service { calls, peer, answer }, request).await
+                grpc.unary(Service { calls, connection, answer }, request).await
             }
             Heavy::Stability => {
                 let answer = |calls: HeavyCalls, request| {
                     Box::pin(async move { calls.handlers.handlers.get_stability(request).await }) as Answer<_>
                 };
-                grpc.unary(Service { calls, peer, answer }, request).await
+                grpc.unary(Service { calls, connection, answer }, request).await
             }
             Heavy::Infer => {
                 let answer = |calls: HeavyCalls, request| {
                     Box::pin(async move { calls.handlers.model_infer(request).await }) as Answer<_>
                 };
-                grpc.unary(Service { calls, peer, answer }, request).await
+                grpc.unary(Service { calls, connection, answer }, request).await
             }
+        };
+        match response.extensions_mut().remove::<Encoded>() {
+            Some(encoded) => response.map(|_| Body::new(encoded)),
+            None => response,
         }
     }
 }
@@ -118,7 +124,7 @@ impl States for ModelInferRequest {
 /// One of the calls.
 struct Service<M, R> {
     calls: HeavyCalls,
-    peer: Peer,
+    connection: Arc<Connection>,
     answer: fn(HeavyCalls, Request<M>) -> Answer<R>,
 }
 
@@ -128,7 +134,7 @@ impl<M: States, R: Message + 'static> UnaryService<Bytes> for Service<M, R> {
 
     fn call(&mut self, mut request: Request<Bytes>) -> Self::Future {
         request.extensions_mut().insert(Arrived(Instant::now()));
-        let (calls, peer, answer) = (self.calls.clone(), self.peer, self.answer);
+        let (calls, connection, answer) = (self.calls.clone(), Arc::clone(&self.connection), self.answer);
         Box::pin(async move {
             let (metadata, extensions, bytes) = request.into_parts();
             // the bytes are shared, not copied
@@ -139,13 +145,64 @@ impl<M: States, R: Message + 'static> UnaryService<Bytes> for Service<M, R> {
             let work = async move {
                 let message = known.map_or_else(|| decode(bytes), Ok)?;
                 let response = answer(calls, Request::from_parts(metadata, extensions, message)).await?;
-                Ok(response.map(|message| Bytes::from(message.encode_to_vec())))
+                let (metadata, message, mut extensions) = response.into_parts();
+                // tonic frames no message, and so copies none
+                extensions.insert(Encoded::new(&message));
+                Ok(Response::from_parts(metadata, Bytes::new(), extensions))
             };
             if is_light {
                 return work.await;
             }
-            bulk.run(peer, work).await.map_err(|error| Status::unavailable(error.to_string()))?
+            let _heavy = UnderWay::begin(&connection);
+            bulk.run(connection.peer(), work).await.map_err(|error| Status::unavailable(error.to_string()))?
         })
+    }
+}
+
+/// Length of what stands before a message: a flag, here of one that is not compressed, and its length [bytes].
+const PREFIX: usize = 5;
+
+/// The body of an answer, encoded where it was computed. It is passed on to the socket without a copy.
+#[derive(Debug, Clone)]
+struct Encoded {
+    message: Option<Bytes>,
+    ended: bool,
+}
+
+impl Encoded {
+    fn new(message: &impl Message) -> Self {
+        let len = message.encoded_len();
+        let mut bytes = BytesMut::with_capacity(PREFIX + len);
+        bytes.put_u8(0);
+        // no message of more than 4 GB is encoded: the longest batch is bounded by that of a request
+        bytes.put_u32(u32::try_from(len).unwrap_or(u32::MAX));
+        // there is room for it
+        let _ = message.encode(&mut bytes);
+        Self { message: Some(bytes.freeze()), ended: false }
+    }
+}
+
+impl HttpBody for Encoded {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        if let Some(message) = self.message.take() {
+            return Poll::Ready(Some(Ok(Frame::data(message))));
+        }
+        if std::mem::replace(&mut self.ended, true) {
+            return Poll::Ready(None);
+        }
+        let mut trailers = http::HeaderMap::new();
+        trailers.insert("grpc-status", http::HeaderValue::from_static("0"));
+        Poll::Ready(Some(Ok(Frame::trailers(trailers))))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.ended
     }
 }
 

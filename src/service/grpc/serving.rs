@@ -7,12 +7,13 @@ use std::task::ready;
 use std::time::{Duration, Instant};
 
 use hyper::server::conn::http2;
-use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
+use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::sync::watch;
 
 use super::Config;
 use super::calls::Calls;
 use super::link::Link;
+use super::moving::Reading;
 use super::turns::Turns;
 use crate::service::accounts::{Closed, Connection};
 use crate::service::stopped;
@@ -72,8 +73,8 @@ impl Deadlines {
 }
 
 /// The settings of HTTP/2.
-pub fn builder(config: &Config) -> http2::Builder<TokioExecutor> {
-    let mut builder = http2::Builder::new(TokioExecutor::new());
+pub fn builder(config: &Config, reading: Reading) -> http2::Builder<Reading> {
+    let mut builder = http2::Builder::new(reading);
     builder
         .timer(TokioTimer::new())
         .initial_stream_window_size(STREAM_WINDOW)
@@ -105,7 +106,7 @@ pub struct Accepted {
 
 /// Serves one connection until it ends, is to be closed, or the server drains and its calls are answered.
 pub async fn serve(
-    http: http2::Builder<TokioExecutor>,
+    http: http2::Builder<Reading>,
     accepted: Accepted,
     deadlines: Deadlines,
     stop: watch::Receiver<bool>,
