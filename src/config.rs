@@ -214,6 +214,11 @@ impl Config {
             "access.certificates names certificates, and no authority is believed",
         )?;
         conflict(
+            tls.believes_clients() && access.certificates.is_empty() && !is_set(&access.tokens),
+            "access.certificates",
+            "tls.client_ca is set, and no certificate is given a role: such as { \"*\" = [\"query\"] }",
+        )?;
+        conflict(
             self.grpc.admin_over_tcp && (tls.believes_clients() || is_set(&access.tokens)),
             "grpc.admin_over_tcp",
             "lets everybody administer although callers show who they are: give the role administer instead",

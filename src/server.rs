@@ -36,6 +36,9 @@ use wade_core::model::kernel::Isa;
 /// Longest time for answers over HTTP that are under way when everything else has ended.
 const HTTP_DRAIN: Duration = Duration::from_secs(1);
 
+/// Longest time for connections to end that are closed at the drain's bound.
+const GOODBYE: Duration = Duration::from_millis(500);
+
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
@@ -258,7 +261,14 @@ impl Running {
             match outcome {
                 Some(Err(error)) => tracing::error!(%error, "gRPC ended"),
                 Some(Ok(())) => {}
-                None => tracing::warn!(?drain, "connections were still open at the drain's bound: closed"),
+                None => {
+                    tracing::warn!(?drain, "connections were still open at the drain's bound: closed");
+                    // some are served by a thread of long work, and wait by this one's clock
+                    let closing = async { tokio::time::timeout(GOODBYE, server.close_all()).await };
+                    if runtime.block_on(closing).is_err() {
+                        tracing::warn!("some of them did not end");
+                    }
+                }
             }
             runtime.shutdown_background();
         })?;
@@ -274,6 +284,7 @@ impl Running {
         }
         let access = Arc::clone(&self.access);
         let thread = self.spawn("wade-tls", move || {
+            give_way();
             runtime.block_on(access.follow_files(stop));
             runtime.shutdown_background();
         })?;

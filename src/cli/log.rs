@@ -55,6 +55,11 @@ pub fn ready(config: &Config, running: &Running, elapsed: Duration) {
         let form = if grpc { format!("https://{address}") } else { address.to_string() };
         tracing::info!(address = form, "gRPC");
         warn_if_open("gRPC", address, grpc);
+        if config.grpc.admin_over_tcp && !address.ip().to_canonical().is_loopback() {
+            tracing::warn!(
+                "gRPC at {address}: whoever reaches it may load and unload vehicles (grpc.admin_over_tcp)"
+            );
+        }
     }
     if let Some(path) = running.unix_path() {
         tracing::info!(address = %format!("unix:{}", path.display()), "gRPC");

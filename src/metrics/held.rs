@@ -21,6 +21,7 @@ wade_core::named_enum! {
         batches,
         probes,
         streams,
+        watches,
         bytes,
     }
 }
@@ -32,6 +33,7 @@ wade_core::named_enum! {
     pub enum Closed {
         no_handshake,
         no_tls,
+        drained,
         no_request,
         idle,
         answer_not_read,

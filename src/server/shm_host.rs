@@ -23,6 +23,11 @@ pub(super) const COMMAND: &str = "serve-shm";
 /// Pause before the process is started again: the first, and the longest after it was doubled at each start that failed.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LAST_PAUSE: Duration = Duration::from_secs(5);
+/// The longest before one is that had served.
+const LAST_PAUSE_OF_OPENED: Duration = Duration::from_millis(400);
+
+/// A process that has served for this long is not in a row of those that end.
+const STEADY: Duration = Duration::from_secs(3);
 
 /// How often deadlines are looked at.
 const LOOK: Duration = Duration::from_millis(50);
@@ -129,20 +134,24 @@ impl Keeper {
     pub(super) fn run(mut self) {
         let (mut pause, mut crashed) = (FIRST_PAUSE, false);
         loop {
+            let start = Instant::now();
             let end = self.serve(crashed);
             self.waiting.clear();
             let reason = match end {
                 End::Stopped => return,
                 End::Unavailable(reason) => reason,
                 End::Crashed { opened, reason } => {
-                    // what others wrote ended it: that costs its clients no more than once
-                    pause = if opened { FIRST_PAUSE } else { pause };
+                    // what others wrote ended it: that costs its clients half a second more at most, however often
+                    pause = if opened { pause.min(LAST_PAUSE_OF_OPENED) } else { pause };
                     crashed = true;
                     reason
                 }
             };
             self.health.set(Part::Shm, State::Unavailable(reason));
             self.metrics.count_shm_restart();
+            if start.elapsed() >= STEADY {
+                pause = FIRST_PAUSE;
+            }
             if self.stops_within(pause) {
                 return;
             }

@@ -31,6 +31,8 @@ const LOOKS_PER_QUESTION: u32 = 5;
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Questions without an answer, one after the other, after which the services are opened again.
 const UNANSWERED: u32 = 2;
+/// The same of questions for which the client could not connect.
+const UNCONNECTED: u32 = 4;
 
 /// Why requests are refused over shared memory, as metrics have it.
 const INVALID: &str = "invalid_argument";
@@ -332,8 +334,15 @@ impl Asking {
     fn ask(&mut self, watched: &Watched) {
         while self.connect(watched) {
             let start = Instant::now();
-            let (stall, probe) = (&mut self.stall, self.probe.as_mut());
-            let probed = probe.map_or(Probed::Lost, |(_, probe)| probe.ask(PATIENCE, stall));
+            let Some((_, probe)) = &mut self.probe else {
+                // a client that cannot connect tries again with the next question
+                self.unanswered += 1;
+                if self.unanswered > UNCONNECTED {
+                    std::process::exit(BROKEN);
+                }
+                return;
+            };
+            let probed = probe.ask(PATIENCE, &mut self.stall);
             if probed == Probed::Answered {
                 break;
             }

@@ -17,8 +17,8 @@ use tonic::{Code, Status};
 use crate::service::access::Acceptor;
 use crate::service::health::{Health, Part, State};
 use crate::service::{grpc, stopped};
-use wade_wire::proto::ListVehiclesRequest;
-use wade_wire::proto::hydrodynamics_client::HydrodynamicsClient;
+use wade_wire::proto::inference::ServerLiveRequest;
+use wade_wire::proto::inference::grpc_inference_service_client::GrpcInferenceServiceClient;
 
 /// How often the server is asked, and how long an answer may take.
 const ASK: Duration = Duration::from_secs(1);
@@ -146,8 +146,9 @@ async fn ask_grpc(asked: &mut Asked<Channel>, acceptor: &Acceptor) -> Result<(),
         Some(channel) => channel,
         None => within(connect(&asked.at, acceptor)).await?,
     };
-    let mut client = HydrodynamicsClient::new(channel.clone());
-    let answer = within(async { Ok(client.list_vehicles(ListVehiclesRequest {}).await) }).await?;
+    // one that takes no role
+    let mut client = GrpcInferenceServiceClient::new(channel.clone());
+    let answer = within(async { Ok(client.server_live(ServerLiveRequest {}).await) }).await?;
     match answer {
         Err(status) if !is_answer(&status) => Err(status.to_string()),
         // a refusal, for one where too much is in flight, is an answer of a server that lives

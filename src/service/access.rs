@@ -36,6 +36,8 @@ use wade_wire::Refusal;
 const LOOK: Duration = Duration::from_secs(2);
 /// Largest file of certificates, a key or tokens [bytes].
 const LARGEST_FILE: u64 = 1 << 20;
+/// Most bytes of answers that are encrypted before the system takes them: one record.
+const ENCRYPTED_AHEAD: usize = 16 << 10;
 /// The name in [`Config::certificates`] that stands for every certificate of the authority.
 const ANY_CERTIFICATE: &str = "*";
 
@@ -140,6 +142,8 @@ impl fmt::Display for Caller {
 /// The settings in force, and the files that they name as they were last read.
 #[derive(Debug)]
 pub struct Access {
+    /// The files as they were before they were first read.
+    first_read: [Option<Stamp>; 4],
     tls_config: TlsConfig,
     config: Config,
     keys: Option<ArcSwap<Keys>>,
@@ -159,6 +163,7 @@ impl Access {
         grpc: &grpc::Config,
         metrics: Arc<Metrics>,
     ) -> Result<Self, FileError> {
+        let first_read = stamps(tls, config);
         let keys = tls.is_on().then(|| Keys::read(tls)).transpose()?;
         let tokens = ArcSwap::from_pointee(Tokens::read(&config.tokens)?);
         if let Some(keys) = &keys {
@@ -172,6 +177,7 @@ impl Access {
             format!("ask unix:{}", path.display())
         };
         Ok(Self {
+            first_read,
             tls_config: tls.clone(),
             config: config.clone(),
             keys,
@@ -215,11 +221,8 @@ impl Access {
 
     /// Reads the files again whenever one of them has changed, until `stop` turns true.
     pub async fn follow_files(&self, stop: watch::Receiver<bool>) {
-        let files = || {
-            let tls = &self.tls_config;
-            [&tls.certificate, &tls.key, &tls.client_ca, &self.config.tokens].map(|path| stamp(path))
-        };
-        let mut before = files();
+        let files = || stamps(&self.tls_config, &self.config);
+        let mut before = self.first_read;
         let mut ticks = tokio::time::interval(LOOK);
         let following = async {
             loop {
@@ -279,11 +282,17 @@ fn note(keys: &Keys, certificate: &Path, metrics: &Metrics) {
     }
 }
 
-/// What changes when a file is replaced: its device, number, length and time.
-fn stamp(path: &Path) -> Option<(u64, u64, u64, i64, i64)> {
+/// What changes when a file is replaced, or who may read it: its device, number, and time of change.
+type Stamp = (u64, u64, i64, i64);
+
+fn stamp(path: &Path) -> Option<Stamp> {
     use std::os::unix::fs::MetadataExt;
     let file = std::fs::metadata(path).ok()?;
-    Some((file.dev(), file.ino(), file.len(), file.mtime(), file.mtime_nsec()))
+    Some((file.dev(), file.ino(), file.ctime(), file.ctime_nsec()))
+}
+
+fn stamps(tls: &TlsConfig, config: &Config) -> [Option<Stamp>; 4] {
+    [&tls.certificate, &tls.key, &tls.client_ca, &config.tokens].map(|path| stamp(path))
 }
 
 /// The token in an authorization header: of the scheme Bearer, or the password of Basic, which is what a browser asks for.
@@ -334,7 +343,8 @@ impl Acceptor {
                 let accepting = keys.load().accept(self.protocol, stream);
                 // dropped with the wait, the handshake ends too
                 let mut task = Owned(handshakes.spawn(accepting));
-                let stream = (&mut task.0).await.map_err(std::io::Error::other)??;
+                let mut stream = (&mut task.0).await.map_err(std::io::Error::other)??;
+                stream.get_mut().1.set_buffer_limit(Some(ENCRYPTED_AHEAD));
                 let leaf = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
                 let names = leaf.map(|leaf| names::names_in(leaf)).unwrap_or_default();
                 Ok((Socket::Tls(Box::new(stream.into())), Who::Network(names.into())))
@@ -344,17 +354,21 @@ impl Acceptor {
         }
     }
 
-    /// The same within this time, unless the connection is to be closed; none where it is over.
+    /// The same within this time, unless the connection is to be closed or the server ends; none where it is over.
     pub async fn let_in(
         &self,
         socket: Socket,
         connection: &Connection,
         within: Duration,
+        stop: watch::Receiver<bool>,
     ) -> Option<(Socket, Who)> {
         let welcome = tokio::time::timeout(within, self.welcome(socket));
         let welcomed = tokio::select! {
+            // without TLS it is there at once, whether or not the server ends
+            biased;
             welcomed = welcome => welcomed,
             _ = connection.closing() => return None,
+            () = stopped(stop) => return None,
         };
         match welcomed {
             Ok(Ok(welcomed)) => Some(welcomed),

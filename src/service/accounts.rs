@@ -81,7 +81,7 @@ impl Limits {
             Resource::http_connections => self.http_connections,
             // each has places of its own: probes and single queries are short, and must not wait behind batches
             Resource::requests | Resource::batches | Resource::probes => self.requests,
-            Resource::streams => self.streams,
+            Resource::streams | Resource::watches => self.streams,
             Resource::bytes => self.bytes,
         }
     }
@@ -267,6 +267,18 @@ impl Accounts {
             victim.close(Closed::made_room);
             true
         })
+    }
+
+    /// Has every gRPC connection closed, and waits until they are.
+    pub async fn close_all(&self) {
+        let open: Vec<_> = self.lock().connections.values().filter_map(Weak::upgrade).collect();
+        for connection in open.iter().filter(|one| one.held.get(Resource::connections) > 0) {
+            connection.close(Closed::drained);
+        }
+        drop(open);
+        while self.total.get(Resource::connections) > 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
     }
 
     /// Whether all places are taken.

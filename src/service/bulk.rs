@@ -47,13 +47,16 @@ pub struct Bulk {
 struct Right<'b> {
     bulk: &'b Bulk,
     peer: Peer,
-    pieces: Arc<Semaphore>,
+    /// There until it is dropped.
+    pieces: Option<Arc<Semaphore>>,
 }
 
 impl Drop for Right<'_> {
     fn drop(&mut self) {
+        // one after the other, so that the last of them finds itself the last
         let mut rights = self.bulk.rights();
-        if Arc::strong_count(&self.pieces) == 1 {
+        self.pieces = None;
+        if rights.get(&self.peer).is_some_and(|pieces| pieces.strong_count() == 0) {
             rights.remove(&self.peer);
         }
     }
@@ -75,7 +78,7 @@ impl Bulk {
         let pieces = known.unwrap_or_else(|| Arc::new(Semaphore::new(self.threads.len())));
         rights.insert(peer, Arc::downgrade(&pieces));
         drop(rights);
-        Right { bulk: self, peer, pieces }
+        Right { bulk: self, peer, pieces: Some(pieces) }
     }
 
     /// Has a piece of work done for a peer when it is its turn. Work that nobody waits for ends at its next pause.
@@ -85,8 +88,12 @@ impl Bulk {
         work: impl Future<Output = T> + Send + 'static,
     ) -> io::Result<T> {
         let right = self.right_of(peer);
+        let pieces = right.pieces.clone();
         // it is never closed
-        let _piece = right.pieces.acquire().await.map_err(io::Error::other)?;
+        let _piece = match &pieces {
+            Some(pieces) => Some(pieces.acquire().await.map_err(io::Error::other)?),
+            None => None,
+        };
         let mut task = Owned(self.thread().spawn(work));
         (&mut task.0).await.map_err(io::Error::other)
     }

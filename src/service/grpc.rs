@@ -342,6 +342,11 @@ impl Server {
         Ok(())
     }
 
+    /// Closes every connection.
+    pub async fn close_all(&self) {
+        self.accounts.close_all().await;
+    }
+
     /// Accepts on one listener until `stop` turns true.
     async fn listen(
         &self,
@@ -371,7 +376,7 @@ impl Server {
             let of = Arc::clone(&connection);
             let serving = async move {
                 if let Some((socket, who)) =
-                    rules.acceptor.let_in(socket, &connection, deadlines.handshake).await
+                    rules.acceptor.let_in(socket, &connection, deadlines.handshake, stop.clone()).await
                 {
                     let link = link::Link::new(socket, Arc::clone(&connection), frames);
                     let calls = calls::Calls { routes, connection, rules, who };

@@ -216,6 +216,23 @@ fn a_certificate_allows_what_its_names_were_given() {
 }
 
 #[test]
+fn no_session_is_resumed_so_that_each_connection_shows_a_certificate_that_holds() {
+    let authority = Authority::new();
+    authority.signs("server", 2, OURS);
+    let served = authority.serves("server", |_| {});
+    let (address, session) = (served.running.http_address().expect("HTTP is on"), authority.path("session"));
+    let mut command = Command::new("openssl");
+    command.args(["s_client", "-quiet", "-connect", &address.to_string(), "-sess_out"]).arg(&session);
+    let mut client =
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("openssl");
+    let asks = b"GET /livez HTTP/1.0\r\n\r\n";
+    std::io::Write::write_all(client.stdin.as_mut().expect("piped"), asks).expect("written");
+    let answer = client.wait_with_output().expect("ended").stdout;
+    assert!(String::from_utf8_lossy(&answer).contains("200 OK"));
+    assert!(!session.exists(), "there is nothing to resume");
+}
+
+#[test]
 fn a_token_allows_what_it_was_given_until_it_is_taken_out_of_the_file() {
     let authority = Authority::new();
     authority.signs("server", 2, OURS);
@@ -380,7 +397,13 @@ fn files_that_cannot_be_used_are_refused_at_the_start_by_name() {
         ("tls.certificate", refusal(&|c| c.tls.certificate = authority.path("empty.pem"))),
         ("tls.key", refusal(&|c| c.tls.key = authority.path("ca.key"))),
         ("tls.key", refusal(&|c| c.tls.key = authority.path("ca.pem"))),
-        ("tls.client_ca", refusal(&|c| c.tls.client_ca = authority.path("empty.pem"))),
+        (
+            "tls.client_ca",
+            refusal(&|c| {
+                c.tls.client_ca = authority.path("empty.pem");
+                c.access.certificates.insert("*".into(), vec![Role::Query]);
+            }),
+        ),
         ("access.tokens", refusal(&|c| c.access.tokens = authority.path("nowhere.toml"))),
     ] {
         assert!(error.contains(names) && error.contains('/'), "{error}");

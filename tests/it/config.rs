@@ -60,6 +60,11 @@ fn settings_of_access_that_do_not_go_together_are_named() {
     assert!(refusal(|c| c.tls.certificate = "c.pem".into()).contains("tls.key"));
     assert!(refusal(|c| c.tls.key = "k.pem".into()).contains("tls.certificate"));
     assert!(refusal(|c| c.tls.client_ca = "ca.pem".into()).contains("tls.certificate"));
+    let nobody = refusal(|c| {
+        (c.tls.certificate, c.tls.key) = ("c.pem".into(), "k.pem".into());
+        c.tls.client_ca = "ca.pem".into();
+    });
+    assert!(nobody.contains("access.certificates"), "{nobody}");
     let named = refusal(|c| {
         c.access.certificates.insert("rig".into(), vec![Role::Query]);
     });

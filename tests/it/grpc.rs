@@ -195,6 +195,27 @@ fn streams_over_the_limit_are_refused_with_a_time_to_retry() {
 }
 
 #[test]
+fn who_watches_the_health_takes_no_place_of_a_stream_and_closes_nobody() {
+    let served = Served::with(|config| config.grpc.max_streams = 1);
+    runtime().block_on(async {
+        let mut streaming = client(&served).await;
+        let (sender, outgoing) = tokio::sync::mpsc::channel(1);
+        let mut answers = streaming.stream(ReceiverStream::new(outgoing)).await.expect("opened").into_inner();
+        let mut watching = HealthClient::new(channel(&served).await);
+        let check = HealthCheckRequest { service: String::new() };
+        let _first = watching.watch(check.clone()).await.expect("watched");
+        // longer than whoever stands still is left in peace
+        tokio::time::sleep(Duration::from_millis(1500)).await;
+        for _ in 0..3 {
+            let refused = HealthClient::new(channel(&served).await).watch(check.clone()).await;
+            assert_eq!(refused.expect_err("the place is taken").code(), Code::ResourceExhausted);
+        }
+        sender.send(request("husky", 0.1)).await.expect("sent");
+        answers.message().await.expect("the stream lives on").expect("one");
+    });
+}
+
+#[test]
 fn while_a_batch_is_computed_another_over_the_limit_is_refused_and_single_queries_are_answered() {
     let served = Served::with(|config| {
         config.grpc.max_requests = 1;
@@ -387,7 +408,7 @@ fn a_drain_answers_what_is_in_flight_and_ends_open_streams_within_its_bound() {
     let request = proto::EvaluateBatchRequest { omit_surfaces: true, ..batch(1 << 14) };
     let in_flight = runtime.spawn(async move { long.evaluate_batch(request).await });
     // the batch is in flight once it has taken a place
-    let requests = served.running.metrics().held(wade::metrics::Resource::requests);
+    let requests = served.running.metrics().held(wade::metrics::Resource::batches);
     runtime.block_on(async {
         let start = Instant::now();
         while requests.get() == 0 {

@@ -9,7 +9,7 @@ use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, Server
 use rustls::crypto::{CryptoProvider, ring, verify_tls13_signature};
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
-use rustls::server::WebPkiClientVerifier;
+use rustls::server::{NoServerSessionStorage, WebPkiClientVerifier};
 use rustls::version::TLS13;
 use rustls::{
     ClientConfig, DigitallySignedStruct, Error, PeerMisbehaved, RootCertStore, ServerConfig, SignatureScheme,
@@ -117,10 +117,13 @@ impl Keys {
         } else {
             builder.with_no_client_auth()
         };
-        let common = builder.with_single_cert(chain, key).map_err(|fault| match fault {
+        let mut common = builder.with_single_cert(chain, key).map_err(|fault| match fault {
             Error::InconsistentKeys(_) => of_key("is not the key of tls.certificate".into()),
             fault => of_certificate(fault.to_string()),
         })?;
+        // a session that is resumed is not asked for its certificate again, which may have expired since
+        common.session_storage = Arc::new(NoServerSessionStorage {});
+        common.send_tls13_tickets = 0;
         let of = |protocol: Protocol| {
             let mut config = common.clone();
             config.alpn_protocols = vec![protocol.name()];

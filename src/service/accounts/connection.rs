@@ -79,7 +79,7 @@ impl Connection {
     /// Has the connection closed by the task that serves it; the first reason counts.
     pub fn close(&self, reason: Closed) {
         if self.closed.set(reason).is_ok() {
-            if matches!(reason, Closed::control_frames | Closed::broke_protocol) {
+            if matches!(reason, Closed::control_frames | Closed::broke_protocol | Closed::no_tls) {
                 self.accounts.fault.store(true, Relaxed);
             }
             self.accounts.metrics.count_closed(reason);
@@ -159,9 +159,8 @@ impl Connection {
 
     /// Whether a call is open.
     pub fn has_calls(&self) -> bool {
-        [Resource::requests, Resource::batches, Resource::streams, Resource::probes]
-            .iter()
-            .any(|&r| self.held.get(r) > 0)
+        use Resource::{batches, probes, requests, streams, watches};
+        [requests, batches, streams, watches, probes].iter().any(|&resource| self.held.get(resource) > 0)
     }
 
     /// Whether the server is at work for this connection, so that it is not the peer that lets others wait.

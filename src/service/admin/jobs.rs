@@ -70,7 +70,23 @@ type Outcome = Result<Vec<Reloaded>, UnknownVehicle>;
 #[derive(Debug)]
 struct Waiting {
     job: Job,
-    askers: Vec<oneshot::Sender<Outcome>>,
+    askers: Vec<Asker>,
+}
+
+/// Who waits for a job.
+#[derive(Debug)]
+struct Asker {
+    by: String,
+    /// What he asked for, which the job covers.
+    job: String,
+    sender: oneshot::Sender<Outcome>,
+}
+
+impl Asker {
+    fn note(&self, refused: &str) {
+        let Self { by, job, .. } = self;
+        tracing::info!(target: AUDIT, by, job, refused, "administration");
+    }
 }
 
 #[derive(Debug, Default)]
@@ -106,23 +122,9 @@ impl Jobs {
 
     /// Has a job done for a caller, and waits for it.
     pub async fn run(&self, job: Job, caller: Option<&Caller>) -> Result<Vec<Reloaded>, Refusal> {
-        let by = caller.map_or_else(|| "nobody".to_owned(), ToString::to_string);
-        let said = job.to_string();
-        let outcome = self.done(job).await;
-        match &outcome {
-            Ok(vehicles) => {
-                let refused = vehicles.iter().filter(|one| !one.refusal.is_empty());
-                let refused: Vec<&str> = refused.map(|one| one.vehicle.as_str()).collect();
-                tracing::info!(target: AUDIT, by, job = said, refused = refused.join(" "), "administration");
-            }
-            Err(refusal) => tracing::info!(target: AUDIT, by, job = said, %refusal, "administration"),
-        }
-        outcome
-    }
-
-    async fn done(&self, job: Job) -> Result<Vec<Reloaded>, Refusal> {
         let asked = job.clone();
-        let outcome = self.submit(job)?.await;
+        let by = caller.map_or_else(|| "nobody".to_owned(), ToString::to_string);
+        let outcome = self.submit(job, by)?.await;
         let mut reloaded = outcome.map_err(|_| Refusal::TooManyJobs)??;
         if let Job::Reload { vehicle, .. } = asked
             && !vehicle.is_empty()
@@ -136,12 +138,16 @@ impl Jobs {
     }
 
     /// Puts a job in its place: on the thread, beside one that waits, or nowhere.
-    fn submit(&self, job: Job) -> Result<oneshot::Receiver<Outcome>, Refusal> {
-        let (asker, answer) = oneshot::channel();
+    fn submit(&self, job: Job, by: String) -> Result<oneshot::Receiver<Outcome>, Refusal> {
+        let (sender, answer) = oneshot::channel();
+        let asker = Asker { by, job: job.to_string(), sender };
         let mut queue = self.lock();
         match &mut queue.waiting {
             Some(waiting) if waiting.job.covers(&job) => waiting.askers.push(asker),
-            Some(_) => return Err(Refusal::TooManyJobs),
+            Some(_) => {
+                asker.note("another job waits");
+                return Err(Refusal::TooManyJobs);
+            }
             None => queue.waiting = Some(Waiting { job, askers: vec![asker] }),
         }
         // a thread that was woken and has not looked yet finds this job as well
@@ -183,9 +189,17 @@ impl Worker {
             let start = Instant::now();
             let outcome = self.perform(&job);
             let elapsed = start.elapsed();
+            let refused = match &outcome {
+                Ok(vehicles) => {
+                    let refused = vehicles.iter().filter(|one| !one.refusal.is_empty());
+                    refused.map(|one| one.vehicle.as_str()).collect::<Vec<_>>().join(" ")
+                }
+                Err(unknown) => unknown.to_string(),
+            };
             for asker in askers {
-                // whoever has gone meanwhile needs no answer
-                let _ = asker.send(outcome.clone());
+                // here, since it was done: whoever asked may have hung up
+                asker.note(&refused);
+                let _ = asker.sender.send(outcome.clone());
             }
             if self.lock().waiting.is_some() {
                 // whoever asks without end takes half a core at most

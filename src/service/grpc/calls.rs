@@ -51,7 +51,7 @@ impl Method {
             "/wade.v1.Hydrodynamics/Stream" => of(stream, names.stream),
             "/inference.GRPCInferenceService/ModelInfer" => heavy(Heavy::Infer, names.infer),
             "/inference.GRPCInferenceService/ModelStreamInfer" => of(stream, names.infer),
-            "/grpc.health.v1.Health/Watch" => Self { role: None, ..of(stream, names.other) },
+            "/grpc.health.v1.Health/Watch" => Self { role: None, ..of(Resource::watches, names.other) },
             "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo"
             | "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo" => {
                 observes(of(stream, names.other))
@@ -164,7 +164,9 @@ impl Calls {
         let caller = method.role.map(|role| access.check(&self.who, headers, role)).transpose();
         let caller = caller.inspect_err(|refusal| {
             if method.administers() {
-                tracing::warn!(peer = %self.connection.peer(), %refusal, "an administrator's call was refused");
+                // as text, so that a name in it writes no line of its own
+                let (peer, refusal) = (self.connection.peer(), refusal.to_string());
+                tracing::warn!(%peer, refusal, "an administrator's call was refused");
             }
         })?;
         let accounts = self.connection.accounts();
@@ -174,7 +176,12 @@ impl Calls {
             accounts.make_room(&self.connection, Resource::bytes, overloaded.of_peer);
             Refusal::Overloaded { what: Resource::bytes.name(), overloaded }
         })?;
-        let place = accounts.admit(&self.connection, method.resource).await.map_err(overloaded)?;
+        let place = match method.resource {
+            // for a caller without a role no connection is closed
+            Resource::watches => accounts.take(&self.connection, method.resource, 1),
+            resource => accounts.admit(&self.connection, resource).await,
+        };
+        let place = place.map_err(overloaded)?;
         Ok((caller, place))
     }
 }
@@ -265,7 +272,7 @@ type Later<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 impl Received {
     fn new(body: Incoming, calls: &Calls, method: Method, work: &Work) -> Self {
         let rules = &calls.rules;
-        let is_stream = method.resource == Resource::streams;
+        let is_stream = matches!(method.resource, Resource::streams | Resource::watches);
         // whoever waits for an administrator's job does not compute
         let gated = method.resource == Resource::requests && method.transport == rules.names.other;
         Self {

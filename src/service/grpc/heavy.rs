@@ -104,7 +104,8 @@ trait States: Message + Default + 'static {
 
 impl States for proto::EvaluateBatchRequest {
     fn states(&self) -> usize {
-        self.depth_m.len()
+        // a batch is as long as the one of them that it has
+        self.depth_m.len().max(self.water_level_m.len())
     }
 }
 
@@ -240,5 +241,29 @@ impl Decoder for Raw {
 
     fn decode(&mut self, buffer: &mut DecodeBuf<'_>) -> Result<Option<Bytes>, Status> {
         Ok(Some(buffer.copy_to_bytes(buffer.remaining())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wade_wire::proto::inference::model_infer_request::InferInputTensor;
+
+    #[test]
+    fn a_request_counts_its_states_by_whichever_array_it_has() {
+        let levels = proto::EvaluateBatchRequest { water_level_m: vec![0.0; 100], ..Default::default() };
+        let depths = proto::EvaluateBatchRequest { depth_m: vec![0.0; 100], ..Default::default() };
+        assert_eq!([levels.states(), depths.states()], [100, 100]);
+        let map = proto::GetStabilityRequest {
+            depth_m: vec![0.0; 10],
+            speed_mps: vec![0.0; 20],
+            ..Default::default()
+        };
+        assert_eq!(map.states(), 200);
+        let tensor = |rows| InferInputTensor { shape: vec![rows, 3], ..Default::default() };
+        let infer = ModelInferRequest { inputs: vec![tensor(1), tensor(50)], ..Default::default() };
+        assert_eq!(infer.states(), 50);
+        let negative = ModelInferRequest { inputs: vec![tensor(-1)], ..Default::default() };
+        assert_eq!(negative.states(), usize::MAX);
     }
 }

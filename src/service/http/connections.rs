@@ -54,9 +54,10 @@ pub async fn serve(listener: Listener, routes: Routes, shared: &Shared, stop: wa
     let serve = |socket, connection: Arc<Connection>, place| {
         let (routes, acceptor) = (routes.clone(), shared.acceptor.clone());
         let (http, watcher) = (http.clone(), open.watcher());
-        let metrics = Arc::clone(&shared.grpc.metrics);
+        let (metrics, stop) = (Arc::clone(&shared.grpc.metrics), stop.clone());
         tokio::spawn(async move {
-            let Some((socket, who)) = acceptor.let_in(socket, &connection, handshake).await else { return };
+            let welcomed = acceptor.let_in(socket, &connection, handshake, stop).await;
+            let Some((socket, who)) = welcomed else { return };
             let service = Requests { routes, connection: Arc::clone(&connection), acceptor, who, metrics };
             let noted = Noted { socket, connection: Arc::clone(&connection) };
             let served = watcher.watch(http.serve_connection(TokioIo::new(noted), service));
@@ -71,7 +72,7 @@ pub async fn serve(listener: Listener, routes: Routes, shared: &Shared, stop: wa
     };
     tokio::select! {
         () = intake::accept_all(listener, Arc::clone(&shared.accounts), Resource::http_connections, serve) => {}
-        () = stopped(stop) => {}
+        () = stopped(stop.clone()) => {}
     }
     open.shutdown().await;
 }
