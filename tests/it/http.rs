@@ -304,7 +304,7 @@ fn bad_queries_are_refused_by_field_and_the_next_good_one_is_answered() {
 }
 
 #[test]
-fn json_is_refused_while_grpc_takes_every_place() {
+fn a_batch_as_json_is_refused_while_grpc_takes_every_place() {
     let served = Served::with(|config| {
         config.grpc.max_requests = 1;
         config.grpc.max_batch = 1 << 14;
@@ -328,7 +328,7 @@ fn json_is_refused_while_grpc_takes_every_place() {
     });
     let start = Instant::now();
     let refused = loop {
-        let answer = post(address, "/v1/query", r#"{"vehicle": "husky", "state": {"depth_m": 0.1}}"#);
+        let answer = post(address, "/v1/batch", r#"{"vehicle": "husky", "depth_m": [0.1, 0.2]}"#);
         if answer.status != 200 {
             break answer;
         }

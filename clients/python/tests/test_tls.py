@@ -208,7 +208,8 @@ def test_a_handshake_that_fails_says_why(guarded: Guarded, opened: Any, server: 
 def test_a_server_whose_certificate_has_expired_is_not_believed(opened: Any, tmp_path: Path) -> None:
     authority = Authority(tmp_path)
     authority.sign("late", OURS, -1)
-    server = Server(tmp_path, authority.settings("late"))
+    roles = '[access]\ncertificates = { "*" = ["query"] }\n'
+    server = Server(tmp_path, authority.settings("late") + roles)
     server.start()
     try:
         with opened(f"https://{server.address}", tls=authority.tls()) as client:

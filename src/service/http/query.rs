@@ -61,10 +61,14 @@ pub(super) async fn whole(shared: &Shared, body: Body, longest: usize) -> Result
     text.map_err(|_| Rejection::TooLong { limit: longest })
 }
 
-/// A place for a request, held while it is computed.
-pub(super) fn admit(shared: &Shared, connection: &Arc<Connection>) -> Result<Place, Refusal> {
-    let overloaded = |overloaded| Refusal::Overloaded { what: Resource::requests.name(), overloaded };
-    shared.accounts.take(connection, Resource::requests, 1).map_err(overloaded)
+/// A place among the requests or the batches, held while one is computed.
+pub(super) fn admit(
+    shared: &Shared,
+    connection: &Arc<Connection>,
+    resource: Resource,
+) -> Result<Place, Refusal> {
+    let overloaded = |overloaded| Refusal::Overloaded { what: resource.name(), overloaded };
+    shared.accounts.take(connection, resource, 1).map_err(overloaded)
 }
 
 /// Answers on this thread, as gRPC does on its own.
@@ -72,7 +76,7 @@ fn evaluate(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Resul
     let call = Call::arriving(&shared.grpc, Transport::http, None);
     let request: proto::EvaluateRequest = read(shared, "wade.v1.EvaluateRequest", text)?;
     let mut names = Vec::new();
-    let answer = admit(shared, connection).and_then(|_place| {
+    let answer = admit(shared, connection, Resource::requests).and_then(|_place| {
         let vehicle = shared.grpc.engine.vehicle(&request.vehicle)?;
         names = vehicle.model().vehicle().surfaces.iter().map(|surface| surface.name.clone()).collect();
         answer_state(&vehicle, request.state.as_ref(), None)
@@ -114,7 +118,7 @@ async fn stand(shared: &Shared, connection: &Arc<Connection>, text: &[u8]) -> Re
     let call = Call::arriving(&shared.grpc, Transport::http, None);
     let request: proto::GetStabilityRequest = read(shared, "wade.v1.GetStabilityRequest", text)?;
     let answer = async {
-        let _place = admit(shared, connection)?;
+        let _place = admit(shared, connection, Resource::batches)?;
         stability(&call, shared.grpc.engine.vehicle(&request.vehicle)?, &request).await
     };
     let answer = answer.await;

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::query::{admit, read, whole};
 use super::rejection::Rejection;
 use super::{Shared, json};
-use crate::metrics::Transport;
+use crate::metrics::{Resource, Transport};
 use crate::service::accounts::{Computing, Connection};
 use crate::service::batch::batch;
 use crate::service::call::Call;
@@ -165,7 +165,7 @@ async fn evaluate(
     let call = Call::arriving(&shared.grpc, Transport::http, None);
     let mut request: proto::EvaluateBatchRequest = read(shared, "wade.v1.EvaluateBatchRequest", &text)?;
     request.omit_surfaces = true;
-    let _place = admit(shared, connection)?;
+    let _place = admit(shared, connection, Resource::batches)?;
     let vehicle = match version {
         Some(version) => cache.version(shared, &request.vehicle, version).await?,
         None => shared.grpc.engine.vehicle(&request.vehicle).map_err(Refusal::from)?,
