@@ -88,7 +88,11 @@ impl Credentials {
     pub(crate) async fn connect(&self, url: &str, timeout: Duration) -> Result<Channel, ClientError> {
         let endpoint = self.endpoint(url, timeout)?;
         let connected = tokio::time::timeout(timeout, endpoint.connect()).await;
-        connected.map_err(|_| ClientError::Timeout(timeout))?.map_err(|error| nobody_at(url, &error))
+        let late = |_| ClientError::NoServer {
+            at: url.to_owned(),
+            reason: format!("no connection within {} ms", timeout.as_millis()),
+        };
+        connected.map_err(late)?.map_err(|error| nobody_at(url, &error))
     }
 
     /// How to connect.
