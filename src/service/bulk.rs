@@ -43,19 +43,15 @@ pub struct Bulk {
     rights: Mutex<HashMap<Peer, Weak<Semaphore>>>,
 }
 
-/// A peer's right to have work under way, which is forgotten with the last of it.
-struct Right<'b> {
+/// Forgets a peer's right with the last of its work, which is dropped before this.
+struct Forgets<'b> {
     bulk: &'b Bulk,
     peer: Peer,
-    /// There until it is dropped.
-    pieces: Option<Arc<Semaphore>>,
 }
 
-impl Drop for Right<'_> {
+impl Drop for Forgets<'_> {
     fn drop(&mut self) {
-        // one after the other, so that the last of them finds itself the last
         let mut rights = self.bulk.rights();
-        self.pieces = None;
         if rights.get(&self.peer).is_some_and(|pieces| pieces.strong_count() == 0) {
             rights.remove(&self.peer);
         }
@@ -72,13 +68,12 @@ impl Bulk {
         self.rights.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn right_of(&self, peer: Peer) -> Right<'_> {
+    fn right_of(&self, peer: Peer) -> Arc<Semaphore> {
         let mut rights = self.rights();
         let known = rights.get(&peer).and_then(Weak::upgrade);
         let pieces = known.unwrap_or_else(|| Arc::new(Semaphore::new(self.threads.len())));
         rights.insert(peer, Arc::downgrade(&pieces));
-        drop(rights);
-        Right { bulk: self, peer, pieces: Some(pieces) }
+        pieces
     }
 
     /// Has a piece of work done for a peer when it is its turn. Work that nobody waits for ends at its next pause.
@@ -87,13 +82,10 @@ impl Bulk {
         peer: Peer,
         work: impl Future<Output = T> + Send + 'static,
     ) -> io::Result<T> {
+        let _forgets = Forgets { bulk: self, peer };
         let right = self.right_of(peer);
-        let pieces = right.pieces.clone();
         // it is never closed
-        let _piece = match &pieces {
-            Some(pieces) => Some(pieces.acquire().await.map_err(io::Error::other)?),
-            None => None,
-        };
+        let _piece = right.acquire().await.map_err(io::Error::other)?;
         let mut task = Owned(self.thread().spawn(work));
         (&mut task.0).await.map_err(io::Error::other)
     }

@@ -24,15 +24,10 @@ impl CredentialFiles {
         vehicle: &str,
         timeout: Duration,
     ) -> Result<GrpcLink, ClientError> {
-        let connecting = async {
-            let credentials = self.read(url)?;
-            GrpcLink::connect(url, vehicle, timeout, &credentials).await
+        let connected = match self.read(url) {
+            Ok(credentials) => GrpcLink::connect(url, vehicle, timeout, &credentials).await,
+            Err(error) => Err(error),
         };
-        // a listener that says nothing keeps a handshake waiting
-        let connected = tokio::time::timeout(timeout, connecting).await.unwrap_or_else(|_| {
-            let reason = format!("no connection within {} ms", timeout.as_millis());
-            Err(ClientError::NoServer { at: url.to_owned(), reason })
-        });
         connected.map_err(|error| self.with_files(error))
     }
 
