@@ -6,11 +6,12 @@
 //! above the ground-contact plane at the body origin. Velocity is the vehicle's velocity through the water.
 //!
 //! Modules in reading order; each uses only those above it:
-//! values ([`at`], [`frame`], [`wrench`], [`condition`], [`domain`], [`digest`], [`forces`]), the body ([`geometry`], [`vehicle`]),
+//! values ([`at`], [`caught`], [`frame`], [`wrench`], [`condition`], [`domain`], [`digest`], [`forces`]), the body ([`geometry`], [`vehicle`]),
 //! the inputs of the network and the loads by formula ([`features`], [`effects`], [`analytic`], [`anchor`]), the network ([`model`]),
 //! with the effects added to it ([`served`]), its files ([`bundle`]), and how a vehicle stands under its loads ([`stability`]).
 
 pub mod at;
+pub mod caught;
 pub mod condition;
 pub mod digest;
 pub mod domain;

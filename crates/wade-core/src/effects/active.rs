@@ -50,11 +50,15 @@ pub struct EffectsSession {
     depth_rate: Option<f64>,
 }
 
+/// Largest rate of the depth that is taken from its change [m/s], and the largest that may be stated: what exceeds it is the
+/// rounding of a depth over a step of no length.
+const MOST_DEPTH_RATE: f64 = 1e3;
+
 impl EffectsSession {
     /// Takes the rate of the depth from its change.
     fn follow(&mut self, depth: f64, time_step: f64) {
         if let Some(before) = self.depth.filter(|_| time_step > 0.0) {
-            self.depth_rate = Some((depth - before) / time_step);
+            self.depth_rate = Some(((depth - before) / time_step).clamp(-MOST_DEPTH_RATE, MOST_DEPTH_RATE));
         }
         self.depth = Some(depth);
     }

@@ -39,9 +39,12 @@ pub fn hydrostatics(mesh: &Mesh, plane: &WaterPlane, density: f64, about: &Vec3)
 pub fn float_depth(mesh: &Mesh, z0: f64, mass: f64) -> f64 {
     let top = mesh.bounds().map_or(z0, |bounds| bounds.max.z);
     let (mut sinks, mut floats) = (0.0, top - z0);
-    // the displaced volume grows with depth: bisection to a micrometer
+    // the displaced volume grows with depth: bisection to a micrometer, or as far as numbers go
     while floats - sinks > 1e-6 {
         let depth = 0.5 * (sinks + floats);
+        if depth <= sinks || depth >= floats {
+            break;
+        }
         let displaced =
             hydrostatics(mesh, &WaterPlane::level(z0, depth), FRESH_WATER, &Vec3::zeros()).displaced_volume;
         if displaced * FRESH_WATER < mass { sinks = depth } else { floats = depth }

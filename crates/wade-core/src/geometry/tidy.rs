@@ -1,6 +1,7 @@
-//! Mends what exporters leave in a mesh without changing its shape: corners that differ by rounding, faces without area.
+//! Mends what exporters leave in a mesh without changing its shape: corners that differ by rounding, faces without area, faces
+//! that are written twice.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::mesh::Mesh;
 use super::parts::{EdgeFaults, edges};
@@ -22,6 +23,8 @@ pub struct Tidying {
     pub joined_corners: usize,
     /// Faces without area that were dropped.
     pub dropped_faces: usize,
+    /// Faces that were dropped because the same one stands before them.
+    pub repeated_faces: usize,
 }
 
 impl Tidying {
@@ -33,17 +36,17 @@ impl Tidying {
 
 /// Joins near corners and drops flat faces where the mesh is closed by that, or no less closed than before.
 ///
-/// A mesh that is closed and has no flat face stays as it is, bit for bit.
+/// A mesh that is closed and has neither a flat face nor one twice stays as it is, bit for bit.
 pub fn tidy(mesh: Mesh) -> (Mesh, Tidying) {
     let mut done = Tidying::default();
-    let mesh = without_flat_faces(mesh, &mut done);
+    let mesh = without_repeated_faces(without_flat_faces(mesh, &mut done), &mut done);
     let faults = EdgeFaults::of(&mesh);
     if faults.closed() {
         return (mesh, done);
     }
     let (joined, corners) = welded(&mesh, weld_tolerance(&mesh));
     let mut after = Tidying { joined_corners: corners, ..done };
-    let joined = without_flat_faces(joined, &mut after);
+    let joined = without_repeated_faces(without_flat_faces(joined, &mut after), &mut after);
     if EdgeFaults::of(&joined).count() < faults.count() { (joined, after) } else { (mesh, done) }
 }
 
@@ -110,6 +113,24 @@ fn without_flat_faces(mesh: Mesh, done: &mut Tidying) -> Mesh {
     let faces: Vec<usize> = (0..mesh.faces.len()).filter(|&face| keep[face]).collect();
     done.dropped_faces += mesh.faces.len() - faces.len();
     if faces.len() == mesh.faces.len() { mesh } else { mesh.part(&faces) }
+}
+
+/// Drops faces whose corners are, in the same order, those of a face before them: a solid that is written twice is one solid.
+fn without_repeated_faces(mesh: Mesh, done: &mut Tidying) -> Mesh {
+    let mut seen = HashSet::new();
+    let faces: Vec<usize> =
+        (0..mesh.faces.len()).filter(|&face| seen.insert(turned(mesh.faces[face]))).collect();
+    done.repeated_faces += mesh.faces.len() - faces.len();
+    if faces.len() == mesh.faces.len() { mesh } else { mesh.part(&faces) }
+}
+
+/// The corners of a face, from the smallest index on: the same for every way to write it.
+pub fn turned([a, b, c]: [u32; 3]) -> [u32; 3] {
+    match a.min(b).min(c) {
+        least if least == a => [a, b, c],
+        least if least == b => [b, c, a],
+        _ => [c, a, b],
+    }
 }
 
 /// True where the edges of a face cancel better without it.

@@ -134,8 +134,19 @@ impl<T: Real> Condition<T> {
     }
 }
 
+/// Motion [m/s, rad/s] and tilt [rad] that have the derivatives of none: powers of less leave the range of the numbers.
+const STILL: f64 = 1e-12;
+
 /// A state that grows along each column of a [`Jacobian`].
 fn moving(condition: &Condition, z0: f64) -> Condition<Full> {
+    let still = |v: &Vec3| v.map(|x| if x.abs() < STILL { 0.0 } else { x });
+    let condition = &Condition {
+        velocity: still(&condition.velocity),
+        ground_velocity: still(&condition.ground_velocity),
+        angular_velocity: still(&condition.angular_velocity),
+        up: UnitVector3::new_unchecked(still(&condition.up)),
+        ..*condition
+    };
     let level = condition.water_plane(z0).offset;
     let mut moving: Condition<Full> = condition.map(Full::from);
     for axis in 0..3 {

@@ -7,6 +7,7 @@
 use nalgebra::Matrix3;
 
 use crate::frame::Vec3;
+use crate::geometry::mesh::Mesh;
 use crate::vehicle::Vehicle;
 
 /// Elements that are evaluated in one step; the elements of a surface are padded to a multiple of it.
@@ -59,10 +60,11 @@ pub fn elements(vehicle: &Vehicle, count: usize) -> Vec<Element> {
     let wanted = if symmetric { count.div_ceil(2) } else { count };
     let area = vehicle.hull.mesh.area() / if symmetric { 2.0 } else { 1.0 };
     let mut cell = (area / wanted as f64).sqrt();
-    let mut half = grouped(vehicle, cell, symmetric);
+    let shortest = shortest_piece(&vehicle.hull.mesh);
+    let mut half = grouped(vehicle, (cell, shortest), symmetric);
     while half.len() > wanted && half.len() > vehicle.surfaces.len() {
         cell *= GROWTH;
-        let coarser = grouped(vehicle, cell, symmetric);
+        let coarser = grouped(vehicle, (cell, shortest), symmetric);
         // a cell beyond the size of the hull groups no more
         if cell > area.sqrt() && coarser.len() >= half.len() {
             break;
@@ -88,11 +90,18 @@ struct Group {
     second: Matrix3<f64>,
 }
 
-fn grouped(vehicle: &Vehicle, cell: f64, left_half: bool) -> Vec<Element> {
+/// How short pieces may be, so that there is room for all: of a broad face by its area, of a sliver by its length.
+fn shortest_piece(mesh: &Mesh) -> f64 {
+    let lengths: f64 = (0..mesh.faces.len()).map(|face| longest_edge(&mesh.triangle(face))).sum();
+    let most = MAX_PIECES as f64;
+    (2.0 * mesh.area() / most).sqrt().max(2.0 * lengths / most)
+}
+
+/// The pieces of the hull by cell; none is longer than a cell or, where that is longer, than the shortest that there is room for.
+fn grouped(vehicle: &Vehicle, (cell, shortest): (f64, f64), left_half: bool) -> Vec<Element> {
     let mut groups = std::collections::BTreeMap::<Key, Group>::new();
     let mesh = &vehicle.hull.mesh;
-    // no piece is longer than a cell, as long as there is room for so many
-    let piece = cell.max((2.0 * mesh.area() / MAX_PIECES as f64).sqrt());
+    let piece = cell.max(shortest);
     let mut stack = Vec::new();
     for (face, &surface) in vehicle.hull.face_surface.iter().enumerate() {
         stack.push(mesh.triangle(face));
@@ -146,6 +155,10 @@ impl Group {
         let spread = self.second / self.area - center * center.transpose();
         Some(Element { surface, area: self.area, normal, center, spread })
     }
+}
+
+fn longest_edge([a, b, c]: &[Vec3; 3]) -> f64 {
+    (b - a).norm().max((c - b).norm()).max((a - c).norm())
 }
 
 /// The two halves of a triangle cut at the middle of its longest edge; `None` where no edge is longer than `limit`.

@@ -3,6 +3,9 @@
 use super::{ContactPatch, Dimensions, MAX_SURFACES, SurfaceKind, Vehicle};
 use crate::frame::Vec3;
 
+/// Farthest that a point of a vehicle may lie from its origin [m]: no deeper water can be asked about.
+const FARTHEST: f64 = 1e3;
+
 /// Why a set of values is no vehicle.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum VehicleError {
@@ -70,6 +73,16 @@ pub enum VehicleError {
         /// The surface.
         name: String,
     },
+    /// A hull that no water could reach, or that holds none.
+    #[error(
+        "the hull reaches {farthest} m from its origin and holds {volume} m3: at most {FARTHEST} m, and a volume, are allowed"
+    )]
+    Hull {
+        /// The largest coordinate of a vertex [m].
+        farthest: f64,
+        /// The volume [m3].
+        volume: f64,
+    },
     /// Samples of another vehicle.
     #[error("samples of {samples} surfaces for {surfaces} surfaces")]
     SampleCount {
@@ -107,16 +120,26 @@ impl Vehicle {
 
     fn check_numbers(&self) -> Result<(), VehicleError> {
         let Dimensions { length, width, height } = self.dimensions;
-        for (quantity, value) in
-            [("length", length), ("width", width), ("height", height), ("mass", self.mass)]
-        {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(VehicleError::Number { quantity, value, expected: "positive and finite" });
+        for (quantity, value) in [("length", length), ("width", width), ("height", height)] {
+            if !(value > 0.0 && value <= 2.0 * FARTHEST) {
+                return Err(VehicleError::Number {
+                    quantity,
+                    value,
+                    expected: "positive and at most 2000 m",
+                });
             }
         }
-        for (quantity, value) in [("z0", self.z0), ("center of mass", self.center_of_mass.sum())] {
-            if !value.is_finite() {
-                return Err(VehicleError::Number { quantity, value, expected: "finite" });
+        if !(self.mass > 0.0 && self.mass.is_finite()) {
+            let value = self.mass;
+            return Err(VehicleError::Number { quantity: "mass", value, expected: "positive and finite" });
+        }
+        for (quantity, value) in [("z0", self.z0), ("center of mass", self.center_of_mass.amax())] {
+            if value.is_nan() || value.abs() > FARTHEST {
+                return Err(VehicleError::Number {
+                    quantity,
+                    value,
+                    expected: "within 1000 m of the origin",
+                });
             }
         }
         let skew = (self.inertia - self.inertia.transpose()).norm();
@@ -162,6 +185,11 @@ impl Vehicle {
     }
 
     fn check_faces(&self) -> Result<(), VehicleError> {
+        let farthest = self.hull.mesh.vertices.iter().map(|vertex| vertex.amax()).fold(0.0, f64::max);
+        let volume = self.hull.mesh.volume();
+        if !(farthest <= FARTHEST && volume > 0.0) {
+            return Err(VehicleError::Hull { farthest, volume });
+        }
         let (entries, faces, surfaces) =
             (self.hull.face_surface.len(), self.hull.mesh.faces.len(), self.surfaces.len());
         let mut seen = [false; MAX_SURFACES];

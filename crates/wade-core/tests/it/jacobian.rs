@@ -306,3 +306,33 @@ fn derivatives_are_finite_at_rest_dry_and_where_water_just_reaches_the_hull() {
         }
     }
 }
+
+#[test]
+fn almost_no_motion_and_almost_no_tilt_have_derivatives() {
+    let mut slopes = JacobianWorkspace::default();
+    for name in VEHICLES {
+        let model = crate::common::model(name);
+        let motion = Motion {
+            wheel_speeds: &[0.0; MAX_SURFACES],
+            time_step: 0.0,
+            implicit_added_mass: false,
+            physics: Physics::Full,
+            waters: None,
+        };
+        for size in [0.0, 1e-300, 1e-160, 4e-45, 1e-20, 1e-13, 1e-12, 1e-11, 1e-9, 1e-6] {
+            for moved in [[size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size], [0.0; 3]] {
+                for tilt in [0.0, size] {
+                    let velocity = Vec3::from(moved);
+                    let up = UnitVector3::new_normalize(Vec3::new(0.0, tilt, 1.0));
+                    let state =
+                        Condition { up, ground_velocity: velocity, ..Condition::level(velocity, 0.2) };
+                    let jacobian = Asked::of(&model, motion).jacobian(&state, &mut slopes);
+                    assert!(
+                        jacobian.iter().all(|value| value.is_finite()),
+                        "{name}, {moved:?}, {tilt}: {jacobian}"
+                    );
+                }
+            }
+        }
+    }
+}
