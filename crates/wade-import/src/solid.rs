@@ -1,19 +1,22 @@
 //! Every shape a closed mesh: near corners joined, faces turned outward, holes refused or closed when asked.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
+use manifold_rust::linalg::Vec2;
 use manifold_rust::manifold::Manifold;
-use manifold_rust::types::{Error, MeshGLP, WindingRule};
+use manifold_rust::polygon::triangulate_idx;
+use manifold_rust::types::{Error, MeshGLP, PolyVert, WindingRule};
+use wade_core::caught::caught;
 use wade_core::frame::Vec3;
-use wade_core::geometry::mesh::Mesh;
+use wade_core::geometry::mesh::{Bounds, Mesh};
 use wade_core::geometry::parts::{Hole, holes, parts};
 use wade_core::geometry::seal::seal;
-use wade_core::geometry::tidy::tidy;
+use wade_core::geometry::tidy::{tidy, turned};
 use wade_core::geometry::watertight::{hull_share, is_closed};
 
 use crate::limits::{HOLLOW_SHARE, LEAST_VOLUME_SHARE, MOST_UNION_SECONDS};
 use crate::scene::{Link, Role, Scene, Shape};
-use crate::watch::{Watch, guarded};
+use crate::watch::Watch;
 use crate::{Shapes, at};
 
 /// A mesh for the library of the union.
@@ -157,6 +160,12 @@ fn close(
 ) -> Result<(), SolidError> {
     let source_name = piece.source.clone();
     let (mut mesh, _) = tidy(std::mem::take(&mut piece.mesh));
+    if let Some(one_sided) = without_backs(&mesh) {
+        warnings.push(format!(
+            "{source_name}: its faces stand there twice, once for each side; one of both counts"
+        ));
+        mesh = one_sided;
+    }
     let diagonal = mesh.bounds().map_or(0.0, |bounds| bounds.extent().norm());
     if !is_closed(&mesh) {
         let turned = orient(&mut mesh);
@@ -190,12 +199,18 @@ fn outward(
     if turned > 0 {
         warnings.push(format!("{source_name}: {turned} faces pointed inward and are turned"));
     }
+    let has_inner = has_inner_shells(&mesh);
+    if has_inner {
+        warnings.push(format!(
+            "{source_name}: closed parts of it lie inside others, where they displace nothing"
+        ));
+    }
     let least = LEAST_VOLUME_SHARE * diagonal.powi(3);
     if mesh.volume() <= least {
         let center = mesh.bounds().map_or_else(Vec3::zeros, |bounds| bounds.center());
         return Err(SolidError::Flat { source_name, area: mesh.area(), center });
     }
-    match guarded(|| repaired(&mesh, watch)) {
+    match caught(|| repaired(&mesh, has_inner, watch)).ok() {
         Some(Ok(None)) => {}
         Some(Ok(Some(repaired))) if repaired.volume() > least => mesh = repaired,
         Some(Err(Error::Cancelled)) => return Err(SolidError::Slow { source_name, faces: mesh.faces.len() }),
@@ -216,13 +231,13 @@ fn outward(
     Ok(())
 }
 
-/// The mesh without faces that cross each other; none where it has none.
-fn repaired(mesh: &Mesh, watch: &Watch) -> Result<Option<Mesh>, Error> {
+/// The mesh without faces that cross each other or lie in its inside; none where it has none.
+fn repaired(mesh: &Mesh, has_inner: bool, watch: &Watch) -> Result<Option<Mesh>, Error> {
     let solid = Manifold::from_mesh_glp_robust(&to_exchange(mesh, 0));
     if solid.status() != Error::NoError {
         return Err(solid.status());
     }
-    if !solid.has_self_intersections() {
+    if !has_inner && !solid.has_self_intersections() {
         return Ok(None);
     }
     let rebuilt = solid.rebuild_solid_with_token(WindingRule::Nonzero, Some(watch.token()));
@@ -238,14 +253,65 @@ fn outward_shells(mut mesh: Mesh) -> (Mesh, usize) {
     let shells: Vec<Mesh> = parts.iter().map(|faces| mesh.part(faces)).collect();
     let mut turned = 0;
     for (index, shell) in shells.iter().enumerate().filter(|(_, shell)| shell.volume() < 0.0) {
-        let is_in = |other: &Mesh| winding_number(other, &shell.vertices[0]).abs() > 0.5;
-        let is_cavity = shells.iter().enumerate().any(|(other, mesh)| other != index && is_in(mesh));
+        let is_cavity =
+            shells.iter().enumerate().any(|(other, mesh)| other != index && encloses(mesh, shell));
         if !is_cavity {
             parts[index].iter().for_each(|face| mesh.faces[*face].swap(1, 2));
             turned += parts[index].len();
         }
     }
     (mesh, turned)
+}
+
+/// Whether a shell begins in the material of others: it lies there, or crosses them.
+fn has_inner_shells(mesh: &Mesh) -> bool {
+    let shells: Vec<(Mesh, Option<Bounds>)> = parts(mesh)
+        .iter()
+        .map(|faces| {
+            let shell = mesh.part(faces);
+            let bounds = shell.bounds();
+            (shell, bounds)
+        })
+        .collect();
+    let is_inner = |index: usize| {
+        let corner = &shells[index].0.vertices[0];
+        let is_near = |bounds: &Option<Bounds>| {
+            bounds.is_some_and(|b| (0..3).all(|i| b.min[i] <= corner[i] && corner[i] <= b.max[i]))
+        };
+        let others =
+            shells.iter().enumerate().filter(|(other, (_, bounds))| *other != index && is_near(bounds));
+        let turns: f64 = others.map(|(_, (other, _))| winding_number(other, corner)).sum();
+        turns > 0.5 && shells[index].0.volume() > 0.0
+    };
+    (0..shells.len()).any(is_inner)
+}
+
+/// The mesh with one face of each pair that differ in their side alone; none unless every face has
+/// such a twin and the others are closed, which those of a sheet are not.
+fn without_backs(mesh: &Mesh) -> Option<Mesh> {
+    let all: HashSet<[u32; 3]> = mesh.faces.iter().map(|face| turned(*face)).collect();
+    let back = |[a, b, c]: [u32; 3]| turned([a, c, b]);
+    if mesh.faces.is_empty() || !all.iter().all(|face| all.contains(&back(*face))) {
+        return None;
+    }
+    let mut kept: HashSet<[u32; 3]> = HashSet::new();
+    let is_first = |&face: &usize| {
+        let own = turned(mesh.faces[face]);
+        !kept.contains(&back(own)) && kept.insert(own)
+    };
+    let faces: Vec<usize> = (0..mesh.faces.len()).filter(is_first).collect();
+    let mut one_sided = mesh.part(&faces);
+    orient(&mut one_sided);
+    is_closed(&one_sided).then_some(one_sided)
+}
+
+/// Whether a closed mesh encloses another that does not cross it.
+pub fn encloses(outer: &Mesh, inner: &Mesh) -> bool {
+    let is_within = |(outer, inner): (Bounds, Bounds)| {
+        (0..3).all(|i| outer.min[i] <= inner.min[i] && inner.max[i] <= outer.max[i])
+    };
+    outer.bounds().zip(inner.bounds()).is_some_and(is_within)
+        && inner.vertices.first().is_some_and(|corner| winding_number(outer, corner).abs() > 0.5)
 }
 
 /// How often a closed mesh winds about a point, from the solid angles of its faces (van Oosterom and Strackee, "The solid
@@ -361,7 +427,7 @@ fn sealed(source: &str, mesh: Mesh, warnings: &mut Vec<String>) -> Mesh {
     hulled
 }
 
-/// The mesh with a fan over each rim, about the mean of its corners.
+/// The mesh with a cap over each rim.
 fn with_caps(mesh: &Mesh) -> (Mesh, usize) {
     let mut balance: BTreeMap<(u32, u32), i32> = BTreeMap::new();
     for &[a, b, c] in &mesh.faces {
@@ -388,12 +454,28 @@ fn with_caps(mesh: &Mesh) -> (Mesh, usize) {
         if rim.len() < 3 {
             continue;
         }
-        let center = rim.iter().map(|v| out.vertices[*v as usize]).sum::<Vec3>() / rim.len() as f64;
-        let middle = out.vertices.len() as u32;
-        out.vertices.push(center);
-        let ends = rim.iter().skip(1).chain(&rim[..1]);
-        out.faces.extend(rim.iter().zip(ends).map(|(a, b)| [*a, *b, middle]));
+        out.faces.extend(cap(&out.vertices, &rim));
         caps += 1;
     }
     (out, caps)
+}
+
+/// The triangles over a rim, which may be concave, in the plane that its corners are nearest to.
+fn cap(vertices: &[Vec3], rim: &[u32]) -> Vec<[u32; 3]> {
+    let at = |corner: &u32| vertices[*corner as usize];
+    // twice the area, as Newell has it
+    let ends = rim.iter().skip(1).chain(&rim[..1]);
+    let area: Vec3 =
+        rim.iter().zip(ends).map(|(a, b)| (at(a) - at(&rim[0])).cross(&(at(b) - at(&rim[0])))).sum();
+    let normal = area.try_normalize(0.0).unwrap_or_else(Vec3::z);
+    let x = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
+    let y = normal.cross(&x);
+    let place = |(number, corner): (usize, &u32)| PolyVert {
+        pos: Vec2 { x: x.dot(&at(corner)), y: y.dot(&at(corner)) },
+        idx: number as i32,
+    };
+    let polygon = rim.iter().enumerate().map(place).collect();
+    let corner = |index: i32| rim[index as usize];
+    let triangles = triangulate_idx(&vec![polygon], -1.0, true);
+    triangles.iter().map(|of| [corner(of.x), corner(of.y), corner(of.z)]).collect()
 }

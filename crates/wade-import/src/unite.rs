@@ -3,14 +3,15 @@
 use manifold_rust::cancel::CancelToken;
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{BooleanEngine, Error, OpType};
+use wade_core::caught::caught;
 use wade_core::geometry::mesh::{Bounds, Mesh};
 use wade_core::geometry::parts::parts;
 use wade_core::geometry::watertight::is_closed;
 
 use crate::at;
 use crate::limits::{MOST_UNION_SECONDS, REPORTED_CAVITY, REPORTED_OVERLAP_SHARE};
-use crate::solid::{Piece, from_exchange, to_exchange};
-use crate::watch::{Watch, guarded};
+use crate::solid::{Piece, encloses, from_exchange, to_exchange};
+use crate::watch::Watch;
 
 /// The hull of all shapes.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +58,7 @@ pub fn unite(
     for group in groups(pieces) {
         let (mesh, face_piece) = match group[..] {
             [one] => (pieces[one].mesh.clone(), vec![one; pieces[one].mesh.faces.len()]),
-            _ => guarded(|| union_of(pieces, &group, watch.token())).unwrap_or_else(|| {
+            _ => caught(|| union_of(pieces, &group, watch.token())).unwrap_or_else(|_| {
                 let source_name = group.iter().map(|piece| pieces[*piece].source.clone()).collect::<Vec<_>>();
                 Err(UniteError::Failed {
                     source_name: source_name.join(", "),
@@ -140,14 +141,24 @@ fn union_of(
     Ok((mesh, ids.into_iter().map(piece).collect()))
 }
 
-/// Drops shells that look inward: the water does not reach what they enclose.
+/// Drops shells that look inward: the water does not reach what they enclose, nor what lies in there.
 fn without_cavities(united: United, warnings: &mut Vec<String>) -> United {
     let mut keep = Vec::new();
-    for part in parts(&united.mesh) {
-        let shell = united.mesh.part(&part);
+    let shells: Vec<(Vec<usize>, Mesh)> = parts(&united.mesh)
+        .into_iter()
+        .map(|part| {
+            let shell = united.mesh.part(&part);
+            (part, shell)
+        })
+        .collect();
+    let cavities: Vec<&Mesh> =
+        shells.iter().map(|(_, shell)| shell).filter(|shell| shell.volume() < 0.0).collect();
+    for (part, shell) in &shells {
         let volume = shell.volume();
         if volume > 0.0 {
-            keep.extend(part);
+            if !cavities.iter().any(|cavity| encloses(cavity, shell)) {
+                keep.extend(part);
+            }
         } else if volume < -REPORTED_CAVITY {
             let center = shell.bounds().map_or_else(Default::default, |bounds| bounds.center());
             warnings.push(format!(

@@ -1,6 +1,5 @@
 //! Stops the library of repair and union when it takes too long.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -8,12 +7,6 @@ use std::time::{Duration, Instant};
 use manifold_rust::cancel::CancelToken;
 
 use crate::limits::MOST_UNION_SECONDS;
-
-/// What the library makes of a mesh; none where a mesh that nobody foresaw makes it panic, which the user's file must not.
-pub fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
-    // nothing that the closure changes outlives a panic
-    catch_unwind(AssertUnwindSafe(work)).ok()
-}
 
 /// How often the clock is looked at.
 const STEP: Duration = Duration::from_millis(50);

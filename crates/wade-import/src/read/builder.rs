@@ -21,7 +21,7 @@ pub struct Shaper {
     locator: Locator,
     /// Which shapes are wanted.
     pub wanted: Wanted,
-    loaded: HashMap<PathBuf, Mesh>,
+    loaded: HashMap<(PathBuf, Option<String>), Mesh>,
     faces: usize,
     shapes: usize,
 }
@@ -37,6 +37,8 @@ pub struct MeshReference<'a> {
     pub scale: [f64; 3],
     /// Further folder that the path may start at.
     pub folder: &'a str,
+    /// Name of the one part of the file that is meant; else the whole file is.
+    pub part: Option<&'a str>,
 }
 
 impl Shaper {
@@ -59,6 +61,22 @@ impl Shaper {
         let roles = [("visual", Role::Visual), ("collision", Role::Collision)].into_iter();
         let wanted = roles.filter(|(_, role)| self.wants(*role));
         wanted.flat_map(|(tag, role)| link.children(tag).map(move |element| (role, element))).collect()
+    }
+
+    /// [`Shaper::left_out`] of a link with `<visual>` and `<collision>` elements.
+    pub fn link_left_out(&self, link: Element<'_, '_>) -> Result<Option<String>, ReadError> {
+        let has = |tag, is_wanted: bool| is_wanted && link.child(tag).is_some();
+        let Wanted { visual, collision } = self.wanted;
+        let wanted = has("visual", visual) || has("collision", collision);
+        let others = has("visual", !visual) || has("collision", !collision);
+        Ok(self.left_out(link.required("name")?, wanted, others))
+    }
+
+    /// That a link has shapes, and none of the kind that is asked for.
+    pub fn left_out(&self, link: &str, has_wanted: bool, has_others: bool) -> Option<String> {
+        let asked = if self.wanted.visual { "visual" } else { "collision" };
+        (has_others && !has_wanted)
+            .then(|| format!("link `{link}` is left out: it has shapes, and none for --shapes {asked}"))
     }
 
     /// A primitive at a pose.
@@ -96,16 +114,27 @@ impl Shaper {
         if !file.scale.iter().all(|s| *s != 0.0) {
             return Err(element.fault("has a scale of zero".to_owned()));
         }
-        if !self.loaded.contains_key(&path) {
+        let key = (path, file.part.map(str::to_owned));
+        if !self.loaded.contains_key(&key) {
+            let parts = meshes::load(&key.0)?;
+            let is_meant = |part: &&meshes::Part| file.part.is_none_or(|name| part.name == name);
             let mut whole = Mesh::default();
-            meshes::load(&path)?.iter().for_each(|part| whole.append(&part.mesh));
-            self.loaded.insert(path.clone(), whole);
+            parts.iter().filter(is_meant).for_each(|part| whole.append(&part.mesh));
+            if let Some(name) = file.part.filter(|_| whole.faces.is_empty()) {
+                let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+                return Err(element.fault(format!(
+                    "names the part `{name}` of {}; it has {}",
+                    file.reference,
+                    names.join(", ")
+                )));
+            }
+            self.loaded.insert(key.clone(), whole);
         }
-        let mesh = &self.loaded[&path];
+        let (mesh, path) = (&self.loaded[&key], &key.0);
         let map = Matrix3::from_diagonal(&Vec3::from(file.scale));
         let mesh = moved(&scaled(mesh, &map), pose);
         self.count(element, mesh.faces.len())?;
-        Ok(Shape { role, source: file_name(&path), mesh })
+        Ok(Shape { role, source: file_name(path), mesh })
     }
 
     fn count(&mut self, element: Element<'_, '_>, faces: usize) -> Result<(), ReadError> {

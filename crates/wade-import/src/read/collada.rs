@@ -7,7 +7,7 @@ use nalgebra::{Matrix4, Unit, Vector4};
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::Mesh;
 
-use super::meshes::Part;
+use super::meshes::{Part, fan, strip};
 use super::xml::{self, Element};
 use super::{ReadError, bytes};
 use crate::limits::{MOST_DEPTH, MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
@@ -116,7 +116,7 @@ fn mesh_of(geometry: Element<'_, '_>) -> Result<Mesh, ReadError> {
     let values = array.parse_list("float_array", array.node.text().unwrap_or_default())?;
     let vertices = values.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect();
     let mut out = Mesh { vertices, faces: Vec::new() };
-    for tag in ["triangles", "polylist", "polygons"] {
+    for tag in ["triangles", "polylist", "polygons", "tristrips", "trifans"] {
         for element in mesh.children(tag) {
             polygons(element, &mut out)?;
         }
@@ -152,8 +152,12 @@ fn polygons(element: Element<'_, '_>, out: &mut Mesh) -> Result<(), ReadError> {
         let indices = numbers(list.node.text().unwrap_or_default(), list)?;
         let corners: Vec<u32> = indices.chunks_exact(stride).map(|corner| corner[position]).collect();
         let sides = match (&counts, element.tag()) {
+            (_, "tristrips") => {
+                out.faces.extend(strip(&corners));
+                continue;
+            }
+            (_, "trifans") | (None, "polygons") => vec![corners.len()],
             (Some(counts), _) => counts.iter().map(|count| *count as usize).collect(),
-            (None, "polygons") => vec![corners.len()],
             _ => vec![3; corners.len() / 3],
         };
         let mut rest = &corners[..];
@@ -162,7 +166,7 @@ fn polygons(element: Element<'_, '_>, out: &mut Mesh) -> Result<(), ReadError> {
                 return Err(list.fault("holds fewer corners than its polygons have".to_owned()));
             };
             rest = after;
-            out.faces.extend((2..count).map(|i| [polygon[0], polygon[i - 1], polygon[i]]));
+            out.faces.extend(fan(polygon));
         }
     }
     Ok(())

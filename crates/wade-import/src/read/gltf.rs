@@ -8,14 +8,23 @@ use gltf::buffer::Source;
 use gltf::mesh::Mode;
 use gltf::{Document, Gltf, Node};
 use nalgebra::{Matrix3, Matrix4, Vector3};
+use wade_core::caught::caught;
 use wade_core::geometry::mesh::Mesh;
 
-use super::meshes::Part;
+use super::locate::decoded;
+use super::meshes::{Part, fan, strip};
 use super::{ReadError, bytes};
 use crate::limits::{MOST_DEPTH, MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
 
 /// The parts of a file, a node each.
 pub fn load(path: &Path) -> Result<Vec<Part>, ReadError> {
+    // the library looks up what a file names without asking whether it is there
+    let damaged =
+        |what| Err(ReadError::GltfContent { path: path.to_owned(), what: format!("damaged: {what}") });
+    caught(|| decode(path)).unwrap_or_else(damaged)
+}
+
+fn decode(path: &Path) -> Result<Vec<Part>, ReadError> {
     let Gltf { document, blob } = Gltf::from_slice(&bytes(path, MOST_MESH_BYTES)?)
         .map_err(|fault| ReadError::Gltf { path: path.to_owned(), fault })?;
     let buffers = buffers(path, &document, blob)?;
@@ -43,12 +52,15 @@ pub fn load(path: &Path) -> Result<Vec<Part>, ReadError> {
             let name =
                 node.name().or(mesh.name()).map_or_else(|| format!("node {}", node.index()), str::to_owned);
             let mut whole = Mesh::default();
-            for primitive in mesh.primitives().filter(|primitive| primitive.mode() == Mode::Triangles) {
+            for primitive in mesh.primitives().filter(|primitive| has_faces(primitive.mode())) {
                 let count = primitive
                     .indices()
                     .or(primitive.get(&gltf::Semantic::Positions))
                     .map_or(0, |a| a.count());
-                faces += count / 3;
+                faces += match primitive.mode() {
+                    Mode::Triangles => count / 3,
+                    _ => count.saturating_sub(2),
+                };
                 if faces > MOST_FACES {
                     return Err(ReadError::Faces { path: path.to_owned(), faces });
                 }
@@ -61,6 +73,11 @@ pub fn load(path: &Path) -> Result<Vec<Part>, ReadError> {
         open.extend(node.children().map(|child| (child, transform, depth + 1)));
     }
     Ok(parts)
+}
+
+/// Points and lines have none.
+fn has_faces(mode: Mode) -> bool {
+    matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)
 }
 
 fn triangles(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>], transform: &Matrix4<f64>) -> Mesh {
@@ -77,7 +94,11 @@ fn triangles(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>], transform: &M
         Some(indices) => indices.into_u32().collect(),
         None => (0..vertices.len() as u32).collect(),
     };
-    let mut faces: Vec<[u32; 3]> = indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
+    let mut faces: Vec<[u32; 3]> = match primitive.mode() {
+        Mode::TriangleStrip => strip(&indices),
+        Mode::TriangleFan => fan(&indices),
+        _ => indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect(),
+    };
     if linear.determinant() < 0.0 {
         faces.iter_mut().for_each(|face| face.swap(1, 2));
     }
@@ -98,7 +119,11 @@ fn buffers(path: &Path, document: &Document, blob: Option<Vec<u8>>) -> Result<Ve
                     let decoded = encoded.and_then(|encoded| STANDARD.decode(encoded).ok());
                     decoded.ok_or_else(|| content(format!("buffer {} is no base64 data", buffer.index())))?
                 }
-                None => bytes(&path.with_file_name(uri), MOST_MESH_BYTES)?,
+                None => {
+                    let beside = [path.with_file_name(uri), path.with_file_name(decoded(uri))];
+                    let [literal, address] = &beside;
+                    bytes(if literal.is_file() { literal } else { address }, MOST_MESH_BYTES)?
+                }
             },
         };
         if data.len() < buffer.length() {

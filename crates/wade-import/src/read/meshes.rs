@@ -13,6 +13,7 @@ use super::{Kind, ReadError, bytes, collada, gltf};
 use crate::file_name;
 use crate::limits::{MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
 use crate::scene::{Convention, Joint, Link, Role, Scene, Shape};
+use crate::solid::encloses;
 
 /// A named part of a mesh file, in the frame of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,6 +77,21 @@ fn obj(path: &Path) -> Result<Vec<Part>, ReadError> {
     Ok(models.into_iter().map(part).filter(|part| !part.mesh.faces.is_empty()).collect())
 }
 
+/// The triangles of a strip: each corner makes one with the two before it, every other one the other way round.
+pub fn strip(corners: &[u32]) -> Vec<[u32; 3]> {
+    let turn = |(number, of): (usize, &[u32])| match number % 2 {
+        0 => [of[0], of[1], of[2]],
+        _ => [of[1], of[0], of[2]],
+    };
+    corners.windows(3).enumerate().map(turn).collect()
+}
+
+/// The triangles of a fan about the first corner, which a polygon is as well.
+pub fn fan(corners: &[u32]) -> Vec<[u32; 3]> {
+    let Some((&first, rest)) = corners.split_first() else { return Vec::new() };
+    rest.windows(2).map(|of| [first, of[0], of[1]]).collect()
+}
+
 /// A vehicle of meshes alone: a link for each connected part, so that wheels can be recognized by their form.
 pub fn scene(files: &[PathBuf], kinds: &[Kind]) -> Result<Scene, ReadError> {
     let mut links = Vec::new();
@@ -123,8 +139,24 @@ fn connected(mesh: &Mesh) -> Vec<Mesh> {
     let solid = |face: &[u32; 3]| face[0] != face[1] && face[1] != face[2] && face[2] != face[0];
     let mesh = Mesh { faces: mesh.faces.iter().copied().filter(solid).collect(), vertices: mesh.vertices };
     let shells: Vec<Mesh> = parts(&mesh).iter().map(|faces| mesh.part(faces)).collect();
-    // an inward shell is the cavity of another, or inside out: which of both is seen together alone
-    if shells.iter().any(|shell| shell.volume() <= 0.0) { vec![mesh] } else { shells }
+    // an inward shell is the cavity of the smallest one around it, or inside out
+    let around = |index: usize| {
+        let is_around = |other: &usize| *other != index && encloses(&shells[*other], &shells[index]);
+        let size = |other: &usize| shells[*other].volume().abs();
+        (0..shells.len()).filter(is_around).min_by(|a, b| size(a).total_cmp(&size(b)))
+    };
+    let mut out: Vec<Option<Mesh>> = shells.iter().cloned().map(Some).collect();
+    for index in (0..shells.len()).filter(|&index| shells[index].volume() <= 0.0) {
+        if let Some(outer) = around(index)
+            && let Some(cavity) = out[index].take()
+        {
+            match &mut out[outer] {
+                Some(mesh) => mesh.append(&cavity),
+                none => *none = Some(cavity),
+            }
+        }
+    }
+    out.into_iter().flatten().collect()
 }
 
 fn link(name: String, mesh: Mesh) -> Link {

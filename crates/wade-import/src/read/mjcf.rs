@@ -19,37 +19,44 @@ use crate::shapes::Primitive;
 /// Density of a geom that states neither mass nor density [kg/m3].
 const DEFAULT_DENSITY: f64 = 1000.0;
 
+/// What the compiler of a model makes other elements of, which are not read here.
+const MADE_OF: [&str; 5] = ["include", "replicate", "attach", "composite", "flexcomp"];
+
 /// Reads a model; `beside` are further files that may be its meshes.
 pub fn read(path: &Path, beside: Vec<PathBuf>, wanted: Wanted) -> Result<Scene, ReadError> {
     let text = super::text(path)?;
     let document = xml::parse(path, &text)?;
     let root = Element { path, node: document.root_element() };
-    if let Some(include) = root.node.descendants().find(|node| node.has_tag_name("include")) {
-        let include = Element { node: include, ..root };
-        return Err(
-            include.fault("is not read: save the model as one file, as mj_saveLastXML does".to_owned())
-        );
+    let is_made = |node: &roxmltree::Node<'_, '_>| MADE_OF.iter().any(|tag| node.has_tag_name(*tag));
+    if let Some(node) = root.node.descendants().find(is_made) {
+        let element = Element { node, ..root };
+        return Err(element
+            .fault("is not read: save the compiled model as one file, as mj_saveLastXML does".to_owned()));
     }
     let mut reader = Reader::new(root, Shaper::new(Locator::new(path, beside), wanted))?;
     let mut scene =
         Scene { links: Vec::new(), convention: Convention::ROBOT, notes: Vec::new(), warnings: Vec::new() };
-    let tops: Vec<Element<'_, '_>> =
-        root.children("worldbody").flat_map(|world| world.children("body")).collect();
-    let is_free = |body: &&Element<'_, '_>| {
-        body.child("freejoint").is_some()
-            || body.children("joint").any(|joint| joint.attribute("type") == Some("free"))
+    let mut tops: Vec<Body<'_, '_>> = Vec::new();
+    for world in root.children("worldbody") {
+        let placed = reader.children(world, "body", &Isometry3::identity(), None)?;
+        tops.extend(placed.into_iter().map(|placed| Body { placed, parent: None }));
+    }
+    let is_free = |body: &&Body<'_, '_>| {
+        let element = body.placed.element;
+        element.child("freejoint").is_some()
+            || element.children("joint").any(|joint| joint.attribute("type") == Some("free"))
     };
-    let free: Vec<&Element<'_, '_>> = tops.iter().filter(is_free).collect();
+    let free: Vec<&Body<'_, '_>> = tops.iter().filter(is_free).collect();
     let mut open: Vec<Body<'_, '_>> = match free[..] {
         // a robot in a scene
         [one] if tops.len() > 1 => {
-            let name = one.attribute("name").unwrap_or("body");
+            let name = one.placed.element.attribute("name").unwrap_or("body");
             scene
                 .notes
                 .push(format!("{} bodies in the world: `{name}`, the free one, is imported", tops.len()));
-            vec![Body::top(*one)]
+            vec![*one]
         }
-        _ => tops.iter().rev().map(|top| Body::top(*top)).collect(),
+        _ => tops.iter().rev().copied().collect(),
     };
     if open.is_empty() {
         return Err(ReadError::Nothing { path: path.to_owned(), what: "body in a worldbody" });
@@ -58,35 +65,34 @@ pub fn read(path: &Path, beside: Vec<PathBuf>, wanted: Wanted) -> Result<Scene, 
         if scene.links.len() >= MOST_LINKS {
             return Err(ReadError::Many { path: path.to_owned(), what: "bodies" });
         }
-        let class = body.element.attribute("childclass").map_or(body.class, Some);
+        let element = body.placed.element;
+        let class = element.attribute("childclass").map_or(body.placed.class, Some);
         let link = reader.link(&body, class, scene.links.len())?;
         let (own, pose) = (scene.links.len(), link.pose);
         scene.links.push(link);
-        let children: Vec<_> = body.element.children("body").collect();
-        open.extend(children.into_iter().rev().map(|element| Body {
-            element,
-            parent: Some(own),
-            above: pose,
-            class,
-        }));
+        let children = reader.children(element, "body", &pose, class)?;
+        open.extend(children.into_iter().rev().map(|placed| Body { placed, parent: Some(own) }));
     }
+    scene.warnings.append(&mut reader.warnings);
     Ok(scene)
 }
 
-/// A body that is still to be read.
-struct Body<'a, 'input> {
+/// An element in the frames around it.
+#[derive(Clone, Copy)]
+struct Placed<'a, 'input> {
     element: Element<'a, 'input>,
-    parent: Option<usize>,
+    /// The frame that its own pose counts from, in that of the scene.
     above: Isometry3<f64>,
     /// Class of defaults that it inherits.
     class: Option<&'a str>,
 }
 
-impl<'a, 'input> Body<'a, 'input> {
-    /// A body of the world.
-    fn top(element: Element<'a, 'input>) -> Self {
-        Self { element, parent: None, above: Isometry3::identity(), class: None }
-    }
+/// A body that is still to be read.
+#[derive(Clone, Copy)]
+struct Body<'a, 'input> {
+    placed: Placed<'a, 'input>,
+    /// Its parent's number; none of a body of the world.
+    parent: Option<usize>,
 }
 
 /// Attributes of the defaults of one class, by element.
@@ -101,12 +107,15 @@ struct Reader<'a, 'input> {
     mesh_folder: &'a str,
     is_degrees: bool,
     euler: &'a str,
+    /// What looks wrong.
+    warnings: Vec<String>,
 }
 
 impl<'a, 'input> Reader<'a, 'input> {
     fn new(root: Element<'a, 'input>, shaper: Shaper) -> Result<Self, ReadError> {
-        let compiler = root.children("compiler").last();
-        let setting = |name: &str| compiler.and_then(|compiler| compiler.attribute(name));
+        // sections that stand there twice are one, in which the last word counts
+        let setting =
+            |name: &str| root.children("compiler").filter_map(|section| section.attribute(name)).last();
         let mut meshes = HashMap::new();
         for mesh in root.children("asset").flat_map(|asset| asset.children("mesh")) {
             let file = mesh.attribute("file").unwrap_or_default();
@@ -127,7 +136,31 @@ impl<'a, 'input> Reader<'a, 'input> {
             mesh_folder: setting("meshdir").or(setting("assetdir")).unwrap_or_default(),
             is_degrees: setting("angle") != Some("radian"),
             euler: setting("eulerseq").unwrap_or("xyz"),
+            warnings: Vec::new(),
         })
+    }
+
+    /// Children of that name, those in `<frame>` elements too.
+    fn children(
+        &self,
+        of: Element<'a, 'input>,
+        name: &'static str,
+        above: &Isometry3<f64>,
+        class: Option<&'a str>,
+    ) -> Result<Vec<Placed<'a, 'input>>, ReadError> {
+        let mut children = Vec::new();
+        for node in of.node.children().filter(|node| node.is_element()) {
+            let element = Element { node, ..of };
+            if element.tag() == name {
+                children.push(Placed { element, above: *above, class });
+            } else if element.tag() == "frame" {
+                let inner = above * self.pose(element, None)?;
+                let class = element.attribute("childclass").map_or(class, Some);
+                // the document is bounded in depth
+                children.extend(self.children(element, name, &inner, class)?);
+            }
+        }
+        Ok(children)
     }
 
     /// An attribute of an element, or that of its class of defaults.
@@ -164,35 +197,45 @@ impl<'a, 'input> Reader<'a, 'input> {
         class: Option<&'a str>,
         number: usize,
     ) -> Result<Link, ReadError> {
-        let element = body.element;
+        let element = body.placed.element;
         let name = element.attribute("name").map_or_else(|| format!("body {number}"), str::to_owned);
-        let pose = body.above * self.pose(element, None)?;
-        let geoms: Vec<Element<'_, '_>> = element.children("geom").collect();
-        let is_visual = |geom: &Element<'a, 'input>| {
-            let off = |name| self.attribute(*geom, class, name) == Some("0");
-            off("contype") && off("conaffinity")
-        };
-        let visual: Vec<bool> = geoms.iter().map(is_visual).collect();
-        let has_visual = visual.contains(&true);
-        let (mut shapes, mut parts) = (Vec::new(), Vec::new());
-        for (geom, is_visual) in geoms.into_iter().zip(visual) {
-            let role = match (is_visual, has_visual) {
-                (true, _) => Role::Visual,
-                (false, true) => Role::Collision,
-                (false, false) => Role::Both,
-            };
-            let Some(shape) = self.shape(&name, geom, class, (role, &pose))? else { continue };
+        let pose = body.placed.above * self.pose(element, None)?;
+        let geoms = self.children(element, "geom", &pose, class)?;
+        let roles = self.roles(&geoms);
+        let (mut shapes, mut parts, mut has_others) = (Vec::new(), Vec::new(), false);
+        for (Placed { element: geom, above, class }, role) in geoms.into_iter().zip(roles) {
+            let Some(shape) = self.shape(&name, geom, class, (role, &above))? else { continue };
             parts.extend(self.geom_mass(geom, class, &shape)?);
             if self.shaper.wants(role) {
                 shapes.push(shape);
+            } else {
+                has_others = true;
             }
         }
-        let inertial = match element.child("inertial") {
-            Some(inertial) => Some(self.inertial(inertial, &pose)?),
+        self.warnings.extend(self.shaper.left_out(&name, !shapes.is_empty(), has_others));
+        let inertial = match self.children(element, "inertial", &pose, class)?.first() {
+            Some(inertial) => Some(self.inertial(inertial.element, &inertial.above)?),
             None => sum(&parts),
         };
         let joint = if body.parent.is_some() { self.joint(element, class, &pose)? } else { Joint::Fixed };
         Ok(Link { name, parent: body.parent, joint, pose, shapes, inertial })
+    }
+
+    /// What the geoms of a body are for. One that collides with nothing is only seen; those that collide are a second model of
+    /// the body where they are of other groups than these, and are seen with them where they are of the same.
+    fn roles(&self, geoms: &[Placed<'a, 'input>]) -> Vec<Role> {
+        let off =
+            |geom: &Placed<'a, 'input>, name| self.attribute(geom.element, geom.class, name) == Some("0");
+        let group =
+            |geom: &Placed<'a, 'input>| self.attribute(geom.element, geom.class, "group").unwrap_or("0");
+        let is_visual = |geom: &Placed<'a, 'input>| off(geom, "contype") && off(geom, "conaffinity");
+        let seen: HashSet<&str> = geoms.iter().filter(|geom| is_visual(geom)).map(group).collect();
+        let role = |geom: &Placed<'a, 'input>| match is_visual(geom) {
+            true => Role::Visual,
+            false if seen.is_empty() || seen.contains(group(geom)) => Role::Both,
+            false => Role::Collision,
+        };
+        geoms.iter().map(role).collect()
     }
 
     fn joint(
@@ -201,8 +244,8 @@ impl<'a, 'input> Reader<'a, 'input> {
         class: Option<&str>,
         pose: &Isometry3<f64>,
     ) -> Result<Joint, ReadError> {
-        let joints: Vec<Element<'_, '_>> = body.children("joint").collect();
-        let [joint] = joints[..] else {
+        let joints = self.children(body, "joint", pose, class)?;
+        let [Placed { element: joint, above: pose, class }] = joints[..] else {
             return Ok(if joints.is_empty() { Joint::Fixed } else { Joint::Other });
         };
         let name = joint.attribute("name").unwrap_or_default();
@@ -342,7 +385,19 @@ impl<'a, 'input> Reader<'a, 'input> {
         };
         let scale = self.vector(asset, None, "scale")?.unwrap_or([1.0; 3]);
         let folder = self.mesh_folder;
-        self.shaper.mesh(geom, role, MeshReference { link, reference, scale, folder }, pose)
+        // MuJoCo takes the frame of the mesh off its corners, and then scales them
+        let at = Vec3::from(self.vector(asset, None, "refpos")?.unwrap_or([0.0; 3]));
+        let [w, x, y, z] = self.vector(asset, None, "refquat")?.unwrap_or([1.0, 0.0, 0.0, 0.0]);
+        let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9);
+        let turn = turn.ok_or_else(|| asset.fault("has a direction of length zero".to_owned()))?;
+        if turn.angle() > 0.0 && scale.iter().any(|other| *other != scale[0]) {
+            return Err(
+                asset.fault("has a refquat and a scale that differs by axis, which are not read".to_owned())
+            );
+        }
+        let frame = Isometry3::from_parts(at.component_mul(&Vec3::from(scale)).into(), turn);
+        let file = MeshReference { link, reference, scale, folder, part: None };
+        self.shaper.mesh(geom, role, file, &(pose * frame.inverse()))
     }
 
     /// Mass of a geom by its own statement or by density; none for an open mesh.

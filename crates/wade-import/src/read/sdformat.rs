@@ -24,7 +24,12 @@ pub fn read(path: &Path, beside: Vec<PathBuf>, wanted: Wanted) -> Result<Scene, 
         .children("model")
         .chain(root.children("world").flat_map(|world| world.children("model")))
         .collect();
-    let Some(&model) = models.iter().find(|model| model.child("joint").is_some()).or(models.first()) else {
+    // the ground and the walls of a world stand still
+    let moves = |model: &&Element<'_, '_>| !matches!(model.text("static"), Some("true" | "1"));
+    let Some(&model) = (models.iter().find(|model| model.child("joint").is_some()))
+        .or_else(|| models.iter().find(moves))
+        .or(models.first())
+    else {
         return Err(ReadError::Nothing { path: path.to_owned(), what: "model" });
     };
     let mut scene =
@@ -50,6 +55,7 @@ pub fn read(path: &Path, beside: Vec<PathBuf>, wanted: Wanted) -> Result<Scene, 
     let joints = joints(model, &frames)?;
     for name in order(path, &links, &joints)? {
         let Some(element) = links.iter().find(|link| link.attribute("name") == Some(name)) else { continue };
+        scene.warnings.extend(shaper.link_left_out(*element)?);
         let pose = frames.pose(name)?;
         let above = joints.get(name);
         let parent = above.and_then(|above| scene.links.iter().position(|link| link.name == above.parent));
@@ -175,8 +181,11 @@ fn joint(element: Element<'_, '_>, frames: &Frames<'_, '_>) -> Result<Joint, Rea
     let xyz =
         axis.map(|axis| axis.text_numbers::<3>("xyz")).transpose()?.flatten().unwrap_or([0.0, 0.0, 1.0]);
     let expressed = stated.and_then(|xyz| xyz.attribute("expressed_in")).filter(|frame| !frame.is_empty());
+    // of SDFormat before 1.7
+    let is_of_model = matches!(axis.and_then(|axis| axis.text("use_parent_model_frame")), Some("true" | "1"));
     let turn = match expressed {
         Some(frame) => frames.pose(frame)?.rotation,
+        None if is_of_model => nalgebra::UnitQuaternion::identity(),
         None => pose.rotation,
     };
     let Some(unit) = Vec3::from(xyz).try_normalize(1e-9) else {
@@ -266,9 +275,15 @@ fn shape(
         "mesh" => {
             let reference = geometry.text("uri").ok_or_else(|| geometry.fault("has no <uri>".to_owned()))?;
             let scale = geometry.text_numbers("scale")?.unwrap_or([1.0; 3]);
-            return shaper
-                .mesh(geometry, role, MeshReference { link, reference, scale, folder: "" }, at)
-                .map(Some);
+            let submesh = geometry.child("submesh");
+            if let Some(submesh) =
+                submesh.filter(|submesh| matches!(submesh.text("center"), Some("true" | "1")))
+            {
+                return Err(submesh.fault("with <center> is not read: move the part in its file".to_owned()));
+            }
+            let part = submesh.and_then(|submesh| submesh.text("name"));
+            let file = MeshReference { link, reference, scale, folder: "", part };
+            return shaper.mesh(geometry, role, file, at).map(Some);
         }
         // the ground
         "plane" | "heightmap" | "empty" => return Ok(None),

@@ -23,7 +23,11 @@ pub fn read(path: &Path, beside: Vec<PathBuf>, wanted: Wanted) -> Result<Scene, 
     let mut shaper = Shaper::new(Locator::new(path, beside), wanted);
     let mut scene =
         Scene { links: Vec::new(), convention: Convention::ROBOT, notes: Vec::new(), warnings: Vec::new() };
-    if robot.node.descendants().any(|node| node.tag_name().name().starts_with("xacro")) {
+    let is_macro = |node: &roxmltree::Node<'_, '_>| {
+        node.tag_name().namespace().is_some_and(|namespace| namespace.ends_with("xacro"))
+            || node.attributes().any(|attribute| attribute.value().contains("${"))
+    };
+    if robot.node.descendants().any(|node| is_macro(&node)) {
         return Err(robot.fault("holds xacro macros: expand them with `xacro FILE > robot.urdf`".to_owned()));
     }
     let elements: Vec<Element<'_, '_>> = robot.children("link").collect();
@@ -35,6 +39,7 @@ pub fn read(path: &Path, beside: Vec<PathBuf>, wanted: Wanted) -> Result<Scene, 
     }
     for placed in Tree::read(robot, &elements)?.placed()? {
         let element = elements[placed.element];
+        scene.warnings.extend(shaper.link_left_out(element)?);
         let link = Link {
             name: element.required("name")?.to_owned(),
             parent: placed.parent,
@@ -208,7 +213,8 @@ fn shape(
         "mesh" => {
             let reference = geometry.required("filename")?;
             let scale = geometry.numbers("scale")?.unwrap_or([1.0; 3]);
-            return shaper.mesh(geometry, role, MeshReference { link, reference, scale, folder: "" }, at);
+            let file = MeshReference { link, reference, scale, folder: "", part: None };
+            return shaper.mesh(geometry, role, file, at);
         }
         _ => {
             return Err(

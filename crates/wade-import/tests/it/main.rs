@@ -1,6 +1,7 @@
 //! What the import promises, on robots that the tests write themselves.
 
 mod bad_input;
+mod forms;
 mod mass;
 mod solids;
 mod time;
