@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::means::{Means, SURFACES_FILE, short_number};
+use super::means::{Means, SURFACES_FILE};
 use super::plan::{Bed, CAMPAIGN_FILE, Case, Ground, Plan, Set, as_set};
 use super::run::{RunError, Work};
 use super::solve::{Load, Measured, Outcome, method};
@@ -169,28 +169,36 @@ impl CaseSummary {
             measured_depth_m: None,
             measured_speed_mps: None,
         };
+        let summary = summary.shortened();
         match &outcome.measured {
             Some(flow) => summary.with_flow(case, flow),
             None => summary,
         }
     }
 
-    /// The same with the flow that was measured, and numbers as short as they are uncertain.
-    fn with_flow(self, case: &Case, flow: &Measured) -> Self {
+    /// The same with numbers as long as they can be told apart.
+    fn shortened(self) -> Self {
         Self {
-            fx_n: short_number(self.fx_n),
-            fy_n: short_number(self.fy_n),
-            fz_n: short_number(self.fz_n),
-            rest_fz_n: short_number(self.rest_fz_n),
-            scatter_fx_n: short_number(self.scatter_fx_n),
-            scatter_fy_n: short_number(self.scatter_fy_n),
-            scatter_fz_n: short_number(self.scatter_fz_n),
-            drift_fx_n: short_number(self.drift_fx_n),
-            drift_fy_n: short_number(self.drift_fy_n),
-            drift_fz_n: short_number(self.drift_fz_n),
+            fx_n: to_four_places(self.fx_n),
+            fy_n: to_four_places(self.fy_n),
+            fz_n: to_four_places(self.fz_n),
+            rest_fz_n: to_four_places(self.rest_fz_n),
+            scatter_fx_n: to_four_places(self.scatter_fx_n),
+            scatter_fy_n: to_four_places(self.scatter_fy_n),
+            scatter_fz_n: to_four_places(self.scatter_fz_n),
+            drift_fx_n: to_four_places(self.drift_fx_n),
+            drift_fy_n: to_four_places(self.drift_fy_n),
+            drift_fz_n: to_four_places(self.drift_fz_n),
             core_s: to_four_places(self.core_s),
             mass_imbalance: to_four_places(self.mass_imbalance),
             end_s: to_four_places(self.end_s),
+            ..self
+        }
+    }
+
+    /// The same with the flow that was measured.
+    fn with_flow(self, case: &Case, flow: &Measured) -> Self {
+        Self {
             ground: Some(case.ground),
             bed_share: Some(case.share_of_bed()),
             roll_deg: Some(case.roll_deg),
@@ -203,9 +211,10 @@ impl CaseSummary {
     }
 }
 
-/// To a tenth of a millimeter.
+/// To 0.0001 of the unit.
 fn to_four_places(value: f64) -> f64 {
-    (1e4 * value).round() / 1e4
+    // never -0
+    (1e4 * value).round() / 1e4 + 0.0
 }
 
 fn net(loads: &[Load]) -> Vec3 {

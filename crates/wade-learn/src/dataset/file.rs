@@ -2,11 +2,10 @@
 //! and DuckDB. The key-value meta data carry what no column can: `wade.format`, `wade.meta` (JSON), `wade.units`
 //! (JSON, by column) and `wade.frame`.
 
-use std::cell::Cell;
 use std::fs::File;
-use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 use wade_core::at::At;
+use wade_core::caught::caught;
 
 use parquet::errors::ParquetError;
 use parquet::file::reader::SerializedFileReader;
@@ -197,31 +196,10 @@ pub fn write_compact(path: &Path, dataset: &Dataset) -> Result<(), DatasetError>
 
 fn load(path: &Path) -> Result<Dataset, Fault> {
     let file = File::open(path)?;
-    let dataset = unless_it_panics(|| decode(&SerializedFileReader::new(file)?))?;
+    let decoded = caught(|| decode(&SerializedFileReader::new(file)?));
+    let dataset = decoded.unwrap_or_else(|message| Err(Fault::Damaged { message }))?;
     dataset.check()?;
     Ok(dataset)
-}
-
-thread_local! {
-    static DECODES: Cell<bool> = const { Cell::new(false) };
-}
-
-/// True while this thread decodes a file: a panic then comes back as an error, which a program's panic hook need not print too.
-pub fn catches_panics() -> bool {
-    DECODES.get()
-}
-
-/// Parquet's own reader panics over some files that are damaged, where it should return an error.
-fn unless_it_panics(decode: impl FnOnce() -> Result<Dataset, Fault>) -> Result<Dataset, Fault> {
-    DECODES.set(true);
-    // nothing that the panic may have left half-done outlives it
-    let outcome = panic::catch_unwind(AssertUnwindSafe(decode));
-    DECODES.set(false);
-    outcome.unwrap_or_else(|payload| {
-        let literal = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
-        let message = literal.or_else(|| payload.downcast_ref::<String>().cloned());
-        Err(Fault::Damaged { message: message.unwrap_or_else(|| "its reader panicked".to_owned()) })
-    })
 }
 
 fn store(path: &Path, dataset: &Dataset, loads: Loads) -> Result<(), Fault> {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::case::{CaseError, CaseFile, Placement};
 use super::fluent::{FluentError, Reports};
 use super::history::{History, HistoryError};
-use super::openfoam::{self, OpenFoamError};
+use super::openfoam::{self, OpenFoamError, Run, SurfaceHistory};
 use super::sections::Sections;
 use super::{CutOff, Dataset, Flaw, Image, Meta, Rest, Sample, SurfaceLoad};
 use wade_core::frame::Vec3;
@@ -117,6 +117,22 @@ pub enum ImportError {
         /// What is wrong.
         fault: OpenFoamError,
     },
+    /// Surfaces whose loads come from different runs.
+    #[error(
+        "surface `{surface}`: {} holds no loads of the run that wrote {} for surface `{other}`: the loads of one case must come from the same \
+         runs; restore what is missing, or move the outdated run out of the folders",
+        .folder.display(), .file.display()
+    )]
+    MixedRuns {
+        /// The surface that lacks the run.
+        surface: String,
+        /// The folder where the run would be.
+        folder: PathBuf,
+        /// A surface that has the run.
+        other: String,
+        /// Its file.
+        file: PathBuf,
+    },
     /// Moments about an unknown point.
     #[error(
         "{}, surface `{surface}`: no header states the point that the moments are taken about: put the line `# CofR : (x y z)` above the names of the columns",
@@ -162,6 +178,16 @@ enum Take {
 }
 
 impl Take {
+    /// First and last time that are wanted [s].
+    fn window(self) -> (f64, f64) {
+        match self {
+            Self::Sections(Sections { transient_s, count, length_s }) => {
+                (transient_s, transient_s + length_s * f64::from(count))
+            }
+            Self::Last => (f64::MAX, f64::MAX),
+        }
+    }
+
     fn from<const N: usize>(self, history: &History<N>) -> Result<Vec<[f64; N]>, HistoryError> {
         match self {
             Self::Sections(sections) => sections.means(history),
@@ -183,11 +209,12 @@ impl Import {
     pub fn run(&self, folder: &Path, progress: &dyn Fn(usize, usize)) -> Result<Dataset, ImportError> {
         let folders = case_folders(folder)?;
         let (mut samples, mut contacts, mut domains) = (Vec::new(), Vec::new(), BTreeSet::new());
-        let mut left_out = BTreeSet::new();
+        let (mut left_out, mut passed_over) = (BTreeSet::new(), BTreeSet::new());
         for (done, path) in folders.iter().enumerate() {
             progress(done, folders.len());
-            let (case, of_case) = self.case(path)?;
+            let (case, of_case, not_read) = self.case(path)?;
             samples.extend(of_case);
+            passed_over.extend(not_read);
             left_out.extend(self.left_out(path, &case));
             contacts.push(case.ground_contact);
             domains.extend(case.domain_m.map(|[x, y, z]| format!("{x} x {y} x {z} ({})", case.vehicle)));
@@ -203,6 +230,9 @@ impl Import {
         }
         if !left_out.is_empty() {
             notes.insert(LEFT_OUT.to_owned(), left_out.into_iter().collect::<Vec<_>>().join(", "));
+        }
+        if !passed_over.is_empty() {
+            notes.insert(PASSED_OVER.to_owned(), first_names(&passed_over));
         }
         let used = |(name, _): &(&String, &Vec<String>)| samples.iter().any(|s: &Sample| s.vehicle == **name);
         let meta = Meta {
@@ -258,20 +288,30 @@ impl Import {
         }
     }
 
-    /// The description and the samples of one case, whose name is that of its folder.
-    pub fn case(&self, folder: &Path) -> Result<(CaseFile, Vec<Sample>), ImportError> {
+    /// The description and the samples of one case, whose name is that of its folder, and the files that were passed over.
+    fn case(&self, folder: &Path) -> Result<(CaseFile, Vec<Sample>, Vec<String>), ImportError> {
         let case = self.description(folder)?;
-        let samples = self.samples(folder, &case)?;
-        Ok((case, samples))
+        let mut passed_over = Vec::new();
+        let samples = self.samples(folder, &case, &mut passed_over)?;
+        let within = |path: &PathBuf| {
+            let parent = folder.parent().unwrap_or(folder);
+            path.strip_prefix(parent).unwrap_or(path).display().to_string()
+        };
+        Ok((case, samples, passed_over.iter().map(within).collect()))
     }
 
-    fn samples(&self, folder: &Path, case: &CaseFile) -> Result<Vec<Sample>, ImportError> {
+    fn samples(
+        &self,
+        folder: &Path,
+        case: &CaseFile,
+        passed_over: &mut Vec<PathBuf>,
+    ) -> Result<Vec<Sample>, ImportError> {
         let described = |fault| ImportError::Description { path: folder.join(CASE_FILE), fault };
         let condition = case.condition().map_err(described)?;
         let placement = case.placement();
-        let loads = self.loads(folder, case, Take::Sections(self.sections))?;
+        let loads = self.loads(folder, case, Take::Sections(self.sections), passed_over)?;
         let rest = match &case.rest {
-            Some(name) => Some(self.rest(&folder.join(name), case)?),
+            Some(name) => Some(self.rest(&folder.join(name), case, passed_over)?),
             None => None,
         };
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -302,8 +342,13 @@ impl Import {
     }
 
     /// The last values of the case at rest.
-    fn rest(&self, folder: &Path, case: &CaseFile) -> Result<Vec<Rest>, ImportError> {
-        let loads = self.loads(folder, case, Take::Last)?;
+    fn rest(
+        &self,
+        folder: &Path,
+        case: &CaseFile,
+        passed_over: &mut Vec<PathBuf>,
+    ) -> Result<Vec<Rest>, ImportError> {
+        let loads = self.loads(folder, case, Take::Last, passed_over)?;
         let placement: Placement = case.placement();
         let rest = |(taken, surface): (&Taken, &String)| {
             let no_moment = || ImportError::RestMoment { path: folder.to_owned(), surface: surface.clone() };
@@ -316,32 +361,50 @@ impl Import {
         loads.iter().zip(&self.vehicles[&case.vehicle]).map(rest).collect()
     }
 
-    fn loads(&self, folder: &Path, case: &CaseFile, take: Take) -> Result<Vec<Taken>, ImportError> {
-        let surfaces = &self.vehicles[&case.vehicle];
-        match self.format {
-            Format::OpenFoam => {
-                let taken = |surface: &String| self.openfoam(folder, case, surface, take);
-                surfaces.iter().map(taken).collect()
-            }
-            Format::Fluent => {
-                let reports = Reports::read(folder, self.cut_off)?;
-                surfaces.iter().map(|surface| fluent(folder, case, &reports, surface, take)).collect()
-            }
-        }
-    }
-
-    fn openfoam(
+    fn loads(
         &self,
         folder: &Path,
         case: &CaseFile,
-        surface: &str,
         take: Take,
-    ) -> Result<Taken, ImportError> {
-        let output = folder.join("postProcessing").join(case.name_in_solver(surface));
-        let history = openfoam::read(&output, self.cut_off)
-            .map_err(|fault| ImportError::OpenFoam { surface: surface.to_owned(), fault })?;
+        passed_over: &mut Vec<PathBuf>,
+    ) -> Result<Vec<Taken>, ImportError> {
+        let surfaces = &self.vehicles[&case.vehicle];
+        match self.format {
+            Format::OpenFoam => {
+                let mut outputs = Vec::new();
+                for surface in surfaces {
+                    let folder = folder.join("postProcessing").join(case.name_in_solver(surface));
+                    let history = openfoam::read(&folder, self.cut_off)
+                        .map_err(|fault| ImportError::OpenFoam { surface: surface.clone(), fault })?;
+                    outputs.push(SurfaceOutput { surface, folder, history });
+                }
+                check_runs(&outputs, take.window())?;
+                outputs.iter().map(|output| output.take(take)).collect()
+            }
+            Format::Fluent => {
+                let reports = Reports::read(folder, self.cut_off)?;
+                let taken = surfaces.iter().map(|surface| fluent(folder, case, &reports, surface, take));
+                let taken = taken.collect::<Result<_, _>>()?;
+                passed_over.extend(reports.passed_over().map(Path::to_owned));
+                Ok(taken)
+            }
+        }
+    }
+}
+
+/// What OpenFOAM wrote for one surface.
+struct SurfaceOutput<'a> {
+    surface: &'a str,
+    folder: PathBuf,
+    history: SurfaceHistory,
+}
+
+impl SurfaceOutput<'_> {
+    fn take(&self, take: Take) -> Result<Taken, ImportError> {
+        let Self { surface, folder, history } = self;
         if history.moment.is_some() && history.about.is_none() {
-            return Err(ImportError::MomentCenter { path: output, surface: surface.to_owned() });
+            let surface = (*surface).to_owned();
+            return Err(ImportError::MomentCenter { path: folder.clone(), surface });
         }
         let means = |history: &History<3>, file: &Path| {
             let means = take.from(history).map_err(|fault| sections_error(file, surface, fault))?;
@@ -359,6 +422,44 @@ impl Import {
 
 /// Note of a data set on what was reported and belongs to no surface.
 pub const LEFT_OUT: &str = "left_out";
+
+/// Note of a data set on files beside those that were read, of the same ending, that are no reports or cannot be read.
+pub const PASSED_OVER: &str = "passed_over";
+
+/// Files that the note names.
+const NAMED_FILES: usize = 5;
+
+/// The first of many names, and how many more there are.
+fn first_names(names: &BTreeSet<String>) -> String {
+    let first: Vec<&str> = names.iter().take(NAMED_FILES).map(String::as_str).collect();
+    match names.len() - first.len() {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
+}
+
+/// Refuses surfaces of which one lacks a run that another has in the times that are wanted: their sum would mix two runs.
+fn check_runs(outputs: &[SurfaceOutput], (from, to): (f64, f64)) -> Result<(), ImportError> {
+    let runs = |output: &SurfaceOutput| output.history.runs_between(from, to).to_vec();
+    let mut all: Vec<(&SurfaceOutput, Run)> = Vec::new();
+    for output in outputs {
+        all.extend(runs(output).into_iter().map(|run| (output, run)));
+    }
+    // what lacks the latest run is the surface to look at
+    all.sort_by(|(_, a), (_, b)| b.since.total_cmp(&a.since).then_with(|| b.name.cmp(&a.name)));
+    for (has, run) in all {
+        let lacks = |output: &&SurfaceOutput| runs(output).iter().all(|other| other.name != run.name);
+        if let Some(lacks) = outputs.iter().find(lacks) {
+            return Err(ImportError::MixedRuns {
+                surface: lacks.surface.to_owned(),
+                folder: lacks.folder.clone(),
+                other: has.surface.to_owned(),
+                file: run.file,
+            });
+        }
+    }
+    Ok(())
+}
 
 /// Two surfaces for which the solver has the same name, and that.
 fn shared_patch(case: &CaseFile, surfaces: &[String]) -> Option<([String; 2], String)> {

@@ -60,8 +60,20 @@ impl<'a> Lines<'a> {
         numbered.filter(|(_, line)| !line.is_empty())
     }
 
-    /// The numbers of a line; `None` where it is cut off and that is allowed.
+    /// The numbers of a line, all of them finite; `None` where it is cut off and that is allowed.
     pub(super) fn row(
+        &self,
+        line: usize,
+        text: &str,
+        expected: usize,
+    ) -> Result<Option<Vec<f64>>, LineError> {
+        let row = self.numbers(line, text, expected)?;
+        row.iter().flatten().enumerate().try_for_each(|(index, value)| finite(line, index, *value))?;
+        Ok(row)
+    }
+
+    /// The same where NaN and infinity may stand in it.
+    pub(super) fn numbers(
         &self,
         line: usize,
         text: &str,
@@ -81,10 +93,15 @@ impl<'a> Lines<'a> {
         if !whole {
             return Err(LineError::Numbers { line, found, expected });
         }
-        match row.iter().position(|x| !x.is_finite()) {
-            Some(index) => Err(LineError::NotFinite { line, number: index + 1, value: row[index] }),
-            None => Ok(Some(row)),
-        }
+        Ok(Some(row))
+    }
+}
+
+/// Refuses a number of a line that is not finite, counted from 0.
+pub(super) fn finite(line: usize, index: usize, value: f64) -> Result<(), LineError> {
+    match value.is_finite() {
+        true => Ok(()),
+        false => Err(LineError::NotFinite { line, number: index + 1, value }),
     }
 }
 

@@ -33,7 +33,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 pub use check::Flaw;
-pub use file::{DatasetError, FORMAT, Fault, catches_panics, read, write, write_compact};
+pub use file::{DatasetError, FORMAT, Fault, read, write, write_compact};
 pub use lines::{CutOff, LineError};
 pub use merge::MergeError;
 

@@ -5,6 +5,9 @@
 //! started again adds a folder named by its start time, and a file that is there already is not overwritten but joined by
 //! `force_<time>.dat`, with the start time or the time of the first step. The header of all of them states the point that moments are taken about, `CofR`; a file
 //! that lost it is read, and says so.
+//!
+//! A file that is passed over leaves the loads of an older run in its place, which nothing shows later. So what lies in a
+//! folder of a start time and cannot be read is refused: compressed files, forces without their moments, two forms at once.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,6 +31,28 @@ pub struct SurfaceHistory {
     pub force_file: PathBuf,
     /// The file with the last moments.
     pub moment_file: Option<PathBuf>,
+    /// The runs that the forces are joined from, in the order of time.
+    pub runs: Vec<Run>,
+}
+
+/// One run of a solver, of which a history has a part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// First time that counts [s].
+    pub since: f64,
+    /// Folder of its start time, with what tells a second run from the first: the same for all surfaces of the run.
+    pub name: String,
+    /// Its file with forces.
+    pub file: PathBuf,
+}
+
+impl SurfaceHistory {
+    /// The runs that the loads between two times come from [s].
+    pub fn runs_between(&self, from: f64, to: f64) -> &[Run] {
+        let first = self.runs.partition_point(|run| run.since <= from).saturating_sub(1);
+        let end = self.runs.partition_point(|run| run.since < to).max(first + 1);
+        &self.runs[first..end]
+    }
 }
 
 /// Why the output of a function object was refused.
@@ -47,15 +72,55 @@ pub enum OpenFoamError {
         /// The folder of the function object.
         path: PathBuf,
     },
-    /// Forces of a start time without the moments that other start times have.
-    #[error("{}: moments start at {found} s and forces at {expected} s", .path.display())]
-    NoMoments {
-        /// The folder of the function object.
+    /// Forces of a run without the moments that other runs have, or moments without forces.
+    #[error(
+        "{} is missing beside {}: forces and moments must come from the same runs; restore it, or move the other out of the folder",
+        .missing.display(), .beside.display()
+    )]
+    Unpaired {
+        /// The file that is missing.
+        missing: PathBuf,
+        /// The file that it belongs to.
+        beside: PathBuf,
+    },
+    /// A compressed file, which may be a later run than those that can be read.
+    #[error("{} is compressed: unpack it with gunzip, or move it out of the folder", .path.display())]
+    Compressed {
+        /// The file.
         path: PathBuf,
-        /// First start time with moments [s].
-        found: f64,
-        /// First start time with forces [s].
-        expected: f64,
+    },
+    /// Forces of one start time in both forms.
+    #[error(
+        "{} and {} are both forces from one start time, of two versions of OpenFOAM: move the outdated file out of the folder",
+        .both.display(), .force.display()
+    )]
+    TwoForms {
+        /// The file with forces and moments.
+        both: PathBuf,
+        /// The file with forces or moments alone.
+        force: PathBuf,
+    },
+    /// Loads in the axes of a coordinate system.
+    #[error(
+        "{} has localForces, which a coordinateSystem adds and wade does not read: remove the coordinateSystem from the function \
+         object, move this file out of the folder, and run the case or `foamPostProcess` (`postProcess` before version 11) again",
+        .path.display()
+    )]
+    LocalAxes {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another moment center or other columns below the first rows.
+    #[error(
+        "{}, line {line}: the moment center (CofR) or the columns differ from those of the rows above, so the file holds two runs: \
+         remove the rows and the header of the outdated one",
+        .path.display()
+    )]
+    SecondHeader {
+        /// The file.
+        path: PathBuf,
+        /// Number of the line, from 1.
+        line: usize,
     },
     /// A file without the header that names its columns.
     #[error("{}: no header line in it names the columns total or pressure, and viscous", .path.display())]
@@ -103,27 +168,23 @@ pub enum OpenFoamError {
 pub fn read(folder: &Path, cut_off: CutOff) -> Result<SurfaceHistory, OpenFoamError> {
     let mut forces: Option<Loads> = None;
     let mut moments: Option<Loads> = None;
-    for (start, path) in starts(folder)? {
-        for part in parts(&path, start, "forces", cut_off)? {
+    let outputs: Vec<Output> = starts(folder)?.into_iter().map(Output::list).collect::<Result<_, _>>()?;
+    check_pairs(&outputs)?;
+    for Output { start, both, force, moment } in outputs {
+        for path in both {
             // force and moment stand side by side in one file
-            let [force, moment] = part.both()?;
+            let [force, moment] = Part::read(path, cut_off)?.both()?;
             join(&mut forces, force, start)?;
             join(&mut moments, moment, start)?;
         }
-        for part in parts(&path, start, "force", cut_off)? {
-            join(&mut forces, part.one()?, start)?;
+        for path in force {
+            join(&mut forces, Part::read(path, cut_off)?.one()?, start)?;
         }
-        for part in parts(&path, start, "moment", cut_off)? {
-            join(&mut moments, part.one()?, start)?;
+        for path in moment {
+            join(&mut moments, Part::read(path, cut_off)?.one()?, start)?;
         }
     }
     let forces = forces.ok_or_else(|| OpenFoamError::NoForces { path: folder.to_owned() })?;
-    if let Some(moments) = &moments
-        && moments.start != forces.start
-    {
-        let (found, expected) = (moments.start, forces.start);
-        return Err(OpenFoamError::NoMoments { path: folder.to_owned(), found, expected });
-    }
     Ok(SurfaceHistory {
         // one function object writes both, about one point
         about: moments.as_ref().and_then(|moments| moments.about).or(forces.about),
@@ -132,13 +193,56 @@ pub fn read(folder: &Path, cut_off: CutOff) -> Result<SurfaceHistory, OpenFoamEr
         viscous: forces.viscous,
         moment_file: moments.as_ref().map(|moments| moments.path.clone()),
         moment: moments.map(|moments| moments.total),
+        runs: forces.runs,
     })
+}
+
+/// The files of one start time, those of a second run last.
+struct Output {
+    start: f64,
+    both: Vec<PathBuf>,
+    force: Vec<PathBuf>,
+    moment: Vec<PathBuf>,
+}
+
+impl Output {
+    fn list((start, folder): (f64, PathBuf)) -> Result<Self, OpenFoamError> {
+        let [both, force, moment] = ["forces", "force", "moment"].map(|stem| runs(&folder, stem));
+        let output = Self { start, both: both?, force: force?, moment: moment? };
+        match (output.both.first(), output.force.first().or(output.moment.first())) {
+            (Some(both), Some(force)) => {
+                Err(OpenFoamError::TwoForms { both: both.clone(), force: force.clone() })
+            }
+            _ => Ok(output),
+        }
+    }
+}
+
+/// Refuses forces without moments where other forces have them, and moments without forces: joined, they would be of
+/// different runs.
+fn check_pairs(outputs: &[Output]) -> Result<(), OpenFoamError> {
+    let partner = |path: &PathBuf, stem: &str, other: &str| {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        path.with_file_name(name.replacen(stem, other, 1))
+    };
+    let with_moments = outputs.iter().any(|output| !(output.both.is_empty() && output.moment.is_empty()));
+    for Output { force, moment, .. } in outputs {
+        let forces = force.iter().filter(|_| with_moments).map(|path| (path, "force", "moment", moment));
+        let moments = moment.iter().map(|path| (path, "moment", "force", force));
+        for (path, stem, other, others) in forces.chain(moments) {
+            let missing = partner(path, stem, other);
+            if !others.contains(&missing) {
+                return Err(OpenFoamError::Unpaired { missing, beside: path.clone() });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Force or moment of a run, or of several joined.
 struct Loads {
     path: PathBuf,
-    start: f64,
+    runs: Vec<Run>,
     total: History<3>,
     viscous: History<3>,
     about: Option<Vec3>,
@@ -152,6 +256,9 @@ fn join(to: &mut Option<Loads>, later: Loads, since: f64) -> Result<(), OpenFoam
         }
         Some(loads) => {
             loads.path = later.path;
+            let first = later.total.times()[0];
+            loads.runs.retain(|run| run.since < first);
+            loads.runs.extend(later.runs);
             loads.total.overlay(later.total, since);
             loads.viscous.overlay(later.viscous, since);
         }
@@ -180,11 +287,6 @@ fn starts(folder: &Path) -> Result<Vec<(f64, PathBuf)>, OpenFoamError> {
     Ok(starts)
 }
 
-/// A file of a start time, and the one of a second run from the same time.
-fn parts(folder: &Path, start: f64, stem: &str, cut_off: CutOff) -> Result<Vec<Part>, OpenFoamError> {
-    runs(folder, stem)?.into_iter().map(|path| Part::read(path, start, cut_off)).collect()
-}
-
 /// `<stem>.dat`, then `<stem>_<time>.dat`, whatever the time.
 fn runs(folder: &Path, stem: &str) -> Result<Vec<PathBuf>, OpenFoamError> {
     let io = |fault| OpenFoamError::Io { path: folder.to_owned(), fault };
@@ -195,12 +297,15 @@ fn runs(folder: &Path, stem: &str) -> Result<Vec<PathBuf>, OpenFoamError> {
     for entry in fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        let Some(rest) = name.strip_suffix(".dat").and_then(|name| name.strip_prefix(stem)) else { continue };
-        let is_time = |text: &str| text.parse::<f64>().is_ok_and(f64::is_finite);
-        match rest.strip_prefix('_') {
-            _ if rest.is_empty() => first.push(path),
-            Some(time) if is_time(time) => again.push(path),
-            _ => {}
+        let unpacked = name.strip_suffix(".gz");
+        let Some(rest) = run_suffix(unpacked.unwrap_or(name), stem) else { continue };
+        if unpacked.is_some() {
+            return Err(OpenFoamError::Compressed { path });
+        }
+        if rest.is_empty() {
+            first.push(path);
+        } else {
+            again.push(path);
         }
     }
     again.sort();
@@ -211,26 +316,39 @@ fn runs(folder: &Path, stem: &str) -> Result<Vec<PathBuf>, OpenFoamError> {
     Ok(first)
 }
 
+/// What stands behind the stem of `<stem>.dat` or `<stem>_<time>.dat`: nothing, or `_<time>`.
+fn run_suffix<'a>(name: &'a str, stem: &str) -> Option<&'a str> {
+    let suffix = name.strip_suffix(".dat")?.strip_prefix(stem)?;
+    let is_time = |text: &str| text.parse::<f64>().is_ok_and(f64::is_finite);
+    (suffix.is_empty() || suffix.strip_prefix('_').is_some_and(is_time)).then_some(suffix)
+}
+
 /// One file: the groups of three columns by their names, and the rows.
 struct Part {
     path: PathBuf,
-    start: f64,
     about: Option<Vec3>,
     groups: Vec<String>,
     rows: Vec<(f64, Vec<f64>)>,
 }
 
 impl Part {
-    fn read(path: PathBuf, start: f64, cut_off: CutOff) -> Result<Self, OpenFoamError> {
+    fn read(path: PathBuf, cut_off: CutOff) -> Result<Self, OpenFoamError> {
         let text = match fs::read_to_string(&path) {
             Ok(text) => text.replace(['(', ')'], " "),
             Err(fault) => return Err(OpenFoamError::Io { path, fault }),
         };
-        let mut part = Self { path, start, about: None, groups: Vec::new(), rows: Vec::new() };
+        let mut part = Self { path, about: None, groups: Vec::new(), rows: Vec::new() };
         let lines = Lines::new(&text, cut_off);
         for (number, line) in lines.iter() {
             if let Some(comment) = line.strip_prefix('#') {
+                if comment.contains("localForces") {
+                    return Err(OpenFoamError::LocalAxes { path: part.path });
+                }
+                let before = (part.about, part.groups.clone());
                 part.header(comment);
+                if !part.rows.is_empty() && before != (part.about, part.groups.clone()) {
+                    return Err(OpenFoamError::SecondHeader { path: part.path, line: number });
+                }
                 continue;
             }
             if part.groups.is_empty() {
@@ -267,6 +385,14 @@ impl Part {
         }
     }
 
+    /// The folder of the start time, with the suffix of a run after it.
+    fn run_name(&self) -> String {
+        let start = self.path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let suffix = ["forces", "force", "moment"].iter().find_map(|stem| run_suffix(&name, stem));
+        format!("{start}{}", suffix.unwrap_or_default())
+    }
+
     /// The only quantity of the file.
     fn one(self) -> Result<Loads, OpenFoamError> {
         let at = |name: &str| self.groups.iter().position(|group| group == name);
@@ -296,10 +422,11 @@ impl Part {
             let history = History::new(rows);
             history.map_err(|fault| OpenFoamError::History { path: self.path.clone(), fault })
         };
+        let total = history(parts)?;
         Ok(Loads {
             path: self.path.clone(),
-            start: self.start,
-            total: history(parts)?,
+            runs: vec![Run { since: total.times()[0], name: self.run_name(), file: self.path.clone() }],
+            total,
             viscous: history(&[viscous])?,
             about: self.about,
         })
@@ -329,6 +456,13 @@ mod tests {
     fn plain(center: &str, rows: &[f64]) -> String {
         let rows = rows.iter().map(|time| format!("{time} 1 2 3 0.9 1.9 2.9 0.1 0.1 0.1\n"));
         format!("# CofR : ({center})\n{PLAIN}{}", rows.collect::<String>())
+    }
+
+    /// As the Foundation writes it: no totals, and moments in the same file.
+    fn foundation(center: &str, rows: &[f64]) -> String {
+        let rows = rows.iter().map(|time| format!("{time} ((1 2 3) (0 0 0)) ((1 1 1) (0 0 0))\n"));
+        let names = "# Time forces(pressure viscous) moment(pressure viscous)\n";
+        format!("# CofR : ({center})\n{names}{}", rows.collect::<String>())
     }
 
     #[test]
@@ -379,12 +513,102 @@ mod tests {
         assert!(matches!(output(&files), Err(OpenFoamError::MomentCenter { .. })));
     }
 
+    /// What the refusal of these files says.
+    fn refusal(files: &[(&str, &str)]) -> String {
+        output(files).unwrap_err().to_string()
+    }
+
     #[test]
-    fn moments_that_begin_later_than_forces_are_refused() {
+    fn forces_of_a_run_without_its_moments_are_refused_by_the_missing_file() {
         let load = plain("0 0 0", &[1.5]);
-        let files = [("0/force.dat", &*load), ("1/force.dat", &*load), ("1/moment.dat", &*load)];
-        assert!(matches!(output(&files), Err(OpenFoamError::NoMoments { found: 1.0, expected: 0.0, .. })));
-        assert!(output(&files[..2]).unwrap().moment.is_none(), "a force without moments is a force");
+        let (force, moment) = (("0/force.dat", &*load), ("0/moment.dat", &*load));
+        for (files, missing) in [
+            (vec![force, moment, ("1/force.dat", &*load)], "1/moment.dat is missing"),
+            (vec![force, moment, ("0/force_0.5.dat", &*load)], "0/moment_0.5.dat is missing"),
+            (vec![force, ("1/force.dat", &*load), ("1/moment.dat", &*load)], "0/moment.dat is missing"),
+            (vec![force, moment, ("1/moment.dat", &*load)], "1/force.dat is missing"),
+        ] {
+            let said = refusal(&files);
+            assert!(said.contains(missing), "{said}");
+        }
+        let forces_alone = output(&[force, ("1/force.dat", &*load)]).unwrap();
+        assert!(forces_alone.moment.is_none(), "a force without moments is a force");
+    }
+
+    #[test]
+    fn a_compressed_run_is_refused_and_the_message_says_gunzip() {
+        let load = plain("0 0 0", &[1.5]);
+        for files in [
+            vec![("0/force.dat", &*load), ("1/force.dat.gz", "")],
+            vec![("0/force.dat", &*load), ("0/force_0.5.dat.gz", "")],
+            vec![("0/force.dat", &*load), ("0/moment.dat", &*load), ("0/moment.dat.gz", "")],
+            vec![("0/forces.dat.gz", "")],
+        ] {
+            let (said, compressed) = (refusal(&files), files[files.len() - 1].0);
+            assert!(
+                said.contains(&format!("{compressed} is compressed")) && said.contains("gunzip"),
+                "{said}"
+            );
+        }
+        let unrelated = [("0/force.dat", &*load), ("0/coefficient.dat.gz", "")];
+        assert!(output(&unrelated).is_ok(), "what holds no forces is not read");
+    }
+
+    #[test]
+    fn two_forms_of_forces_from_one_start_time_are_refused_by_name() {
+        let (old, new) = (foundation("0 0 0", &[1.0]), plain("0 0 0", &[2.0]));
+        for name in ["0/force.dat", "0/force_0.5.dat"] {
+            let said = refusal(&[("0/forces.dat", &old), (name, &new)]);
+            assert!(
+                said.contains("0/forces.dat and ") && said.contains(&format!("{name} are both")),
+                "{said}"
+            );
+            assert!(said.contains("move the outdated file"), "{said}");
+        }
+        let apart = [("0/forces.dat", &*old), ("1/force.dat", &*new), ("1/moment.dat", &*new)];
+        assert_eq!(output(&apart).unwrap().force.times(), [1.0, 2.0], "a restart with another version");
+    }
+
+    #[test]
+    fn a_second_header_with_another_moment_center_is_refused_at_its_line() {
+        let first = foundation("0 0 0", &[1.0, 2.0]);
+        let moved = first.clone() + &foundation("0 0 1", &[3.0]);
+        let said = refusal(&[("0/forces.dat", &moved)]);
+        assert!(said.contains("forces.dat, line 5: the moment center (CofR)"), "{said}");
+        let columns = plain("0 0 0", &[1.0]) + &PLAIN.replace("total", "internal") + "2 1 2 3 1 2 3 0 0 0\n";
+        let said = refusal(&[("0/force.dat", &columns)]);
+        assert!(said.contains("force.dat, line 4: the moment center (CofR) or the columns"), "{said}");
+        let same = first + &foundation("0 0 0", &[3.0]);
+        assert_eq!(output(&[("0/forces.dat", &same)]).unwrap().force.times(), [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn loads_of_a_coordinate_system_are_refused_with_the_way_out() {
+        let text = "# CofR : (0 0 0)\n\
+                    # Time forces(pressure viscous porous) moment(pressure viscous porous)\t\
+                    localForces(pressure,viscous,porous) localMoments(pressure,viscous,porous)\n\
+                    1 ((1 2 3) (0 0 0) (0 0 0)) ((0 0 0) (0 0 0) (0 0 0))\n\
+                    1 ((3 2 1) (0 0 0) (0 0 0)) ((0 0 0) (0 0 0) (0 0 0))\n";
+        let said = refusal(&[("0/forces.dat", text)]);
+        assert!(said.contains("0/forces.dat has localForces"), "{said}");
+        assert!(said.contains("remove the coordinateSystem") && said.contains("foamPostProcess"), "{said}");
+    }
+
+    #[test]
+    fn the_runs_of_a_history_are_those_of_its_rows() {
+        let runs =
+            [plain("0 0 0", &[1.0, 2.0, 3.0]), plain("0 0 0", &[2.5, 3.0]), plain("0 0 0", &[2.25, 4.0])];
+        let files = [("0/force.dat", &*runs[0]), ("2/force.dat", &*runs[1]), ("2/force_2.25.dat", &*runs[2])];
+        let names = |load: &SurfaceHistory, from, to| {
+            load.runs_between(from, to).iter().map(|run| run.name.clone()).collect::<Vec<_>>()
+        };
+        let load = output(&files[..2]).unwrap();
+        assert_eq!(names(&load, 0.0, 9.0), ["0", "2"]);
+        assert_eq!(names(&load, 1.0, 2.0), ["0"]);
+        assert_eq!(names(&load, 2.5, 3.0), ["2"]);
+        let replaced = output(&files).unwrap();
+        assert_eq!(names(&replaced, 0.0, 9.0), ["0", "2_2.25"], "the second run from 2 s replaces the first");
+        assert_eq!(names(&replaced, f64::MAX, f64::MAX), ["2_2.25"]);
     }
 
     #[test]

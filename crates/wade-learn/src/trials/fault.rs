@@ -196,6 +196,46 @@ pub enum Fault {
         /// How many times as large.
         ratio: f64,
     },
+    /// An angular velocity in turns a minute.
+    #[error(
+        "row {row}, column {rate_column}: {value} seems to be in turns a minute, since it is {ratio:.1} times what {column} shows: divide it by 9.549"
+    )]
+    TurnsPerMinute {
+        /// The row of the largest value.
+        row: u64,
+        /// The angle.
+        column: &'static str,
+        /// The largest value.
+        value: f64,
+        /// The angular velocity.
+        rate_column: &'static str,
+        /// How many times as large.
+        ratio: f64,
+    },
+    /// An angle that turns against its rate.
+    #[error(
+        "row {row}, column {column}: it turns against {rate_column}: the sign of one of the two is reversed"
+    )]
+    Opposed {
+        /// The first row.
+        row: u64,
+        /// The angle.
+        column: &'static str,
+        /// The angular velocity.
+        rate_column: &'static str,
+    },
+    /// A clock that contradicts velocity and acceleration.
+    #[error(
+        "row {row}, column t: {column} is {ratio:.3e} times the change of the velocity over t: t must be in seconds, velocities in m/s and accelerations in m/s2"
+    )]
+    Clock {
+        /// The first row.
+        row: u64,
+        /// The acceleration.
+        column: &'static str,
+        /// The acceleration over the derivative of the velocity.
+        ratio: f64,
+    },
     /// An accelerometer in multiples of gravity.
     #[error(
         "row {row}, column {column}: {value} seems to be an accelerometer in g, since it is {ratio:.2} of what the velocity shows: multiply by 9.81"

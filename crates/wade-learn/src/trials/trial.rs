@@ -48,7 +48,7 @@ const OPTIONAL: [&str; 17] = [
     "rho",
 ];
 
-/// A median step above this is no second's fraction any more [s].
+/// A median step from this on is no second's fraction any more [s]: the numbers of frames have a step of 1.
 const LONG_STEP: f64 = 1.0;
 
 /// A hole in time.
@@ -253,7 +253,7 @@ impl Trial {
         let unknown = unknown.map(|column| Remark::UnknownColumn { trial: trial(), column: column.clone() });
         let gaps = self.gaps.iter();
         let gaps = gaps.map(|gap| Remark::Gap { trial: trial(), row: gap.row, seconds: gap.seconds });
-        let step = median_step(&self.t).filter(|&step| step > LONG_STEP);
+        let step = median_step(&self.t).filter(|&step| step >= LONG_STEP);
         let glitches = self.glitches.iter();
         let glitches = glitches.map(|glitch| Remark::Glitch { trial: trial(), glitch: *glitch });
         let clock = step.map(|step| Remark::Clock { trial: trial(), step });

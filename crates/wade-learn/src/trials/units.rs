@@ -34,6 +34,12 @@ const ANGLES: [(&str, &str); 3] = [("roll", "wx"), ("pitch", "wy"), ("yaw", "wz"
 const SAME: f64 = 0.7;
 /// Least spread of the smaller and of the larger of two columns from which a factor can be told [rad or m/s2].
 const EXCITED: [f64; 2] = [0.002, 0.02];
+/// Turns a minute of a radian a second.
+const PER_MINUTE: f64 = 30.0 / std::f64::consts::PI;
+/// Times by which an acceleration and the derivative of the velocity may differ, where noise and filters bend either, and the
+/// correlation from which they say the same.
+const CLOCK: f64 = 1.7;
+const SAME_MOTION: f64 = 0.95;
 /// Share by which a factor of 57.3 or 1 / 9.81 may be missed by noise and filters.
 const FACTOR_TOLERANCE: f64 = 0.3;
 
@@ -78,6 +84,11 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
     for (angle, rate) in ANGLES.into_iter().filter(|(angle, _)| table.has(angle)) {
         let turned = integral(t, table.column(rate));
         let unwrapped = unwrapped(table.column(angle));
+        let opposite: Vec<f64> = unwrapped.iter().map(|angle| -angle).collect();
+        if factor(&turned, &opposite).is_some_and(|ratio| near(ratio, 1.0)) {
+            let fault = Fault::Opposed { row: table.rows[0], column: angle, rate_column: rate };
+            return Err(At::path(&table.path)(fault));
+        }
         let Some(ratio) = factor(&turned, &unwrapped) else { continue };
         let degrees = 180.0 / std::f64::consts::PI;
         let fault = if near(ratio, degrees) {
@@ -86,6 +97,9 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
         } else if near(ratio, 1.0 / degrees) {
             let (row, value) = largest(table, rate);
             Fault::DegreesPerSecond { row, column: angle, value, rate_column: rate, ratio: 1.0 / ratio }
+        } else if near(ratio, 1.0 / PER_MINUTE) {
+            let (row, value) = largest(table, rate);
+            Fault::TurnsPerMinute { row, column: angle, value, rate_column: rate, ratio: 1.0 / ratio }
         } else {
             continue;
         };
@@ -98,11 +112,19 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
 pub(super) fn check_accelerometer(table: &Table, from_velocity: &[Vec3]) -> Result<(), TrialError> {
     let names = ["ax", "ay", "az"];
     let fault = |fault| Err(At::path(&table.path)(fault));
-    for (axis, column) in names.into_iter().enumerate() {
-        let derived: Vec<f64> = from_velocity.iter().map(|a| a[axis]).collect();
-        if let Some(ratio) = factor(&derived, table.column(column)).filter(|r| near(*r, 1.0 / GRAVITY)) {
+    let derived = [0, 1, 2].map(|axis| from_velocity.iter().map(|a| a[axis]).collect::<Vec<f64>>());
+    for (derived, column) in derived.iter().zip(names) {
+        if let Some(ratio) = factor(derived, table.column(column)).filter(|r| near(*r, 1.0 / GRAVITY)) {
             let (row, value) = largest(table, column);
             return fault(Fault::AccelerometerInG { row, column, value, ratio });
+        }
+    }
+    for (derived, column) in derived.iter().zip(names) {
+        let ([xx, xy, yy], spread) = products(derived, table.column(column));
+        let ratio = (yy / xx).sqrt();
+        let is_same = xy > SAME_MOTION * (xx * yy).sqrt() && spread > EXCITED[1];
+        if is_same && !(1.0 / CLOCK..CLOCK).contains(&ratio) {
+            return fault(Fault::Clock { row: table.rows[0], column, ratio });
         }
     }
     let mean_of = |column: &str| mean(table.column(column));
@@ -133,13 +155,18 @@ fn largest(table: &Table, column: &str) -> (u64, f64) {
 /// The factor between two columns that say the same, from the ratio of their spreads: noise bends it by less than the
 /// factors of 10 and 57 that are looked for. `None` where they do not say the same, or hardly move.
 fn factor(x: &[f64], y: &[f64]) -> Option<f64> {
-    let (mx, my) = (mean(x), mean(y));
-    let pairs = || x.iter().zip(y).map(|(x, y)| (x - mx, y - my));
-    let (xx, yy) = pairs().fold((0.0, 0.0), |(xx, yy), (x, y)| (xx + x * x, yy + y * y));
-    let xy: f64 = pairs().map(|(x, y)| x * y).sum();
+    let ([xx, xy, yy], _) = products(x, y);
     let spread = |squares: f64| (squares / x.len().max(1) as f64).sqrt();
     let excited = spread(xx.min(yy)) > EXCITED[0] && spread(xx.max(yy)) > EXCITED[1];
     (excited && xy > SAME * (xx * yy).sqrt()).then(|| (yy / xx).sqrt())
+}
+
+/// Sums of squares and products about the means, and the spread of the second.
+fn products(x: &[f64], y: &[f64]) -> ([f64; 3], f64) {
+    let (mx, my) = (mean(x), mean(y));
+    let pairs = x.iter().zip(y).map(|(x, y)| (x - mx, y - my));
+    let sums = pairs.fold([0.0; 3], |[xx, xy, yy], (x, y)| [xx + x * x, xy + x * y, yy + y * y]);
+    (sums, (sums[2] / y.len().max(1) as f64).sqrt())
 }
 
 fn mean(values: &[f64]) -> f64 {

@@ -13,6 +13,7 @@ use tempfile::TempDir;
 use wade_core::condition::{Condition, GroundContact};
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::vehicle::{Vehicle, shipped};
+use wade_learn::dataset::lift::{Cause, Lift, Question, questions};
 use wade_learn::dataset::mirror::{MirrorError, Partners, Plane, augment};
 use wade_learn::dataset::split::{By, Split, SplitError, split};
 use wade_learn::dataset::summary::Summary;
@@ -570,9 +571,23 @@ fn sets_of_cases_are_taken_alone() {
     assert_eq!(both.samples.len(), all);
 }
 
+/// The questions about this data's vertical forces.
+fn lifts(data: &Dataset) -> Vec<Lift> {
+    let lift = |question| match question {
+        Question::Lift(lift) => lift,
+        other => panic!("{other}"),
+    };
+    questions(data, &vehicles()).into_iter().map(lift).collect()
+}
+
+/// Multiplies the loads of some cases of the Warthog.
+fn scale(data: &mut Dataset, cases: &[&str], factor: f64) {
+    let of_cases = data.samples.iter_mut().filter(|sample| cases.contains(&sample.case.as_str()));
+    of_cases.flat_map(|sample| &mut sample.surfaces).for_each(|load| load.force *= factor);
+}
+
 #[test]
 fn a_wrong_unit_or_half_a_hull_shows_beside_the_lift_at_rest() {
-    use wade_learn::dataset::lift::{Cause, questions};
     let right = data(40);
     assert_eq!(questions(&right, &vehicles()), []);
     for (factor, cause) in [
@@ -586,16 +601,112 @@ fn a_wrong_unit_or_half_a_hull_shows_beside_the_lift_at_rest() {
         let mut wrong = right.clone();
         let warthogs = wrong.samples.iter_mut().filter(|sample| sample.vehicle == "warthog");
         warthogs.flat_map(|sample| &mut sample.surfaces).for_each(|load| load.force *= factor);
-        let found = questions(&wrong, &vehicles());
+        let found = lifts(&wrong);
         assert_eq!(found.len(), 1, "{factor}: {found:?}");
-        assert_eq!((found[0].vehicle.as_str(), found[0].cause), ("warthog", cause), "{}", found[0]);
-        assert!(found[0].to_string().contains("Archimedes"));
+        assert_eq!((found[0].cases.vehicle.as_str(), found[0].cause), ("warthog", cause), "{}", found[0]);
+        assert_eq!((found[0].cases.names.len(), found[0].cases.compared), (40, 40));
+        let said = found[0].to_string();
+        assert!(
+            said.contains("Archimedes") && said.starts_with("warthog: in 40 of 40 cases (`warthog-"),
+            "{said}"
+        );
     }
 }
 
 #[test]
+fn a_minority_of_wrong_cases_is_named_whatever_the_speed() {
+    let mut data = data(40);
+    scale(&mut data, &["warthog-0003", "warthog-0017"], 1e-3);
+    scale(&mut data, &["warthog-0005"], -1.0);
+    let found = lifts(&data);
+    let cases = |cause: Cause| {
+        let lift = found.iter().find(|lift| lift.cause == cause).unwrap();
+        let mut names = lift.cases.names.clone();
+        names.sort();
+        (names.join(" "), lift.to_string())
+    };
+    assert_eq!(found.len(), 2, "{found:?}");
+    let (names, said) = cases(Cause::OverDensity);
+    assert_eq!(names, "warthog-0003 warthog-0017");
+    assert!(said.starts_with("warthog: in 2 of 40 cases (`warthog-0"), "{said}");
+    assert!(said.contains("it is 0.0010 of it") && said.contains("rhoInf 1"), "{said}");
+    let (names, said) = cases(Cause::Axis);
+    assert_eq!(names, "warthog-0005");
+    assert!(said.starts_with("warthog: in 1 of 40 cases (`warthog-0005`)"), "{said}");
+}
+
+#[test]
+fn half_a_hull_among_whole_ones_is_named_where_no_suction_explains_it() {
+    let half_at = |speed: f64| {
+        let mut data = data(40);
+        scale(&mut data, &["warthog-0003"], 0.5);
+        let sample = data.samples.iter_mut().filter(|sample| sample.case == "warthog-0003");
+        sample.for_each(|sample| sample.condition.velocity = Vec3::x() * speed);
+        lifts(&data)
+    };
+    let slow = half_at(0.1);
+    assert_eq!(slow.len(), 1, "{slow:?}");
+    assert_eq!((slow[0].cause, slow[0].cases.names.join(" ")), (Cause::HalfDomain, "warthog-0003".into()));
+    assert_eq!(half_at(4.0), [], "as much as suction takes from a fast hull");
+}
+
+#[test]
+fn a_question_names_the_first_of_many_cases() {
+    let mut data = data(40);
+    let names: Vec<String> = (10..15).map(|case| format!("warthog-{case:04}")).collect();
+    scale(&mut data, &names.iter().map(String::as_str).collect::<Vec<_>>(), 1e-3);
+    let said = lifts(&data)[0].to_string();
+    assert!(said.starts_with("warthog: in 5 of 40 cases (") && said.contains(", ...)"), "{said}");
+    assert_eq!(said.matches("`warthog-00").count(), 3, "{said}");
+}
+
+#[test]
+fn a_depth_in_centimeters_is_questioned() {
+    let mut data = data(40);
+    let in_case = |sample: &&mut Sample| sample.case == "husky-0007";
+    data.samples.iter_mut().filter(in_case).for_each(|sample| sample.condition.depth *= 100.0);
+    let said: Vec<String> = questions(&data, &vehicles()).iter().map(Question::to_string).collect();
+    let depth: Vec<&String> =
+        said.iter().filter(|said| said.contains("depth_m of case.toml in meters?")).collect();
+    assert_eq!(depth.len(), 1, "{said:?}");
+    assert!(
+        depth[0].starts_with("husky: in 1 of 40 cases (`husky-0007`) the water is more than 3 times"),
+        "{said:?}"
+    );
+
+    // a hull that is wholly under water has its lift at any depth
+    let deep = Condition::level(Vec3::zeros(), 1.0);
+    data.samples.truncate(0);
+    for (depth, questioned) in [(1.0, false), (30.0, true)] {
+        data.samples = analytic::samples(warthog(), "deep", &[Condition { depth, ..deep }]);
+        let found = questions(&data, &vehicles());
+        assert_eq!(matches!(found[..], [Question::Depth(_)]), questioned, "{depth}: {found:?}");
+    }
+}
+
+#[test]
+fn moments_about_a_point_far_away_are_questioned() {
+    let mut data = data(40);
+    let moved = |data: &mut Dataset, by: Vec3| {
+        for load in data.samples.iter_mut().filter(|s| s.case == "husky-0007").flat_map(|s| &mut s.surfaces) {
+            load.moment = Some(load.moment.unwrap_or_default() + by.cross(&load.force));
+        }
+    };
+    moved(&mut data, Vec3::new(0.4, 0.0, 0.0));
+    assert_eq!(questions(&data, &vehicles()), [], "within the vehicle");
+    moved(&mut data, Vec3::new(413.0, 0.0, 0.0));
+    let found = questions(&data, &vehicles());
+    let [Question::Arm(arm)] = &found[..] else { panic!("{found:?}") };
+    assert!(arm.arm > 100.0 && arm.cases.names == ["husky-0007"], "{arm:?}");
+    let said = arm.to_string();
+    assert!(
+        said.contains("origin_m and the point of the moments (CofR, moment_center_m) in meters"),
+        "{said}"
+    );
+}
+
+#[test]
 fn the_vertical_force_of_our_own_cfd_raises_no_question() {
-    use wade_learn::dataset::lift::questions;
     for vehicle in [husky(), warthog()] {
         let campaigns = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../campaigns");
         let data = dataset::read(&campaigns.join(&vehicle.name).join("sections.parquet")).unwrap();

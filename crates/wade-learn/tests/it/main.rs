@@ -7,6 +7,7 @@ mod common;
 
 mod anchored;
 mod dataset;
+mod dataset_import;
 mod evaluate;
 mod gradient;
 mod training;

@@ -208,6 +208,11 @@ fn an_accelerometer_in_g_or_with_gravity_is_named() {
     assert!(in_g.contains("column ax") && in_g.contains("in g") && in_g.contains("row "), "{in_g}");
     let with_gravity = message(1.0, 9.81);
     assert!(with_gravity.contains("column az") && with_gravity.contains("gravity"), "{with_gravity}");
+    // clocks that run at 50 times and at twice the speed beside an acceleration in m/s2
+    for scale in [50.0, 2.0] {
+        let clock = message(scale, 0.0);
+        assert!(clock.contains("column t") && clock.contains("ax is"), "{clock}");
+    }
     // at rest an accelerometer in g shows nothing but its one g
     let still = fault(&[("vx", &|_| 0.0), ("ax", &|_| 0.0), ("ay", &|_| 0.0), ("az", &|_| 1.0)]).1;
     assert!(still.contains("column az") && still.contains("gravity in g"), "{still}");
@@ -223,6 +228,10 @@ fn angles_in_degrees_are_told_from_the_angular_velocity() {
     assert!(matches!(found, Fault::Degrees { column: "pitch", rate_column: "wy", .. }), "{message}");
     let (found, message) = fault(&[("yaw", &angle), ("wz", &|t| rate(t).to_degrees())]);
     assert!(matches!(found, Fault::DegreesPerSecond { rate_column: "wz", .. }), "{message}");
+    let (found, message) = fault(&[("yaw", &angle), ("wz", &|t| rate(t) * 9.549)]);
+    assert!(matches!(found, Fault::TurnsPerMinute { rate_column: "wz", .. }), "{message}");
+    let (found, message) = fault(&[("pitch", &|t| -5.0 * angle(t)), ("wy", &|t| 5.0 * rate(t))]);
+    assert!(matches!(found, Fault::Opposed { column: "pitch", rate_column: "wy", .. }), "{message}");
     // a heading that crosses north is no jump
     let heading = |t: f64| {
         let turned = 0.5 * t + 5.9;
