@@ -16,6 +16,13 @@ const CLEARLY: f64 = 3.0;
 /// A number a thousand times as large or as small, and the factor by which a prediction may be off beside it.
 const THOUSAND: f64 = 1000.0;
 const OFF: f64 = 1.6;
+/// Newtons of a pound and of a kilogram of force, the factor by which a prediction may be off beside these, which are nearer to one,
+/// and the correlation that they need: a current that is not known scales the drag as well, but not in the same way in all trials,
+/// which are looked at together. A pound foot is too near a newton meter to be known from it.
+const POUND_N: f64 = 4.448_222;
+const KILOGRAM_N: f64 = 9.806_65;
+const NEARLY: f64 = 1.35;
+const SAME_UNIT: f64 = 0.95;
 /// Correlation with the prediction from which a factor between the two is one, and from which it says that a sign is reversed:
 /// a current that is not known turns the drag of some trials about, but does not mirror it.
 const SAME: f64 = 0.7;
@@ -148,8 +155,18 @@ impl<'a> Channel<'a> {
         let [mm, mp, pp] = products(pairs);
         let ratio = mp.abs() / pp.max(f64::MIN_POSITIVE);
         let is_near = |factor: f64| is_about(ratio / factor);
-        let other = [(THOUSAND, larger), (1.0 / THOUSAND, smaller)].into_iter().find(|(f, _)| is_near(*f));
-        match other.filter(|_| mp.abs() > SAME * (mm * pp).sqrt()) {
+        let correlation = mp.abs() / (mm * pp).sqrt().max(f64::MIN_POSITIVE);
+        let thousands =
+            [(THOUSAND, larger), (1.0 / THOUSAND, smaller)].into_iter().find(|(f, _)| is_near(*f));
+        let is_nearly = |factor: f64| (1.0 / NEARLY..NEARLY).contains(&(ratio / factor));
+        let weights: &[(f64, &'static str)] = match self.component {
+            0..3 => &[(1.0 / POUND_N, "lbf"), (1.0 / KILOGRAM_N, "kgf")],
+            _ => &[(1.0 / KILOGRAM_N, "kgf m")],
+        };
+        let weights = weights.iter().copied().find(|(factor, _)| is_nearly(*factor));
+        let is_sure = mp > 0.0 && correlation > SAME_UNIT && place == ALL;
+        let other = thousands.filter(|_| correlation > SAME).or(weights.filter(|_| is_sure));
+        match other {
             Some((_, other)) => Err(GapError::Unit { place, column: self.column(), ratio, unit, other }),
             None => Ok(()),
         }

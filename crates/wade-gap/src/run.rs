@@ -105,21 +105,27 @@ pub fn run(
     // the set of the search while a more probable one is tried in its place, and the names of one that the held-out trials disproved
     let (mut searched, mut refuted): (Option<(Vec<Member>, Verdict)>, Vec<&str>) = (None, Vec::new());
     let mut is_tried = false;
+    // where the search ended in nothing, a set that is far more probable than not is taken for its weight: it has passed no gate of
+    // the search, and the held-out trials judge it
+    let mut for_its_weight = false;
     loop {
         let asked = members.clone();
         refine(&mut design, &all, &setting, &members);
         through_sensors(&mut design, &mut all, &setting, &members);
         // what stood in for a shape that was not yet right has no place any more
         let judge = Judge::new(&design, &all, &setting, config, &floors, floor_loss);
-        members = judge.confirmed(&members);
-        let mut found = Found::of(&judge, &members, &library, &general, &gap_structure);
+        if !for_its_weight {
+            members = judge.confirmed(&members);
+        }
+        let mut found = Found::of(&judge, &members, &library, &general, &gap_structure, for_its_weight);
         let weighed = weigh(&judge, &found, &library);
         let is_disproved = |set: &[Member]| is_disproved(&judge, set, &held);
         let names = |set: &[Member]| judge.sorted_names(set);
         let next = match searched.take() {
             Some((searched, verdict)) => {
                 // as open as what was searched for, or not at all
-                let is_named = found.verdict == Verdict::Named || found.verdict == verdict;
+                let is_open = if for_its_weight { Verdict::Ambiguous } else { verdict };
+                let is_named = found.verdict == Verdict::Named || found.verdict == is_open;
                 let is_whole = is_named && names(&members) == names(&asked);
                 if is_disproved(&members) {
                     refuted = names(&asked);
@@ -129,6 +135,7 @@ pub fn run(
             None if is_tried => None,
             None => found.set_to_name(&judge, &weighed).inspect(|_| searched = Some((asked, found.verdict))),
         };
+        for_its_weight = searched.is_some() && !matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
         let Some(next) = next else {
             found.heed(&weighed, |set| names(set) != refuted && !is_disproved(set));
             return Ok(compose(trials, &judge, found, &weighed, held, &library));

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::design::Design;
 use super::detect::sizes;
-use super::explanations::{Weighed, more_probable_than_not};
+use super::explanations::{NOTHING, OUTSIDE_LIBRARY, Weighed, more_probable_than_not};
 use super::features::{energy, without_zeros};
 use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
@@ -41,6 +41,11 @@ const LIMITED: f64 = 0.1;
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
 
+/// Probability from which a set that the search passed by is tried, and that of `nothing` below which nothing is not what is said:
+/// nine to one, as the intervals of a report have it, and twenty to one.
+const LIKELY: f64 = 0.9;
+const UNLIKELY: f64 = 0.05;
+
 /// What the search found.
 pub(super) struct Found {
     pub verdict: Verdict,
@@ -56,6 +61,8 @@ pub(super) struct Found {
     /// What the gap has without a name before anything is taken out.
     pub of_gap: Structure,
     pub loss: f64,
+    /// Whether what the state predicts of the gap is large enough to matter.
+    is_relevant: bool,
     /// Why members that pass every gate are not named.
     pub unfit: Option<Unfit>,
 }
@@ -84,6 +91,7 @@ impl Found {
         library: &[Effect],
         general: &General,
         gap_structure: &Structure,
+        for_its_weight: bool,
     ) -> Self {
         let (design, config) = (judge.design, judge.config);
         let columns = judge.columns(members);
@@ -109,7 +117,9 @@ impl Found {
         });
         let unfit = match members.is_empty() {
             true => None,
-            _ if coverage < needed && loss > stated => Some(Unfit::Explains(coverage, needed)),
+            _ if coverage < needed && loss > stated && !for_its_weight => {
+                Some(Unfit::Explains(coverage, needed))
+            }
             _ if unresolved => Some(Unfit::Unresolved),
             _ if imitated => Some(Unfit::Imitates),
             _ => leaves_much(design, &residual).then_some(Unfit::Leaves),
@@ -138,6 +148,7 @@ impl Found {
             left,
             of_gap,
             loss,
+            is_relevant: is_relevant(judge, gap_structure),
             unfit,
         }
     }
@@ -148,20 +159,40 @@ impl Found {
     }
 
     /// The set of the effects that are more probable than not, where it is none of what was found: a search that adds one effect
-    /// after the other can end in a set too many or too few.
+    /// after the other can end in a set too many or too few. Where it ended in none, a set must be far more probable than not.
     pub fn set_to_name(&self, judge: &Judge, weighed: &[Weighed]) -> Option<Vec<Member>> {
         let likely = more_probable_than_not(weighed);
         let is_named = matches!(self.verdict, Verdict::Named | Verdict::Ambiguous);
+        let first = weighed.first().map(|first| &first.explanation);
+        let is_likely = self.is_relevant
+            && first.is_some_and(|first| first.effects == likely && first.probability >= LIKELY);
         let stands_beside = self.alternatives.iter().any(|set| judge.sorted_names(set) == likely);
-        let is_another = is_named && !likely.is_empty() && likely != self.names && !stands_beside;
+        let is_another =
+            (is_named && likely != self.names || is_likely) && !likely.is_empty() && !stands_beside;
         let set = weighed.iter().find(|weighed| is_another && weighed.explanation.effects == likely)?;
-        Some(set.set.clone())
+        let mut set = set.set.clone();
+        set.sort_by_key(|member| judge.effect(member));
+        Some(set)
     }
 
     /// Names nothing against the weight of the evidence: where other effects than the members are more probable than not, the
     /// explanations that are more probable than the members stand beside them. Where the first of these is none of the library, or where
     /// the held-out trials disprove all of them, nothing is named: then neither the members nor they are what is missing.
     pub fn heed(&mut self, weighed: &[Weighed], holds: impl Fn(&[Member]) -> bool) {
+        let probability = |name: &str| {
+            let explanations = weighed.iter().map(|weighed| &weighed.explanation);
+            explanations.filter(|e| e.effects == [name]).map(|e| e.probability).sum::<f64>()
+        };
+        let (outside, nothing) = (probability(OUTSIDE_LIBRARY), probability(NOTHING));
+        let is_outside = self.verdict == Verdict::Ambiguous && outside > 0.5;
+        let is_something = self.is_relevant && nothing < UNLIKELY;
+        if is_outside || self.verdict == Verdict::NothingMissing && is_something {
+            self.verdict = Verdict::NoCandidateFits;
+            self.alternatives.clear();
+            self.unfit = is_outside.then_some(Unfit::Unlikely(outside));
+            self.left = self.of_gap.clone();
+            return;
+        }
         let Some(own) = self.own(weighed) else { return };
         if self.verdict != Verdict::Named || more_probable_than_not(weighed) == self.names {
             return;
@@ -203,9 +234,9 @@ fn leaves_much(design: &Design, residual: &DVector<f64>) -> bool {
         && after.energy - of_zeros > MUCH * before.energy
 }
 
-/// Predictable from the state, or lasting in a trial, and large enough to matter.
-fn is_structured(judge: &Judge, structure: &Structure) -> bool {
-    let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
+/// What the state predicts of the gap, and the least that matters, in noises of a bin.
+fn size_and_least(judge: &Judge, structure: &Structure) -> [f64; 2] {
+    let (design, setting) = (judge.design, judge.setting);
     let rows = design.y.len().max(1) as f64;
     // gain per row is in bins' noise; relevance is in samples' noise
     let relative = setting
@@ -213,8 +244,18 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
         .iter()
         .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].rough()) / design.noise.bin[c])
         .fold(f64::INFINITY, f64::min);
-    let least = config.relevance * relative;
-    let size = ((structure.gain - design.error.most_left()).max(0.0) / rows).sqrt();
+    [((structure.gain - design.error.most_left()).max(0.0) / rows).sqrt(), judge.config.relevance * relative]
+}
+
+fn is_relevant(judge: &Judge, structure: &Structure) -> bool {
+    let [size, least] = size_and_least(judge, structure);
+    size > least
+}
+
+/// Predictable from the state, or lasting in a trial, and large enough to matter.
+fn is_structured(judge: &Judge, structure: &Structure) -> bool {
+    let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
+    let [size, least] = size_and_least(judge, structure);
     // what lasts and is no larger than the rough part of what the model says is none
     let lasts = least.max(design.noise.stated());
     // a force that comes and goes with no phase of its own shows in its energy alone
