@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use wade_core::physics::Physics;
 
 use crate::service::accounts::Limits;
-use crate::service::{access, grpc, health, http, shm};
+use crate::service::{access, grpc, health, http, shm, traces};
 
 /// Settings of `wade serve`: the file deploy/wade.toml shows every key with its default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,6 +34,8 @@ pub struct Config {
     pub http: http::Config,
     /// When the server calls itself ready.
     pub ready: health::Config,
+    /// Traces for OpenTelemetry.
+    pub traces: traces::Config,
     /// Logs.
     pub log: Log,
 }
@@ -52,6 +54,7 @@ impl Default for Config {
             shm: shm::Config::default(),
             http: http::Config::default(),
             ready: health::Config::default(),
+            traces: traces::Config::default(),
             log: Log::default(),
         }
     }
@@ -141,6 +144,8 @@ impl Config {
         range((0.0..=day).contains(&self.drain_s), "drain_s", &self.drain_s, "0 to 86400")?;
         let window = self.latency_window_s;
         range((0.1..=day).contains(&window), "latency_window_s", &window, "0.1 to 86400")?;
+        let ratio = self.traces.sample_ratio;
+        range((0.0..=1.0).contains(&ratio), "traces.sample_ratio", &ratio, "0 to 1")?;
         range((1..=256).contains(&grpc.threads), "grpc.threads", &grpc.threads, "1 to 256")?;
         range(
             grpc.max_message_bytes >= 1024,

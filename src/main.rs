@@ -10,7 +10,7 @@ fn main() -> ExitCode {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         // what comes back as an error is printed as one
-        if !wade_learn::dataset::catches_panics() {
+        if !wade_core::caught::is_expected() {
             usual(info);
         }
     }));

@@ -1,12 +1,18 @@
 //! Every metric's name, unit and buckets, and the one function that records a request.
 
+mod exchange;
 mod held;
+
+/// The locks of [`exchange`], for which its model has others.
+mod sync {
+    pub use std::sync::{Mutex, MutexGuard};
+}
 
 pub use held::{Closed, Resource};
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 use hdrhistogram::Histogram;
@@ -17,8 +23,7 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram as Buckets;
 use prometheus_client::registry::{Registry, Unit};
 
-/// Latencies are recorded from 1 ns up to this [ns] with three significant digits.
-const HIGHEST_NS: u64 = 60_000_000_000;
+use exchange::Exchange;
 
 /// Upper bounds of the Prometheus buckets [s]: 1 us to 100 ms.
 const BUCKETS_S: [f64; 22] = [
@@ -85,90 +90,40 @@ struct ReloadLabels {
 /// Latencies of one transport and vehicle.
 #[derive(Debug)]
 pub struct Recorder {
-    /// What came since somebody last looked: all that a query waits for.
-    current: Mutex<Histogram<u64>>,
-    accounts: Mutex<Accounts>,
+    latencies: Exchange,
     buckets: Buckets,
     out_of_domain: Counter,
 }
 
-/// Everything up to when somebody last looked.
-#[derive(Debug)]
-struct Accounts {
-    since_start: Histogram<u64>,
-    window: Histogram<u64>,
-    last_window: Histogram<u64>,
-    /// Empty, to take the place of `current`.
-    spare: Histogram<u64>,
-    /// States outside the training domain that were drained.
-    outside_drained: u64,
-}
-
 impl Recorder {
     fn new(buckets: Buckets, out_of_domain: Counter) -> Self {
-        let histogram =
-            || Histogram::new_with_max(HIGHEST_NS, 3).expect("the constants are valid for a histogram");
-        let accounts = Accounts {
-            since_start: histogram(),
-            window: histogram(),
-            last_window: histogram(),
-            spare: histogram(),
-            outside_drained: 0,
-        };
-        Self { current: Mutex::new(histogram()), accounts: Mutex::new(accounts), buckets, out_of_domain }
+        Self { latencies: Exchange::new(), buckets, out_of_domain }
     }
 
     /// Records one answered request: the time from its arrival to its answer, and how many of its states were outside
     /// the training domain.
     pub fn record(&self, elapsed: Duration, out_of_domain: u64) {
-        let ns = u64::try_from(elapsed.as_nanos()).unwrap_or(u64::MAX);
-        lock(&self.current).saturating_record(ns);
+        self.latencies.record(u64::try_from(elapsed.as_nanos()).unwrap_or(u64::MAX), 1);
         self.buckets.observe(elapsed.as_secs_f64());
         if out_of_domain > 0 {
             self.out_of_domain.inc_by(out_of_domain);
         }
     }
 
-    /// The accounts with everything in them. What queries write to is exchanged and not copied, so that they never wait
-    /// for whoever looks at the latencies.
-    fn collect(&self) -> MutexGuard<'_, Accounts> {
-        let mut guard = lock(&self.accounts);
-        let accounts = &mut *guard;
-        std::mem::swap(&mut *lock(&self.current), &mut accounts.spare);
-        for account in [&mut accounts.since_start, &mut accounts.window] {
-            account.add(&accounts.spare).expect("both have the same bounds");
-        }
-        accounts.spare.reset();
-        guard
-    }
-
     /// Takes out what has come since the last call: times [ns] with how many there were of each, and states outside the
     /// training domain. For a process that reports to another, which alone looks at latencies.
     pub fn drain(&self) -> (Vec<(u64, u64)>, u64) {
-        let mut guard = self.collect();
-        let accounts = &mut *guard;
-        let times = accounts.window.iter_recorded().map(|at| (at.value_iterated_to(), at.count_at_value()));
-        let times = times.collect();
-        accounts.window.reset();
-        let outside = self.out_of_domain.get();
-        (times, outside - std::mem::replace(&mut accounts.outside_drained, outside))
+        self.latencies.drain(|| self.out_of_domain.get())
     }
 
     /// Records what another process has [drained](Self::drain).
     pub fn record_all(&self, times: &[(u64, u64)], out_of_domain: u64) {
         for &(ns, count) in times {
-            lock(&self.current).saturating_record_n(ns, count);
+            self.latencies.record(ns, count);
             let seconds = Duration::from_nanos(ns).as_secs_f64();
             (0..count).for_each(|_| self.buckets.observe(seconds));
         }
         self.out_of_domain.inc_by(out_of_domain);
-    }
-
-    fn rotate(&self) {
-        let mut guard = self.collect();
-        let accounts = &mut *guard;
-        std::mem::swap(&mut accounts.window, &mut accounts.last_window);
-        accounts.window.reset();
     }
 }
 
@@ -376,7 +331,7 @@ impl Metrics {
     pub fn rotate(&self) {
         for recorders in &self.recorders {
             for recorder in recorders.read().unwrap_or_else(PoisonError::into_inner).values() {
-                recorder.rotate();
+                recorder.latencies.rotate();
             }
         }
     }
@@ -387,7 +342,7 @@ impl Metrics {
             // not looked up under the lock: a new vehicle's first query would wait for it, and the others for that one
             let recorders = recorders.read().unwrap_or_else(PoisonError::into_inner).clone();
             recorders.into_iter().map(move |(vehicle, recorder)| {
-                let accounts = recorder.collect();
+                let accounts = recorder.latencies.collect();
                 let (since_start, window) = (&accounts.since_start, &accounts.last_window);
                 let (since_start, window) = (Percentiles::of(since_start), Percentiles::of(window));
                 Latency { transport, vehicle, since_start, window }
@@ -403,7 +358,7 @@ impl Metrics {
             let recorders = self.recorders[transport as usize].read().unwrap_or_else(PoisonError::into_inner);
             let Some(recorder) = recorders.get(vehicle).cloned() else { continue };
             drop(recorders);
-            let accounts = recorder.collect();
+            let accounts = recorder.latencies.collect();
             let count = accounts.since_start.len();
             totals.0 += count;
             totals.1 += (accounts.since_start.mean() * count as f64) as u64;
@@ -451,10 +406,6 @@ fn plain(open: &str) -> String {
 }
 
 /// A histogram is sound even if a thread panicked while it held the lock: the worst is one lost value.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -30,6 +30,7 @@ use crate::service::bulk::{Bulk, give_way};
 use crate::service::grpc::{self, GrpcError, Listeners};
 use crate::service::health::{Health, Part, State};
 use crate::service::http::{self, HttpError};
+use crate::service::traces::{Traces, TracesError};
 use crate::service::{call, stopped};
 use wade_core::model::kernel::Isa;
 
@@ -54,6 +55,9 @@ pub enum StartError {
     /// A file of certificates, a key or tokens.
     #[error(transparent)]
     Access(#[from] FileError),
+    /// Traces.
+    #[error(transparent)]
+    Traces(#[from] TracesError),
     /// A thread or a runtime.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
@@ -85,6 +89,7 @@ pub struct Running {
     drain: Duration,
     /// A thread ended that should not have.
     failed: Arc<AtomicBool>,
+    traces: Option<Arc<Traces>>,
 }
 
 /// Binds everything, reads the bundles while health says NOT_SERVING, then says SERVING.
@@ -102,17 +107,21 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
     let access = Arc::new(Access::new(&config.tls, &config.access, &config.grpc, Arc::clone(&metrics))?);
     let listeners = Arc::new(Listeners::bind(&config.grpc)?);
     let http_listener = http::bind(&config.http)?;
+    let (runtime, handshakes, administration) = (runtime()?, runtime()?, runtime()?);
+    let collecting = config.traces.is_on().then(self::runtime).transpose()?;
+    let traces =
+        collecting.as_ref().map(|runtime| Traces::start(&config.traces, runtime.handle())).transpose()?;
     let shared = call::Shared {
         engine: Arc::clone(&engine),
         metrics: Arc::clone(&metrics),
         reloader: Arc::clone(&reloader),
         window_s: config.latency_window_s,
         taps: Arc::default(),
+        traces: traces.clone(),
     };
     let health = Arc::new(Health::new(&config.ready, Arc::clone(&metrics)));
     let accounts = Accounts::new(&config.limits(), Arc::clone(&metrics));
     // handshakes are computed there, where nobody waits for an answer
-    let (runtime, handshakes) = (runtime()?, runtime()?);
     let acceptor = |protocol, insecure| Acceptor::new(&access, protocol, insecure, handshakes.handle());
     let grpc_acceptor = acceptor(Protocol::Http2, config.grpc.insecure);
     let http_acceptor = acceptor(Protocol::Http1, config.http.insecure);
@@ -126,8 +135,8 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
             shared.clone(),
             Arc::clone(&accounts),
             grpc_acceptor.clone(),
-            bulk,
-        ))?),
+            grpc::Aside { bulk, administration: administration.handle().clone() },
+        ))),
         http_address: http_listener.as_ref().and_then(|listener| listener.local_addr().ok()),
         health: Arc::clone(&health),
         shm: None,
@@ -144,10 +153,16 @@ pub fn start(config: &Config) -> Result<Running, StartError> {
         stop_http,
         runtime,
         failed: Arc::new(AtomicBool::new(false)),
+        traces,
     };
     running.spawn_handshakes(handshakes, http_stopped.clone())?;
     for worker in workers {
-        running.spawn_bulk(worker, http_stopped.clone())?;
+        running.spawn_aside("wade-bulk", worker, http_stopped.clone())?;
+    }
+    // on two cores, whoever asks for reloads without end must not have the processor before a query
+    running.spawn_aside("wade-admin", administration, http_stopped.clone())?;
+    if let Some(collecting) = collecting {
+        running.spawn_aside("wade-traces", collecting, http_stopped.clone())?;
     }
     for _ in 0..config.grpc.threads {
         running.spawn_grpc(stopped.clone())?;
@@ -231,7 +246,6 @@ impl Running {
         let start = Instant::now();
         self.health.set_serving(false);
         self.runtime.block_on(self.grpc.set_health(&self.health));
-        self.runtime.block_on(self.grpc.end_health_watches());
         self.stop.send_replace(true);
         if let Some(shm) = &self.shm {
             shm.stop();
@@ -240,6 +254,9 @@ impl Running {
             if thread.join().is_err() {
                 tracing::error!("a server thread panicked");
             }
+        }
+        if let Some(traces) = &self.traces {
+            traces.end();
         }
         self.stop_http.send_replace(true);
         for thread in self.housekeeping.drain(..) {
@@ -254,22 +271,7 @@ impl Running {
         let (server, listeners, drain) = (Arc::clone(&self.grpc), Arc::clone(&self.listeners), self.drain);
         let runtime = runtime()?;
         let thread = self.spawn("wade-grpc", move || {
-            let outcome = runtime.block_on(async {
-                let serving = std::pin::pin!(server.run(&listeners, stop.clone()));
-                bounded(serving, stop.clone(), drain).await
-            });
-            match outcome {
-                Some(Err(error)) => tracing::error!(%error, "gRPC ended"),
-                Some(Ok(())) => {}
-                None => {
-                    tracing::warn!(?drain, "connections were still open at the drain's bound: closed");
-                    // some are served by a thread of long work, and wait by this one's clock
-                    let closing = async { tokio::time::timeout(GOODBYE, server.close_all()).await };
-                    if runtime.block_on(closing).is_err() {
-                        tracing::warn!("some of them did not end");
-                    }
-                }
-            }
+            runtime.block_on(serve_grpc(&server, &listeners, stop, drain));
             runtime.shutdown_background();
         })?;
         self.threads.push(thread);
@@ -293,8 +295,13 @@ impl Running {
     }
 
     /// A thread of long work, which goes on until the calls that wait for it have their answers.
-    fn spawn_bulk(&mut self, worker: Runtime, stop: watch::Receiver<bool>) -> Result<(), StartError> {
-        let thread = self.spawn("wade-bulk", move || {
+    fn spawn_aside(
+        &mut self,
+        name: &str,
+        worker: Runtime,
+        stop: watch::Receiver<bool>,
+    ) -> Result<(), StartError> {
+        let thread = self.spawn(name, move || {
             give_way();
             worker.block_on(stopped(stop));
             worker.shutdown_background();
@@ -436,6 +443,30 @@ impl Drop for Running {
     }
 }
 
+/// Serves gRPC until `stop` turns true and what is in flight is answered, for at most `drain`; then closes what is left.
+pub async fn serve_grpc(
+    server: &grpc::Server,
+    listeners: &Listeners,
+    stop: watch::Receiver<bool>,
+    drain: Duration,
+) {
+    let outcome = {
+        let serving = std::pin::pin!(server.run(listeners, stop.clone()));
+        bounded(serving, stop, drain).await
+    };
+    match outcome {
+        Some(Err(error)) => tracing::error!(%error, "gRPC ended"),
+        Some(Ok(())) => {}
+        None => {
+            tracing::warn!(?drain, "connections were still open at the drain's bound: closed");
+            // some are served by a thread of long work, and wait by this one's clock
+            if tokio::time::timeout(GOODBYE, server.close_all()).await.is_err() {
+                tracing::warn!("some of them did not end");
+            }
+        }
+    }
+}
+
 /// Runs to the end, or until the bound has passed since the stop.
 async fn bounded<F: Future + Unpin>(
     mut work: F,
@@ -443,6 +474,7 @@ async fn bounded<F: Future + Unpin>(
     bound: Duration,
 ) -> Option<F::Output> {
     tokio::select! {
+        biased;
         output = &mut work => return Some(output),
         () = stopped(stop) => {}
     }

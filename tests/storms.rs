@@ -7,6 +7,8 @@
 
 #[path = "storms/attack.rs"]
 mod attack;
+#[path = "common/http2.rs"]
+mod http2;
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -425,7 +427,7 @@ fn who_says_nothing_is_closed_by_its_deadline() {
     let body = [attack::text(1, "husky"), vec![2 << 3, 1]].concat();
     let many = (0..20).flat_map(|index| {
         let id = 1 + 2 * index;
-        [attack::call(id, "/wade.v1.Hydrodynamics/GetVehicle"), attack::message(id, &body, true)].concat()
+        [http2::call(id, "/wade.v1.Hydrodynamics/GetVehicle"), http2::message(id, &body, true)].concat()
     });
     let deaf = with(many.collect());
     for (what, mut wire, reads) in
@@ -437,7 +439,7 @@ fn who_says_nothing_is_closed_by_its_deadline() {
                 !wire.drain()
             } else {
                 // what the server had sent is not read, so that only an error shows that it has closed
-                wire.send(&attack::frame(6, 0, 0, &[0; 8])).is_err()
+                wire.send(&http2::frame(6, 0, 0, &[0; 8])).is_err()
             };
             if closed {
                 break;
@@ -448,7 +450,7 @@ fn who_says_nothing_is_closed_by_its_deadline() {
     }
     // a request that never arrives, and a stream without one, lose their places, though not the connection
     for (resource, path) in [("requests", "GetVehicle"), ("streams", "Stream")] {
-        let _wire = with(attack::call(1, &format!("/wade.v1.Hydrodynamics/{path}")));
+        let _wire = with(http2::call(1, &format!("/wade.v1.Hydrodynamics/{path}")));
         let name = format!("wade_held{{resource=\"{resource}\"}}");
         for held in [1.0, 0.0] {
             let start = Instant::now();
@@ -469,7 +471,7 @@ fn newcomers_find_room_where_all_places_are_taken_by_those_who_stand_still() {
     let target = server.tcp();
     let mut idle = Wire::greeted(&target).expect("connected");
     let calls: Vec<u8> =
-        (0..4).flat_map(|i| attack::call(1 + 2 * i, "/wade.v1.Hydrodynamics/Stream")).collect();
+        (0..4).flat_map(|i| http2::call(1 + 2 * i, "/wade.v1.Hydrodynamics/Stream")).collect();
     idle.send_all(&calls).expect("sent");
     let start = Instant::now();
     while server.metric("wade_held{resource=\"streams\"}") < 4.0 {

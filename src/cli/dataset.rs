@@ -13,7 +13,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use wade_core::vehicle::Vehicle;
-use wade_learn::dataset::import::{Format, Import, LEFT_OUT};
+use wade_learn::dataset::import::{Format, Import, LEFT_OUT, PASSED_OVER};
 use wade_learn::dataset::lift;
 use wade_learn::dataset::sections::Sections;
 use wade_learn::dataset::split::{self, By};
@@ -283,6 +283,9 @@ impl ImportCases {
             eprintln!(
                 "warning: forces were reported of {left_out} too, none of the vehicle's surfaces; they are left out"
             );
+        }
+        if let Some(files) = data.meta.notes.get(PASSED_OVER) {
+            eprintln!("warning: these files hold no report that can be read, and were passed over: {files}");
         }
         let without = data.without_moments();
         if let Some(first) = without.first() {

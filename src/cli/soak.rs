@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use wade::cores;
-use wade::soak::{self, Ask, Clients, Config, Input, Rate, Report, SendError, Slo};
+use wade::soak::{self, Ask, Clients, Config, Input, Pace, Rate, Report, SendError, Slo};
 use wade_client::{Address, Client, ClientError, Credentials, GrpcClient, InProcess, Method, ShmClient};
 use wade_core::domain::{Domain, Range};
 use wade_wire::State;
@@ -91,6 +91,9 @@ pub struct Soak {
     /// Which CPUs server and client run on
     #[arg(long, value_enum, default_value_t = Pin::Split)]
     pin: Pin,
+    /// How a client waits until its next request is due
+    #[arg(long, value_enum, default_value_t = Waiting::Spin)]
+    pace: Waiting,
     #[command(flatten)]
     vehicles: Vehicles,
 }
@@ -127,6 +130,14 @@ pub enum Transport {
     Uds,
     /// gRPC over a Unix socket, one stream
     UdsStream,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Waiting {
+    /// It reads the clock without pause, on a core that it has to itself
+    Spin,
+    /// It sleeps, some 0.05 ms too long, and leaves the core to others
+    Sleep,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -292,6 +303,10 @@ impl Soak {
             duration: self.duration,
             warm_up: self.warm_up,
             batch: self.batch,
+            pace: match self.pace {
+                Waiting::Spin => Pace::Spin,
+                Waiting::Sleep => Pace::Sleep,
+            },
             slo: self.slo.clone(),
             control_core,
             commit: env!("WADE_COMMIT").into(),

@@ -349,8 +349,9 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let Built { vehicle, tidying, sealing, overlap_m3 } = build_reporting(&spec, stl, made.seal)?;
     if !tidying.is_nothing() {
         eprintln!(
-            "mended: {} corners joined that differed by rounding, {} faces without area dropped",
-            tidying.joined_corners, tidying.dropped_faces
+            "mended: {} corners joined that differed by rounding; dropped: {} faces without area, {} faces that stand \
+             there twice",
+            tidying.joined_corners, tidying.dropped_faces, tidying.repeated_faces
         );
     }
     if let Some(sealing) = sealing {

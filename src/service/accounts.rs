@@ -5,15 +5,16 @@
 mod connection;
 mod sent;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::net::IpAddr;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use prometheus_client::metrics::gauge::Gauge;
 use tokio::sync::Notify;
+use tokio::time::Instant;
 
 pub use crate::metrics::Closed;
 use crate::metrics::{Metrics, Resource};
@@ -131,7 +132,7 @@ pub struct Accounts {
 #[derive(Debug, Default)]
 struct Open {
     peers: HashMap<Peer, Weak<Held>>,
-    connections: HashMap<u64, Weak<Connection>>,
+    connections: BTreeMap<u64, Weak<Connection>>,
     next: u64,
 }
 
@@ -279,6 +280,11 @@ impl Accounts {
         while self.total.get(Resource::connections) > 0 {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
+    }
+
+    /// How much is held by all together.
+    pub fn held(&self, resource: Resource) -> usize {
+        self.total.get(resource)
     }
 
     /// Whether all places are taken.

@@ -3,12 +3,14 @@
 
 use std::cell::RefCell;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use tokio::time::Instant;
 use tonic::{Request, Response, Status};
 
 use super::admin::Reloader;
 use super::taps::Taps;
+use super::traces::Traces;
 use crate::engine::Engine;
 use crate::metrics::{self, Metrics, Transport};
 use wade_core::served::ServedVehicle;
@@ -35,6 +37,8 @@ pub struct Shared {
     pub window_s: f64,
     /// Streams that can be looked at.
     pub taps: Arc<Taps>,
+    /// Where spans go; none where nobody collects them.
+    pub traces: Option<Arc<Traces>>,
 }
 
 /// What the metrics need to know of an answer.
@@ -117,7 +121,7 @@ impl<'s> Call<'s> {
 
     fn refuse(self, refusal: Refusal) -> Refusal {
         self.shared.metrics.refuse(self.transport, refusal.reason());
-        let elapsed_ns = nanoseconds_since(self.arrived);
+        let elapsed_ns = nanoseconds_since(self.arrived.into_std());
         tracing::debug!(target: "wade::request", transport = self.transport.name(), %refusal, elapsed_ns);
         refusal
     }

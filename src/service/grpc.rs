@@ -11,7 +11,9 @@ mod moving;
 mod serving;
 mod stream;
 mod turns;
+mod watching;
 
+use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::net::UnixListener;
@@ -20,6 +22,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use tokio::io::DuplexStream;
 use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, mpsc, watch};
 use tonic::codec::CompressionEncoding;
@@ -27,16 +30,17 @@ use tonic::codegen::http;
 use tonic::service::Routes;
 use tonic::{Code, Status};
 use tonic_health::pb::health_server::HealthServer;
-use tonic_health::server::{HealthReporter, HealthService};
+use tonic_health::server::HealthReporter;
 
 use self::turns::Turnstile;
+use self::watching::WatchedHealth;
 use super::access::Acceptor;
-use super::accounts::{Accounts, Connection};
+use super::accounts::{Accounts, Connection, Peer};
 use super::admin::Jobs;
 use super::bulk::Bulk;
 use super::call::Shared;
 use super::health::{Health, Part, State};
-use super::intake::{self, Listener};
+use super::intake::{self, Listener, Made};
 use super::{occupant, stopped};
 use crate::metrics::Resource;
 use wade_wire::Refusal;
@@ -160,6 +164,7 @@ pub enum GrpcError {
 pub struct Listeners {
     tcp: Option<TcpListener>,
     unix: Option<(UnixListener, PathBuf)>,
+    memory: Option<Arc<Made>>,
 }
 
 impl Listeners {
@@ -168,7 +173,12 @@ impl Listeners {
         let tcp = (!config.listen.is_empty()).then(|| bind_tcp(&config.listen)).transpose()?;
         let path = &config.unix_socket;
         let unix = (!path.as_os_str().is_empty()).then(|| bind_unix(path)).transpose()?;
-        Ok(Self { tcp, unix: unix.map(|listener| (listener, path.clone())) })
+        Ok(Self { tcp, unix: unix.map(|listener| (listener, path.clone())), memory: None })
+    }
+
+    /// Only those that are made in memory, as a simulation does.
+    pub fn in_memory(made: mpsc::Receiver<io::Result<(DuplexStream, Peer)>>) -> Self {
+        Self { tcp: None, unix: None, memory: Some(Arc::new(Made::new(made))) }
     }
 
     /// The TCP address in use, with the port that the system chose where 0 was asked for.
@@ -226,6 +236,15 @@ const HEALTH_NAMES: [&str; 3] = ["", "wade.v1.Hydrodynamics", "inference.GRPCInf
 /// What a health check may ask about of shared memory.
 const HEALTH_OF_SHARED_MEMORY: &str = "wade.SharedMemory";
 
+/// Who does what must not stand before a query.
+#[derive(Debug)]
+pub struct Aside {
+    /// Calls that take milliseconds.
+    pub bulk: Arc<Bulk>,
+    /// The administrator's jobs.
+    pub administration: Handle,
+}
+
 /// A server that is bound and whose limits are set: health says NOT_SERVING until [`Server::set_health`].
 #[derive(Debug)]
 pub struct Server {
@@ -241,15 +260,16 @@ pub struct Server {
 }
 
 impl Server {
-    /// A server that is not ready yet; an error where the thread for the administrator's jobs does not start.
+    /// A server that is not ready yet.
     pub async fn new(
         config: Config,
         shared: Shared,
         accounts: Arc<Accounts>,
         acceptor: Acceptor,
-        bulk: Arc<Bulk>,
-    ) -> std::io::Result<Self> {
-        let jobs = Jobs::start(Arc::clone(&shared.reloader))?;
+        aside: Aside,
+    ) -> Self {
+        let Aside { bulk, administration } = aside;
+        let jobs = Jobs::start(Arc::clone(&shared.reloader), &administration);
         let gate = Arc::new(Semaphore::new(config.threads));
         let (turnstile, health) = (Turnstile::new(), HealthReporter::new());
         let server = Self { config, shared, accounts, jobs, gate, turnstile, health, acceptor, bulk };
@@ -257,7 +277,7 @@ impl Server {
         for service in HEALTH_NAMES {
             server.health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
         }
-        Ok(server)
+        server
     }
 
     /// Says SERVING of what answers, and of the server as a whole where it is ready.
@@ -270,13 +290,6 @@ impl Server {
         }
         let shared_memory = health.is_serving() && health.state(Part::Shm) == State::Ok;
         self.health.set_service_status(HEALTH_OF_SHARED_MEMORY, status(shared_memory)).await;
-    }
-
-    /// Ends the streams of those who watch our health, once they have heard the last of it: a drain would wait for them.
-    pub async fn end_health_watches(&self) {
-        for service in HEALTH_NAMES.into_iter().chain([HEALTH_OF_SHARED_MEMORY]) {
-            self.health.clone().clear_service_status(service).await;
-        }
     }
 
     fn routes(
@@ -296,7 +309,7 @@ impl Server {
             inference::InferenceHandlers { handlers: handlers.clone(), jobs: Arc::clone(&self.jobs) };
         let bulk = Arc::clone(&self.bulk);
         let heavy = heavy::HeavyCalls { handlers: inference.clone(), bulk, limit };
-        let health = HealthServer::new(HealthService::from_health_reporter(self.health.clone()));
+        let health = HealthServer::new(WatchedHealth::new(&self.health, stop));
         let reflection = || {
             tonic_reflection::server::Builder::configure()
                 .register_encoded_file_descriptor_set(proto::DESCRIPTORS)
@@ -335,7 +348,11 @@ impl Server {
             let listener = Listener::Unix(listener.map_err(at(path.display().to_string()))?);
             self.listen(listener, handlers::UNIX, &stop, &open).await
         };
-        tokio::try_join!(tcp, unix)?;
+        let memory = async {
+            let Some(made) = &listeners.memory else { return Ok(()) };
+            self.listen(Listener::Memory(Arc::clone(made)), handlers::TCP, &stop, &open).await
+        };
+        tokio::try_join!(tcp, unix, memory)?;
         stopped(stop).await;
         drop(open);
         let _: Option<()> = ended.recv().await;
@@ -363,6 +380,7 @@ impl Server {
             stream_idle: Duration::from_secs_f64(self.config.stream_idle_s),
             gate: Arc::clone(&self.gate),
             metrics: Arc::clone(&self.shared.metrics),
+            traces: self.shared.traces.clone(),
             stop: stop.clone(),
             names,
         });
@@ -387,6 +405,7 @@ impl Server {
             moving::spawn(serving, of, reading.clone(), Arc::clone(&self.bulk));
         };
         tokio::select! {
+            biased;
             () = intake::accept_all(listener, accounts, Resource::connections, serve) => {}
             () = stopped(stop.clone()) => {}
         }

@@ -11,8 +11,9 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use rustix::net::sockopt::{set_socket_recv_buffer_size, set_socket_send_buffer_size};
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio::sync::{Mutex, mpsc};
 use tokio_rustls::TlsStream;
 
 use super::accounts::{Accounts, Closed, Connection, Peer, Place};
@@ -39,7 +40,12 @@ pub enum Socket {
     Tls(Box<TlsStream<TcpStream>>),
     /// The Unix socket.
     Unix(UnixStream),
+    /// Memory.
+    Memory(DuplexStream),
 }
+
+/// Connections that are made in memory, with who is at their other end: those of a simulation.
+pub type Made = Mutex<mpsc::Receiver<io::Result<(DuplexStream, Peer)>>>;
 
 /// A listener of either kind.
 #[derive(Debug)]
@@ -48,6 +54,8 @@ pub enum Listener {
     Tcp(TcpListener),
     /// The Unix socket.
     Unix(UnixListener),
+    /// Whoever makes connections in memory.
+    Memory(Arc<Made>),
 }
 
 /// Listens on TCP. What the system holds for a peer that does not read, or sends faster than it is read, counts in no account
@@ -75,6 +83,11 @@ impl Listener {
                 let pid = stream.peer_cred().ok().and_then(|peer| peer.pid()).unwrap_or(0);
                 Ok((Socket::Unix(stream), Peer::Process(pid)))
             }
+            Self::Memory(made) => match made.lock().await.recv().await {
+                Some(made) => made.map(|(stream, peer)| (Socket::Memory(stream), peer)),
+                // whoever made them has gone
+                None => std::future::pending().await,
+            },
         }
     }
 }
@@ -158,6 +171,7 @@ macro_rules! either {
             Self::Tcp(stream) => Pin::new(stream).$call($($argument),*),
             Self::Tls(stream) => Pin::new(stream.as_mut()).$call($($argument),*),
             Self::Unix(stream) => Pin::new(stream).$call($($argument),*),
+            Self::Memory(stream) => Pin::new(stream).$call($($argument),*),
         }
     };
 }

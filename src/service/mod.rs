@@ -5,7 +5,7 @@ pub mod accounts;
 pub mod admin;
 pub mod answer;
 mod batch;
-pub(crate) mod bulk;
+pub mod bulk;
 pub mod call;
 pub mod grpc;
 pub mod health;
@@ -16,8 +16,10 @@ pub mod shm;
 pub(crate) mod shm_owner;
 pub(crate) mod shm_probe;
 pub(crate) mod shm_remains;
+mod shm_turns;
 pub mod stability;
 pub mod taps;
+pub mod traces;
 
 use tokio::sync::watch;
 

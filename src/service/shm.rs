@@ -1,8 +1,10 @@
-//! The shared-memory server: one thread that polls or sleeps, copies each request once, checks it and answers.
+//! The shared-memory server: one thread that polls or sleeps, copies each request once, checks it and answers. Batches are
+//! answered slice by slice, and single queries go between.
 
 #![allow(unsafe_code)]
 
 use std::collections::HashMap;
+use std::mem::MaybeUninit;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
@@ -15,17 +17,19 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::{ListenerKey, Notifier};
 use iceoryx2::port::server::Server;
 use iceoryx2::prelude::{BackpressureStrategy, CallbackProgression, MessagingPattern, ZeroCopySend, ipc};
+use iceoryx2::response_mut_uninit::ResponseMutUninit;
 use iceoryx2::service::port_factory::event;
 use serde::{Deserialize, Serialize};
 
 use super::shm_probe::{Own, Pulse};
 use super::shm_remains::{self, Remains, ServiceFiles};
+use super::shm_turns::Turns;
 use crate::engine::Engine;
 use crate::metrics::{Metrics, Recorder, Transport};
 use wade_core::served::ServedVehicle;
 use wade_wire::shm::layout::{
-    Answer, BatchAnswer, BatchQuery, JacobianAnswer, MAX_BATCH, Names, Query, SERVER_POLLS, SESSION_BEGINS,
-    Status, VehicleAnswer, wake_name,
+    Answer, BatchAnswer, BatchHeader, BatchQuery, JacobianAnswer, MAX_BATCH, Names, Query, SERVER_POLLS,
+    SESSION_BEGINS, Status, VehicleAnswer, wake_name,
 };
 use wade_wire::shm::{
     Exchange, MAX_CLIENTS, NAMESPACE, ShmError, Wait, events, in_place, node, open, served as shm_served,
@@ -74,6 +78,9 @@ const ROUNDS_PER_YIELD: u32 = 1 << 12;
 
 /// Most requests of a service in one round: more than its clients can have open, which only a forged queue has.
 const MOST_A_ROUND: usize = 1024;
+
+/// States of a batch between two looks at what else has come in: a query waits for so many, a third of a millisecond.
+const STATES_PER_SLICE: usize = 16;
 
 /// Pause after a wait that failed, so that a lasting failure does not spin.
 const PAUSE: Duration = Duration::from_millis(1);
@@ -128,6 +135,23 @@ pub(crate) struct Opening {
 }
 
 type Request<Q, A> = ActiveRequest<ipc::Service, Q, (), A, ()>;
+
+/// A batch that has been begun.
+struct Batch {
+    /// The version that answers all of it, whatever is swapped meanwhile.
+    vehicle: Arc<ServedVehicle>,
+    /// Number of the vehicle's ports.
+    ports: usize,
+    recorder: Arc<Recorder>,
+    arrived: Instant,
+    header: BatchHeader,
+    /// States that were answered, and how many of them lie outside the training domain.
+    answered: usize,
+    outside: u64,
+    // given back before the request that it belongs to
+    slot: ResponseMutUninit<ipc::Service, MaybeUninit<BatchAnswer>, ()>,
+    request: Request<BatchQuery, BatchAnswer>,
+}
 
 /// Who asks: a port, or a client that names itself, whose ports are one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -222,6 +246,7 @@ pub struct ShmServer {
     names: Names,
     node: Node<ipc::Service>,
     ports: Vec<Ports>,
+    batches: Turns<UniqueClientId, Batch>,
     wake: Listener<ipc::Service>,
     told: Told,
     responder: Responder,
@@ -280,7 +305,9 @@ impl ShmServer {
             files.add(&name, MessagingPattern::Event);
         }
         let told = Told::default();
-        let mut server = Self { config, names, node, ports: Vec::new(), wake, told, responder, files };
+        let batches = Turns::new();
+        let mut server =
+            Self { config, names, node, ports: Vec::new(), batches, wake, told, responder, files };
         for vehicle in server.without_ports() {
             server.open_ports(vehicle)?;
         }
@@ -402,7 +429,7 @@ impl ShmServer {
     }
 
     /// Takes everything that is waiting, then answers it: taking one at a time would serve the first connections again
-    /// and again, since that is where looking starts. True where there was anything.
+    /// and again, since that is where looking starts. Of batches it goes on with one. True where there was anything.
     fn answer_round(&mut self) -> bool {
         let mut any = false;
         for (number, ports) in self.ports.iter_mut().enumerate() {
@@ -413,15 +440,20 @@ impl ShmServer {
                 self.responder.describe(served.as_deref(), &request);
             }
             if let Some(vehicle) = served {
+                for arrival in ports.batch.waiting.drain(..) {
+                    let client = arrival.1.origin();
+                    if let Some(batch) =
+                        self.responder.begin(&vehicle, number, arrival, &ports.batch_recorder)
+                    {
+                        self.batches.push(client, batch);
+                    }
+                }
                 let at = At { vehicle: &vehicle, ports: number };
                 for (arrived, request) in ports.single.waiting.drain(..) {
                     self.responder.answer(at, arrived, &request, &ports.single_recorder);
                 }
                 for (arrived, request) in ports.jacobian.waiting.drain(..) {
                     self.responder.answer(at, arrived, &request, &ports.single_recorder);
-                }
-                for (arrived, request) in ports.batch.waiting.drain(..) {
-                    self.responder.answer_batch(at, arrived, &request, &ports.batch_recorder);
                 }
             } else {
                 for (_, request) in ports.single.waiting.drain(..) {
@@ -433,6 +465,12 @@ impl ShmServer {
                 for (_, request) in ports.batch.waiting.drain(..) {
                     self.responder.decline_batch(&request);
                 }
+            }
+        }
+        if let Some((client, batch)) = self.batches.next() {
+            any = true;
+            if let Some(batch) = self.responder.go_on(batch) {
+                self.batches.give_back(client, batch);
             }
         }
         any
@@ -558,46 +596,71 @@ impl Responder {
         self.metrics.refuse(Transport::shm_batch, "not_found");
     }
 
-    fn answer_batch(
+    /// Begins the answer to a batch; nothing where there is no room for it, or where its header is wrong.
+    fn begin(
         &mut self,
-        at: At,
-        arrived: Instant,
-        request: &Request<BatchQuery, BatchAnswer>,
-        recorder: &Recorder,
-    ) {
+        vehicle: &Arc<ServedVehicle>,
+        ports: usize,
+        (arrived, request): (Instant, Request<BatchQuery, BatchAnswer>),
+        recorder: &Arc<Recorder>,
+    ) -> Option<Batch> {
         let header = copy(&request.payload().header);
-        let Some(mut slot) = loaned(request.loan_uninit()) else { return };
+        let mut slot = loaned(request.loan_uninit())?;
         let answer = in_place(slot.payload_mut());
-        let count = header.count as usize;
-        let valid = (1..=MAX_BATCH).contains(&count) && header.flags == 0;
-        answer.sequence = header.sequence;
-        answer.flags = self.flags;
-        answer.status = if valid { Status::Ok as u32 } else { Status::InvalidBatch as u32 };
-        (answer.index, answer.count) = (0, 0);
-        let mut outside = 0;
-        for i in 0..if valid { count } else { 0 } {
-            let query = copy(&request.payload().queries[i]);
-            let slot = &mut answer.answers[i];
-            // a run in batches is another than that of the same number in single calls
-            if self.evaluate(at, Asker::Port(request.origin()), &query, slot).is_err() {
-                (answer.status, answer.index) = (Status::InvalidState as u32, i as u32);
-                break;
-            }
-            outside += u64::from(slot.is_outside());
-            answer.count += 1;
+        (answer.sequence, answer.flags) = (header.sequence, self.flags);
+        (answer.status, answer.index, answer.count) = (Status::Ok as u32, 0, 0);
+        let (vehicle, recorder) = (Arc::clone(vehicle), Arc::clone(recorder));
+        let batch =
+            Batch { vehicle, ports, recorder, arrived, header, answered: 0, outside: 0, slot, request };
+        if (1..=MAX_BATCH).contains(&(header.count as usize)) && header.flags == 0 {
+            return Some(batch);
         }
+        self.end(batch, Status::InvalidBatch);
+        None
+    }
+
+    /// Answers a slice of a batch, which is returned where more of it is left. What nobody waits for any more has ended.
+    fn go_on(&mut self, mut batch: Batch) -> Option<Batch> {
+        if !batch.request.is_connected() {
+            return None;
+        }
+        let count = batch.header.count as usize;
+        // a run in batches is another than that of the same number in single calls
+        let (asker, answer) = (Asker::Port(batch.request.origin()), in_place(batch.slot.payload_mut()));
+        for i in batch.answered..count.min(batch.answered + STATES_PER_SLICE) {
+            let query = copy(&batch.request.payload().queries[i]);
+            let at = At { vehicle: &batch.vehicle, ports: batch.ports };
+            if self.evaluate(at, asker, &query, &mut answer.answers[i]).is_err() {
+                answer.index = i as u32;
+                self.end(batch, Status::InvalidState);
+                return None;
+            }
+            batch.outside += u64::from(answer.answers[i].is_outside());
+            batch.answered += 1;
+        }
+        if batch.answered < count {
+            return Some(batch);
+        }
+        self.end(batch, Status::Ok);
+        None
+    }
+
+    /// Sends what has been answered of a batch.
+    fn end(&mut self, batch: Batch, status: Status) {
+        let Batch { vehicle, recorder, arrived, header, answered, outside, mut slot, .. } = batch;
+        let answer = in_place(slot.payload_mut());
+        (answer.status, answer.count) = (status as u32, answered as u32);
         answer.compute_ns = nanoseconds_since(arrived);
-        let status = answer.status;
         // SAFETY: it has been written, but for answers that do not count, which are numbers too.
         if sent(unsafe { slot.assume_init() }.send()) {
             wake(&self.done, &mut self.sleepers, header.wake_key);
         }
-        if status == Status::Ok as u32 {
+        if status == Status::Ok {
             recorder.record(arrived.elapsed(), outside);
         } else {
             self.metrics.refuse(Transport::shm_batch, "invalid_argument");
         }
-        tracing::debug!(target: "wade::request", transport = "shm_batch", vehicle = at.vehicle.model().vehicle().name, count, status);
+        tracing::debug!(target: "wade::request", transport = "shm_batch", vehicle = vehicle.model().vehicle().name, answered, ?status);
     }
 }
 
@@ -649,4 +712,87 @@ fn wake(done: &Notifier<ipc::Service>, sleepers: &mut HashMap<u64, ListenerKey>,
         }
         CallbackProgression::Stop
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use iceoryx2::port::client::Client;
+    use wade_core::bundle::Library;
+    use wade_core::model::kernel::Isa;
+
+    use super::*;
+
+    fn client<Q, A>(node: &Node<ipc::Service>, name: &str) -> Client<ipc::Service, Q, (), A, ()>
+    where
+        Q: ZeroCopySend + std::fmt::Debug + 'static,
+        A: ZeroCopySend + std::fmt::Debug + 'static,
+    {
+        open::<_, Q, A>(node, name).expect("it is served").client_builder().create().expect("there is room")
+    }
+
+    fn batch(client: &Client<ipc::Service, BatchQuery, (), BatchAnswer, ()>, sequence: u64) -> Pending {
+        let mut slot = client.loan_uninit().expect("there is room");
+        let query = in_place(slot.payload_mut());
+        query.header = BatchHeader {
+            sequence,
+            wake_key: 0,
+            flags: 0,
+            count: MAX_BATCH as u32,
+            spare: 0,
+            reserved: [0; wade_wire::shm::layout::RESERVED_LEN],
+        };
+        query.queries = [Query::from(&State::still(0.2)); MAX_BATCH];
+        wade_wire::shm::written(slot).send().expect("sent")
+    }
+
+    type Pending = iceoryx2::pending_response::PendingResponse<ipc::Service, BatchQuery, (), BatchAnswer, ()>;
+
+    #[test]
+    fn a_query_waits_for_a_slice_of_the_batches_before_it_and_batches_take_turns() {
+        let vehicles = concat!(env!("CARGO_MANIFEST_DIR"), "/vehicles");
+        let library = Library::open(Some(vehicles.as_ref())).expect("the shipped vehicles");
+        let engine = Arc::new(Engine::default());
+        engine.swap(library.served("husky", Isa::available()[0]).expect("husky"));
+        let namespace = format!("slices{}", std::process::id());
+        let opening = Opening {
+            metrics: Arc::new(Metrics::new()),
+            remains: Remains { crashed: false, former: Vec::new() },
+            own: Own::default(),
+            pulse: Arc::default(),
+        };
+        let config = Config { namespace: namespace.clone(), ..Config::default() };
+        let mut server = ShmServer::new(config, engine, opening).expect("nobody else has the namespace");
+        let (node, names) = (node::<ipc::Service>().expect("a node"), Names::new(&namespace));
+        let [first, second] = [(); 2].map(|()| client(&node, &names.evaluate_batch("husky")));
+        let single = client::<Query, Answer>(&node, &names.evaluate("husky"));
+
+        let slices = MAX_BATCH / STATES_PER_SLICE;
+        let long = [batch(&first, 1), batch(&first, 2)];
+        assert!(server.answer_round());
+        let short = batch(&second, 3);
+        let query = single.send_copy(Query::from(&State::still(0.2))).expect("sent");
+        assert!(server.answer_round());
+        assert!(query.receive().expect("connected").is_some(), "a round has one slice of a batch");
+        let mut ended = Vec::new();
+        for round in 2.. {
+            for pending in long.iter().chain([&short]) {
+                if let Some(answer) = pending.receive().expect("connected") {
+                    assert_eq!((answer.status, answer.count), (Status::Ok as u32, MAX_BATCH as u32));
+                    ended.push((answer.sequence, round));
+                }
+            }
+            if !server.answer_round() {
+                break;
+            }
+        }
+        // the second client came after two slices of the first, and from then on each had every other one
+        assert_eq!(ended, [(1, 2 * slices - 2), (3, 2 * slices + 1), (2, 3 * slices)]);
+
+        drop(long);
+        let given_up = batch(&first, 4);
+        assert!(server.answer_round());
+        drop(given_up);
+        assert!(server.answer_round());
+        assert!(!server.answer_round(), "nobody waits for it any more");
+    }
 }

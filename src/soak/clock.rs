@@ -5,6 +5,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::config::Pace;
+
 /// Above this the wait sleeps, below it spins [ns]. A sleep ends up to some 0.1 ms late on a quiet machine and
 /// leaves the core's clock and caches cold, so rates of 500 Hz and more never sleep.
 const SLEEP_ABOVE_NS: u64 = 2_000_000;
@@ -47,10 +49,15 @@ pub(super) struct Wait {
 }
 
 /// Waits until `due` [ns] and returns the first clock reading that is not before it.
-pub(super) fn wait_until(clock: &impl Clock, due: u64) -> Wait {
+pub(super) fn wait_until(clock: &impl Clock, due: u64, pace: Pace) -> Wait {
     let mut last = clock.now();
     let mut stall = None;
     while last < due {
+        if pace == Pace::Sleep {
+            clock.sleep(due - last);
+            last = clock.now();
+            continue;
+        }
         if due - last > SLEEP_ABOVE_NS {
             clock.sleep(due - last - SPIN_NS);
             last = clock.now();
@@ -106,15 +113,22 @@ mod tests {
     #[test]
     fn a_wait_ends_at_the_first_reading_after_the_due_time() {
         let clock = Simulated::default();
-        let wait = wait_until(&clock, 10_000_050);
+        let wait = wait_until(&clock, 10_000_050, Pace::Spin);
         assert!((10_000_050..10_000_050 + TICK).contains(&wait.ended));
         assert_eq!(wait.stall, Some(TICK));
+    }
+
+    #[test]
+    fn a_wait_that_sleeps_reads_the_clock_once_before_and_once_after() {
+        let clock = Simulated::default();
+        let wait = wait_until(&clock, 1_000_000, Pace::Sleep);
+        assert_eq!(wait, Wait { ended: 1_000_000 + TICK, stall: None });
     }
 
     #[test]
     fn a_time_already_past_is_not_waited_for() {
         let clock = Simulated::default();
         clock.pass(5_000);
-        assert_eq!(wait_until(&clock, 1_000), Wait { ended: 5_000 + TICK, stall: None });
+        assert_eq!(wait_until(&clock, 1_000, Pace::Spin), Wait { ended: 5_000 + TICK, stall: None });
     }
 }

@@ -89,6 +89,12 @@ pub(super) struct Watch {
     pub core: Option<usize>,
 }
 
+/// Lets a sleep of this thread end when it is due: by default the kernel may delay it by 50 us to save wake-ups. Where it
+/// refuses, the median shows it.
+pub(super) fn sleep_exactly() {
+    let _ = prctl::set_timerslack(1);
+}
+
 /// Sleeps from deadline to deadline until the end or until told to stop.
 ///
 /// A stall over several deadlines counts for each of them, as it would for requests.
@@ -100,8 +106,7 @@ pub(super) fn watch(
 ) -> Hiccups {
     let Watch { deadlines, end, core } = watch;
     let core = core.filter(|&core| cores::pin_to(&[core]).is_ok());
-    // by default the kernel may delay a sleep by 50 us to save wake-ups; where it refuses, the median shows it
-    let _ = prctl::set_timerslack(1);
+    sleep_exactly();
     for due in (0..).map(|index| deadlines.at(index)).take_while(|&due| due < end) {
         let mut now = clock.now();
         while now < due && !stop.load(Ordering::Relaxed) {

@@ -11,7 +11,7 @@ use std::{
 
 use super::{
     clock::{Clock, Monotonic, wait_until},
-    config::Config,
+    config::{Config, Pace},
     hiccup::{self, Deadlines, Hiccups, StopOnDrop},
     input::Input,
     lateness::Ideal,
@@ -204,6 +204,7 @@ struct Generator<'a, C> {
     offset: u64,
     end: u64,
     batch: usize,
+    pace: Pace,
     stop: Option<&'a AtomicBool>,
 }
 
@@ -216,6 +217,7 @@ impl<'a, C: Clock> Generator<'a, C> {
             offset: config.rate.intended_ns(index as u64).unwrap_or(0),
             end: (config.warm_up + config.duration).as_nanos() as u64,
             batch: config.batch.get(),
+            pace: config.pace,
             stop: None,
         }
     }
@@ -231,6 +233,10 @@ impl<'a, C: Clock> Generator<'a, C> {
         progress: &dyn Fn(&Progress),
     ) -> Recording {
         let Self { clock, end, .. } = *self;
+        if self.pace == Pace::Sleep {
+            // as in the control
+            hiccup::sleep_exactly();
+        }
         let mut states = vec![State::default(); self.batch];
         let (mut ideal, mut teller) = (Ideal::default(), Teller { told: 0, end });
         for index in 0.. {
@@ -245,7 +251,7 @@ impl<'a, C: Clock> Generator<'a, C> {
             }
             teller.tell(&recording, clock.now(), due, progress);
             self.input.fill(next as f64 * 1e-9, &mut states);
-            let wait = wait_until(clock, next);
+            let wait = wait_until(clock, next, self.pace);
             if wait.ended >= end + DRAIN_NS {
                 let due_in_all = self.rate.due_before(end.saturating_sub(self.offset)).unwrap_or(index);
                 let unsent = (index..due_in_all).filter_map(|index| self.due(index));

@@ -27,7 +27,7 @@ mod slo;
 pub mod steps;
 mod trace;
 
-pub use config::Config;
+pub use config::{Config, Pace};
 pub use duration::{DurationError, parse_duration};
 pub use input::{Domain, Input};
 pub use load::{Ask, Clients, Progress, SendError, run, run_clients};

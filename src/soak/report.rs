@@ -46,6 +46,8 @@ pub struct Report {
     pub batch: usize,
     /// Clients that asked at the same time.
     pub clients: usize,
+    /// How a client waited until its next request was due: `spin` or `sleep`.
+    pub pace: &'static str,
     /// True when each request waited for the answer before (`--rate max`); response is then service time.
     pub closed_loop: bool,
     /// The rate that was asked for [Hz]; none in a closed loop.
@@ -149,6 +151,7 @@ impl Report {
             input,
             batch: config.batch.get(),
             clients: config.clients.get(),
+            pace: config.pace.name(),
             closed_loop: config.rate.interval_ns().is_none(),
             target_rate_hz: config.rate.interval_ns().map(|interval| 1e9 / interval),
             rate_hz,

@@ -1,4 +1,4 @@
-//! A server of shared memory alone in a process of its own, which a test can kill.
+//! A process that a test can kill, such as a server of shared memory alone.
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -23,8 +23,12 @@ impl Process {
         );
         std::fs::write(&file, settings).expect("written");
         let mut command = Command::new(env!("CARGO_BIN_EXE_wade"));
-        command.arg("serve").arg("--config").arg(file).stdin(Stdio::null());
-        Self(command.spawn().expect("the server starts"))
+        Self::of(command.arg("serve").arg("--config").arg(file))
+    }
+
+    /// Starts a command, which ends with its owner.
+    pub fn of(command: &mut Command) -> Self {
+        Self(command.stdin(Stdio::null()).spawn().expect("the process starts"))
     }
 
     /// Ends it as nothing can prepare for.

@@ -357,10 +357,16 @@ fn cases_of_two_conventions_are_kept_apart() {
 #[test]
 fn a_second_run_in_the_same_folder_replaces_the_first() {
     let cases = copy("openfoam");
-    let again = cases.path().join(FORCE).with_file_name("force_0.dat");
-    fs::rename(cases.path().join(FORCE), &again).unwrap();
-    let stale = fs::read_to_string(&again).unwrap().replace("\t(-", "\t(-9");
-    fs::write(cases.path().join(FORCE), stale).unwrap();
+    let reports = cases.path().join("warthog-head-on/postProcessing");
+    for surface in fs::read_dir(reports).unwrap().map(Result::unwrap) {
+        for name in ["force", "moment"] {
+            let first = surface.path().join("0").join(name).with_extension("dat");
+            let again = first.with_file_name(format!("{name}_0.dat"));
+            fs::rename(&first, &again).unwrap();
+            let stale = fs::read_to_string(&again).unwrap().replace("\t(-", "\t(-9");
+            fs::write(&first, stale).unwrap();
+        }
+    }
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("data.parquet");
     assert!(import("openfoam", "warthog", cases.path(), &out, &[]).status.success());

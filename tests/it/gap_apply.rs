@@ -292,6 +292,7 @@ fn trials_that_cannot_be_what_they_are_said_to_be_leave_the_bundle_as_it_was() {
         assert!(!place.path("gap").exists());
     };
     refused(&|folder| edit(folder, 0..10, "fx", |_, fx| fx / 1000.0), "is it in kN? It must be in N");
+    refused(&|folder| edit(folder, 0..10, "fx", |_, fx| fx / 4.448), "is it in lbf? It must be in N");
     refused(&|folder| edit(folder, 0..10, "fx", |_, _| -20.0), "column fx: -20 in every row of every trial");
     let deep = |folder: &Path| edit(folder, 5..6, "depth", |_, depth| 20.0 * depth);
     refused(&deep, "run05.csv, row 2, column depth: 6 m of water over the ground");

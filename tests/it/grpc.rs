@@ -223,11 +223,12 @@ fn while_a_batch_is_computed_another_over_the_limit_is_refused_and_single_querie
     });
     runtime().block_on(async {
         let (mut first, mut second) = (client(&served).await, client(&served).await);
-        // now and then it is the long one that finds the place taken
+        // now and then it is the long one that finds the place taken, or that loses it to the other: where the machine has no
+        // time for either, it seems to stand still while it is received
         let long = tokio::spawn(async move {
             loop {
                 match first.evaluate_batch(batch(1 << 16)).await {
-                    Err(status) if status.code() == Code::ResourceExhausted => {}
+                    Err(status) if [Code::ResourceExhausted, Code::Unavailable].contains(&status.code()) => {}
                     answer => break answer,
                 }
             }

@@ -6,6 +6,7 @@
 mod common;
 
 mod access;
+mod balanced;
 mod campaign;
 mod campaign_trials;
 mod cli;
@@ -34,6 +35,7 @@ mod soak;
 mod soak_transports;
 mod stability;
 mod start_log;
+mod traces;
 mod training;
 mod validate;
 mod wheels;

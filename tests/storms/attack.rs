@@ -8,33 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
-const END_STREAM: u8 = 0x1;
-const END_HEADERS: u8 = 0x4;
-
-pub fn frame(kind: u8, flags: u8, stream: u32, payload: &[u8]) -> Vec<u8> {
-    let len = (payload.len() as u32).to_be_bytes();
-    [&len[1..], &[kind, flags], &stream.to_be_bytes(), payload].concat()
-}
-
-/// The HEADERS of a call, without the compression table.
-pub fn call(stream: u32, path: &str) -> Vec<u8> {
-    let mut block = vec![0x83, 0x86, 0x04, path.len() as u8];
-    block.extend(path.bytes());
-    for (first, value) in [(&[0x01][..], "localhost"), (&[0x0f, 0x10], "application/grpc")] {
-        block.extend(first);
-        block.push(value.len() as u8);
-        block.extend(value.bytes());
-    }
-    block.extend(b"\x00\x02te\x08trailers");
-    frame(1, END_HEADERS, stream, &block)
-}
-
-/// A message of gRPC as the whole body of a request, or as a part of it.
-pub fn message(stream: u32, bytes: &[u8], ends: bool) -> Vec<u8> {
-    let prefix = [&[0][..], &(bytes.len() as u32).to_be_bytes()].concat();
-    frame(0, if ends { END_STREAM } else { 0 }, stream, &[&prefix, bytes].concat())
-}
+use crate::http2::{PREFACE, call, frame, message};
 
 /// A field of protobuf that is a string.
 pub fn text(field: u8, value: &str) -> Vec<u8> {

@@ -3,17 +3,17 @@
 //! the one that waits is answered with it, any other is refused.
 
 use std::fmt;
-use std::io;
 use std::path::PathBuf;
-use std::sync::mpsc::{self, SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use tokio::sync::oneshot;
+use tokio::runtime::Handle;
+use tokio::sync::mpsc::error::TrySendError;
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::Instant;
 
 use super::{AUDIT, Reloader};
 use crate::service::access::Caller;
-use crate::service::bulk::give_way;
 use wade_wire::Refusal;
 use wade_wire::UnknownVehicle;
 use wade_wire::proto::Reloaded;
@@ -100,24 +100,22 @@ struct Queue {
 pub struct Jobs {
     reloader: Arc<Reloader>,
     queue: Arc<Mutex<Queue>>,
-    /// Wakes the thread, which ends with the last of these.
-    wake: SyncSender<()>,
+    /// Wakes whoever does them, who ends with the last of these.
+    wake: mpsc::Sender<()>,
 }
 
 impl Jobs {
-    /// No job yet, and the thread that will do them: on two cores, whoever asks without end must not have the processor
-    /// before a query.
-    pub fn start(reloader: Arc<Reloader>) -> io::Result<Arc<Self>> {
-        let (wake, woken) = mpsc::sync_channel(1);
+    /// No job yet, and the task that will do them on this runtime, whose thread reads files meanwhile.
+    pub fn start(reloader: Arc<Reloader>, runtime: &Handle) -> Arc<Self> {
+        let (wake, mut woken) = mpsc::channel(1);
         let worker = Worker { reloader: Arc::clone(&reloader), queue: Arc::default() };
         let queue = Arc::clone(&worker.queue);
-        std::thread::Builder::new().name("wade-admin".into()).spawn(move || {
-            give_way();
-            while woken.recv().is_ok() {
-                worker.work();
+        runtime.spawn(async move {
+            while woken.recv().await.is_some() {
+                worker.work().await;
             }
-        })?;
-        Ok(Arc::new(Self { reloader, queue, wake }))
+        });
+        Arc::new(Self { reloader, queue, wake })
     }
 
     /// Has a job done for a caller, and waits for it.
@@ -137,7 +135,7 @@ impl Jobs {
         Ok(reloaded)
     }
 
-    /// Puts a job in its place: on the thread, beside one that waits, or nowhere.
+    /// Puts a job in its place: before the task, beside one that waits, or nowhere.
     fn submit(&self, job: Job, by: String) -> Result<oneshot::Receiver<Outcome>, Refusal> {
         let (sender, answer) = oneshot::channel();
         let asker = Asker { by, job: job.to_string(), sender };
@@ -150,8 +148,8 @@ impl Jobs {
             }
             None => queue.waiting = Some(Waiting { job, askers: vec![asker] }),
         }
-        // a thread that was woken and has not looked yet finds this job as well
-        if let Err(TrySendError::Disconnected(())) = self.wake.try_send(()) {
+        // a task that was woken and has not looked yet finds this job as well
+        if let Err(TrySendError::Closed(())) = self.wake.try_send(()) {
             queue.waiting = None;
             return Err(Refusal::TooManyJobs);
         }
@@ -169,7 +167,7 @@ fn note(queue: &Queue, reloader: &Reloader) {
     reloader.metrics.set_admin_jobs(jobs);
 }
 
-/// What the thread has.
+/// What the task has.
 #[derive(Debug)]
 struct Worker {
     reloader: Arc<Reloader>,
@@ -178,14 +176,8 @@ struct Worker {
 
 impl Worker {
     /// Does what waits until nothing does.
-    fn work(&self) {
-        loop {
-            let mut queue = self.lock();
-            let waiting = queue.waiting.take();
-            queue.running = waiting.is_some();
-            note(&queue, &self.reloader);
-            drop(queue);
-            let Some(Waiting { job, askers }) = waiting else { return };
+    async fn work(&self) {
+        while let Some(Waiting { job, askers }) = self.next() {
             let start = Instant::now();
             let outcome = self.perform(&job);
             let elapsed = start.elapsed();
@@ -201,11 +193,20 @@ impl Worker {
                 asker.note(&refused);
                 let _ = asker.sender.send(outcome.clone());
             }
-            if self.lock().waiting.is_some() {
+            let waits = self.lock().waiting.is_some();
+            if waits {
                 // whoever asks without end takes half a core at most
-                std::thread::sleep(elapsed.min(LONGEST_PAUSE));
+                tokio::time::sleep(elapsed.min(LONGEST_PAUSE)).await;
             }
         }
+    }
+
+    fn next(&self) -> Option<Waiting> {
+        let mut queue = self.lock();
+        let waiting = queue.waiting.take();
+        queue.running = waiting.is_some();
+        note(&queue, &self.reloader);
+        waiting
     }
 
     fn perform(&self, job: &Job) -> Outcome {

@@ -6,11 +6,11 @@ use std::future::Future;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hyper::body::{Body as HttpBody, Bytes, Frame, Incoming, SizeHint};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
-use tokio::time::Sleep;
+use tokio::time::{Instant, Sleep};
 use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::Service;
@@ -24,6 +24,7 @@ use crate::metrics::{Metrics, Resource, Transport};
 use crate::service::access::{Acceptor, Caller, Role, Who};
 use crate::service::accounts::{Computing, Connection, Place, Sent};
 use crate::service::stopped;
+use crate::service::traces::{self, Traced, Traces};
 use wade_wire::Refusal;
 
 /// What a method needs.
@@ -96,6 +97,8 @@ pub struct Rules {
     pub gate: Arc<Semaphore>,
     /// Where refusals are counted.
     pub metrics: Arc<Metrics>,
+    /// Where spans go; none where nobody collects them.
+    pub traces: Option<Arc<Traces>>,
     /// True when the server ends.
     pub stop: watch::Receiver<bool>,
 }
@@ -120,13 +123,26 @@ impl hyper::service::Service<Request<Incoming>> for Calls {
 
     fn call(&self, request: Request<Incoming>) -> Self::Future {
         let calls = self.clone();
-        Box::pin(async move { Ok(calls.answer(request).await.unwrap_or_else(Status::into_http)) })
+        let method = Method::of(request.uri().path(), &self.rules.names);
+        // who probes does so for ever
+        let traces = self.rules.traces.as_ref().filter(|_| method.role.is_some());
+        let span =
+            traces.map(|traces| traces.call(request.uri().path(), request.headers(), self.connection.peer()));
+        Box::pin(async move {
+            let response = calls.answer(method, request).await.unwrap_or_else(Status::into_http);
+            let Some(mut span) = span else { return Ok(response) };
+            traces::note(&mut span, response.headers());
+            Ok(response.map(|body| Body::new(Traced::new(body, span))))
+        })
     }
 }
 
 impl Calls {
-    async fn answer(mut self, mut request: Request<Incoming>) -> Result<Response<Body>, Status> {
-        let method = Method::of(request.uri().path(), &self.rules.names);
+    async fn answer(
+        mut self,
+        method: Method,
+        mut request: Request<Incoming>,
+    ) -> Result<Response<Body>, Status> {
         self.connection.asks();
         let place = match self.admit(method, request.headers()).await {
             Ok((caller, place)) => {
@@ -345,13 +361,12 @@ impl Received {
         loop {
             let deadline = self.since + self.patience;
             // made where a request does not arrive as a whole, and not moved with every part
-            let sleep =
-                self.deadline.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(deadline.into())));
+            let sleep = self.deadline.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(deadline)));
             std::task::ready!(sleep.as_mut().poll(cx));
             if Instant::now() >= deadline {
                 return Poll::Ready(self.late());
             }
-            sleep.as_mut().reset(deadline.into());
+            sleep.as_mut().reset(deadline);
         }
     }
 

@@ -2,7 +2,9 @@
 //! nothing: each costs the receiver a thousand times what it costs the sender, and no request comes of it. And what a
 //! connection may cost before others get their turn.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use tokio::time::Instant;
 
 /// Length of a frame's header [bytes].
 const HEADER: usize = 9;

@@ -4,11 +4,12 @@ use std::error::Error;
 use std::future::{Future, poll_fn};
 use std::sync::Arc;
 use std::task::ready;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hyper::server::conn::http2;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::sync::watch;
+use tokio::time::Instant;
 
 use super::Config;
 use super::calls::Calls;
@@ -77,6 +78,8 @@ pub fn builder(config: &Config, reading: Reading) -> http2::Builder<Reading> {
     let mut builder = http2::Builder::new(reading);
     builder
         .timer(TokioTimer::new())
+        // gRPC has no use for it, and its length changes with the second
+        .auto_date_header(false)
         .initial_stream_window_size(STREAM_WINDOW)
         .initial_connection_window_size(CONNECTION_WINDOW)
         .max_concurrent_streams(config.max_streams_per_connection)
@@ -115,7 +118,7 @@ pub async fn serve(
     let connection = Arc::clone(&calls.connection);
     let mut served = std::pin::pin!(http.serve_connection(TokioIo::new(link), calls));
     let mut stop = std::pin::pin!(stopped(stop));
-    let mut look = tokio::time::interval_at((Instant::now() + LOOK).into(), LOOK);
+    let mut look = tokio::time::interval_at(Instant::now() + LOOK, LOOK);
     let (mut draining, mut goodbye) = (false, None);
     loop {
         let served_turn = poll_fn(|cx| {
@@ -125,6 +128,8 @@ pub async fn serve(
             polled
         });
         tokio::select! {
+            // what is ready first goes first, so that a simulation does the same each time
+            biased;
             ended = served_turn => {
                 // a client that breaks its own connection off is its own affair
                 if ended.is_err_and(|error| broke_protocol(&error)) {

@@ -29,6 +29,7 @@ use crate::service::access::{Acceptor, Role, Who};
 use crate::service::accounts::{Closed, Computing, Connection, Sent};
 use crate::service::intake::{self, Listener, Socket};
 use crate::service::stopped;
+use crate::service::traces::{self, Traces};
 
 /// How often a connection's deadline is looked at.
 const LOOK: Duration = Duration::from_secs(1);
@@ -54,11 +55,13 @@ pub async fn serve(listener: Listener, routes: Routes, shared: &Shared, stop: wa
     let serve = |socket, connection: Arc<Connection>, place| {
         let (routes, acceptor) = (routes.clone(), shared.acceptor.clone());
         let (http, watcher) = (http.clone(), open.watcher());
-        let (metrics, stop) = (Arc::clone(&shared.grpc.metrics), stop.clone());
+        let (metrics, traces, stop) =
+            (Arc::clone(&shared.grpc.metrics), shared.grpc.traces.clone(), stop.clone());
         tokio::spawn(async move {
             let welcomed = acceptor.let_in(socket, &connection, handshake, stop).await;
             let Some((socket, who)) = welcomed else { return };
-            let service = Requests { routes, connection: Arc::clone(&connection), acceptor, who, metrics };
+            let service =
+                Requests { routes, connection: Arc::clone(&connection), acceptor, who, metrics, traces };
             let noted = Noted { socket, connection: Arc::clone(&connection) };
             let served = watcher.watch(http.serve_connection(TokioIo::new(noted), service));
             tokio::select! {
@@ -91,6 +94,7 @@ struct Requests {
     acceptor: Acceptor,
     who: Who,
     metrics: Arc<Metrics>,
+    traces: Option<Arc<Traces>>,
 }
 
 /// The role that a path takes; probes take none.
@@ -112,12 +116,24 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
         let Routes { probes, browsed, work } = self.routes.clone();
         let connection = Arc::clone(&self.connection);
         connection.moved();
+        // who scrapes and who probes does so for ever
+        let traces = self.traces.as_ref().filter(|_| !is_probe(request.uri().path()));
+        let span = traces.map(|traces| {
+            let (method, path) = (request.method().as_str(), request.uri().path());
+            traces.request(method, path, request.headers(), connection.peer())
+        });
+        let ended = move |response: &Response<Body>| {
+            if let Some(mut span) = span {
+                traces::answered(&mut span, response.status().as_u16());
+            }
+        };
         let checked = role(request.uri().path()).map_or(Ok(()), |role| {
             self.acceptor.access().check(&self.who, request.headers(), role).map(drop)
         });
         if let Err(refusal) = checked {
             self.metrics.refuse(Transport::http, refusal.reason());
             let response = Rejection::from(refusal).into_response();
+            ended(&response);
             return Box::pin(
                 async move { Ok(response.map(|body| Body::new(Sent::new(body, connection, None)))) },
             );
@@ -127,15 +143,21 @@ impl hyper::service::Service<Request<Incoming>> for Requests {
             let _computing = request.body().is_end_stream().then(|| Computing::begin(&connection));
             let mut request = request.map(Body::new);
             request.extensions_mut().insert(Arc::clone(&connection));
-            let response = if matches!(request.uri().path(), "/livez" | "/readyz" | "/metrics") {
+            let response = if is_probe(request.uri().path()) {
                 probes.oneshot(request).await?
             } else {
                 let answered = work.spawn(browsed.oneshot(request)).await;
                 answered.unwrap_or_else(|_| Ok(StatusCode::INTERNAL_SERVER_ERROR.into_response()))?
             };
+            ended(&response);
             Ok(response.map(|body| Body::new(Sent::new(body, connection, None))))
         })
     }
+}
+
+/// Whether it is a program that asks, every few seconds.
+fn is_probe(path: &str) -> bool {
+    matches!(path, "/livez" | "/readyz" | "/metrics")
 }
 
 /// A socket that notes what leaves.

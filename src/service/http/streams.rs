@@ -1,13 +1,13 @@
 //! The streams of clients, looked at while they run.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use axum::Router;
 use axum::extract::{Path, State};
 use axum::response::Response;
 use axum::routing::get;
 use serde::Serialize;
+use tokio::time::Instant;
 
 use super::rejection::Rejection;
 use super::{Shared, json};
