@@ -18,10 +18,13 @@ test:
 ci:
     .ci/run
 
-# the long fault and load tests: an hour and a half
+# the long fault and load tests, fuzzing and worlds: six hours
 long:
     WADE_HOSTILE_SECONDS=3600 cargo test --test hostile -- --nocapture
     WADE_STORMS_S=60 cargo test --release --test storms -- --nocapture --test-threads 1
+    tests/fuzz/run 1800
+    WADE_SIMULATION_SEEDS=0..100000 cargo test --release -p wade-simulation --test seeds
+    tests/simulation/faults/run
 
 # write the tables of README.md and docs/src/results from the raw results, and those of effects from the sources
 results:

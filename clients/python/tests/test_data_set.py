@@ -26,7 +26,7 @@ def test_duckdb_reads_a_campaign(vehicle: str) -> None:
     ).fetchall()
     assert [name for name, *_ in drag] == [name for name, _ in cases]
     for (_, mean, _), (_, stated) in zip(drag, cases, strict=True):
-        assert mean == pytest.approx(stated, rel=1e-5)
+        assert mean == pytest.approx(stated, abs=0.5e-4), "cases.csv has four places"
 
 
 def test_the_meta_data_carry_units_and_provenance() -> None:
