@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::{output, root};
 
 /// What each crate may depend on, and does.
-const EDGES: [(&str, &[&str]); 11] = [
+const EDGES: [(&str, &[&str]); 13] = [
     ("wade-core", &[]),
     ("wade-wire", &["wade-core"]),
     ("wade-client", &["wade-core", "wade-wire"]),
@@ -22,6 +22,9 @@ const EDGES: [(&str, &[&str]); 11] = [
     ("wade-gap-bench", &["wade-core", "wade-learn"]),
     // files of robots and CAD programs to a vehicle: no learning, no server
     ("wade-import", &["wade-core"]),
+    // tests of the whole
+    ("wade-simulation", &["wade", "wade-core", "wade-wire"]),
+    ("wade-fuzz", &["wade", "wade-core", "wade-import", "wade-learn", "wade-simulation", "wade-wire"]),
     (
         "wade",
         &[

@@ -8,6 +8,7 @@ mod effects;
 mod gap;
 mod latency;
 mod remote;
+mod robustness;
 
 use std::path::PathBuf;
 
@@ -33,6 +34,8 @@ fn table(name: &str) -> String {
         "elements" => latency::elements(),
         "python" => latency::python(),
         "epoch" => latency::epoch(),
+        "long memory" => robustness::memory(),
+        "long tails" => robustness::tails(),
         "relay" => remote::relay(),
         "remote use" => remote::steady(),
         "remote cuts" => remote::cuts(),

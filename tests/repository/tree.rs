@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Bytes of all files that git tracks.
-const MAX_TREE_BYTES: u64 = 15_000_000;
+/// Bytes of all files that git tracks: 14 MB, and 2 kB for each of the 300 cases of the campaign `drive` and the 500 of other hulls.
+const MAX_TREE_BYTES: u64 = 14_000_000 + 800 * 2_000;
 
 /// Files that git tracks and that are there; none outside a checkout, such as a source archive.
 fn tracked() -> Vec<PathBuf> {
@@ -59,7 +59,7 @@ fn the_root_holds_what_is_listed_and_nothing_else() {
 }
 
 #[test]
-fn the_tree_holds_at_most_fifteen_megabytes() {
+fn the_tree_holds_no_more_than_what_it_has_room_for() {
     let mut sizes: Vec<(u64, PathBuf)> =
         tracked().into_iter().map(|path| (path.metadata().unwrap().len(), path)).collect();
     sizes.sort();
