@@ -1,12 +1,12 @@
 //! From the rows of the file to samples.
 
 use std::collections::HashMap;
-use std::fs::File;
 
 use nalgebra::UnitVector3;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::file::{FORMAT, FORMAT_KEY, Fault, META_KEY};
+use super::pages::Pages;
 use super::schema::{self, Load, SCALARS, SECTION, STATES, SURFACE, State, TEXTS};
 use super::table::Table;
 use super::{Dataset, Image, Meta, Rest, Sample, SurfaceLoad};
@@ -14,7 +14,7 @@ use wade_core::condition::Condition;
 use wade_core::frame::Vec3;
 
 /// The samples in the order of their first row.
-pub(super) fn decode(reader: &SerializedFileReader<File>) -> Result<Dataset, Fault> {
+pub(super) fn decode(reader: &SerializedFileReader<Pages>) -> Result<Dataset, Fault> {
     let meta = meta(reader)?;
     let table = Table::read(reader)?;
     let mut samples: Vec<Partial> = Vec::new();
@@ -32,7 +32,7 @@ pub(super) fn decode(reader: &SerializedFileReader<File>) -> Result<Dataset, Fau
     Ok(Dataset { meta, samples })
 }
 
-fn meta(reader: &SerializedFileReader<File>) -> Result<Meta, Fault> {
+fn meta(reader: &SerializedFileReader<Pages>) -> Result<Meta, Fault> {
     let pairs = reader.metadata().file_metadata().key_value_metadata();
     let value = |key: &'static str| {
         let pair = pairs.and_then(|pairs| pairs.iter().find(|pair| pair.key == key));

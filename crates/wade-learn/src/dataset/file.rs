@@ -8,10 +8,10 @@ use wade_core::at::At;
 use wade_core::caught::caught;
 
 use parquet::errors::ParquetError;
-use parquet::file::reader::SerializedFileReader;
 
 use super::decode::decode;
 use super::encode::{Loads, encode};
+use super::pages;
 use super::{Dataset, Flaw, Image};
 use crate::files::StagedFile;
 
@@ -196,7 +196,7 @@ pub fn write_compact(path: &Path, dataset: &Dataset) -> Result<(), DatasetError>
 
 fn load(path: &Path) -> Result<Dataset, Fault> {
     let file = File::open(path)?;
-    let decoded = caught(|| decode(&SerializedFileReader::new(file)?));
+    let decoded = caught(|| decode(&pages::open(file)?));
     let dataset = decoded.unwrap_or_else(|message| Err(Fault::Damaged { message }))?;
     dataset.check()?;
     Ok(dataset)

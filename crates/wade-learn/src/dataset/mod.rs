@@ -1,8 +1,8 @@
 //! Data sets: loads on each surface of a vehicle with the state that they belong to, from CFD or by formula.
 //!
 //! Body frame FLU, SI units. A *case* is one run of a solver; a *sample* is the average over one section of its
-//! history, or a mirror image of that. Reading order: `check` (what holds for every data set), `schema`, `file`, `encode`
-//! and `decode` (Parquet), `history` and `sections` (force histories and their averages), `openfoam` and `fluent` (the solvers'
+//! history, or a mirror image of that. Reading order: `check` (what holds for every data set), `schema`, `file`, `encode`,
+//! `pages` and `decode` (Parquet), `history` and `sections` (force histories and their averages), `openfoam` and `fluent` (the solvers'
 //! files), `case` and `import` (a folder of cases), `label` (loads with the hull's own hydrostatics), `mirror` (augmentation), `split`, `merge`, `analytic`, `summary`, `page`.
 
 pub mod analytic;
@@ -21,6 +21,7 @@ mod merge;
 pub mod mirror;
 pub mod openfoam;
 pub mod page;
+mod pages;
 mod schema;
 pub mod sections;
 pub mod split;

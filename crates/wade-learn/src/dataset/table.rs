@@ -2,13 +2,13 @@
 //! required columns into nullable ones.
 
 use std::collections::HashMap;
-use std::fs::File;
 
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 
 use super::file::Fault;
+use super::pages::{self, Pages};
 use super::schema;
 
 /// Values of one column; `None` for a null.
@@ -25,7 +25,7 @@ pub(super) struct Table {
 
 impl Table {
     /// Reads the columns that the schema names and leaves any other.
-    pub(super) fn read(reader: &SerializedFileReader<File>) -> Result<Self, Fault> {
+    pub(super) fn read(reader: &SerializedFileReader<Pages>) -> Result<Self, Fault> {
         let rows = usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or(0);
         let descriptor = reader.metadata().file_metadata().schema_descr();
         let mut columns = HashMap::new();
@@ -99,7 +99,7 @@ impl Column {
     ) -> Result<(), Fault> {
         let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         let found = group.metadata().column(index).column_type();
-        match (self, group.get_column_reader(index)?) {
+        match (self, pages::column(group, index)?) {
             (Self::Text(to), ColumnReader::ByteArrayColumnReader(from)) => {
                 extend(to, from, rows, |value| value)
             }

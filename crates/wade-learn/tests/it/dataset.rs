@@ -6,8 +6,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
+use parquet::basic::Encoding;
+use parquet::data_type::{ByteArray, ByteArrayType};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::parser::parse_message_type;
 use proptest::prelude::*;
 use tempfile::TempDir;
 use wade_core::condition::{Condition, GroundContact};
@@ -209,6 +215,57 @@ fn a_file_that_is_cut_off_anywhere_is_refused() {
     }
     let missing = dataset::read(&folder.path().join("none.parquet")).unwrap_err();
     assert!(matches!(missing.fault, Fault::Io(_)), "{missing}");
+}
+
+/// A file with our meta data and the column `vehicle` alone, three names in it.
+fn one_column(encoding: Option<Encoding>) -> Vec<u8> {
+    let schema = "message data { REQUIRED BINARY vehicle (STRING); }";
+    let mut properties = WriterProperties::builder().set_key_value_metadata(Some(
+        [
+            ("wade.format", "1"),
+            ("wade.meta", r#"{"provenance":"analytic","ground_contact":"wetted","vehicles":{}}"#),
+        ]
+        .map(|(key, value)| KeyValue::new(key.into(), value.to_owned()))
+        .into(),
+    ));
+    if let Some(encoding) = encoding {
+        properties = properties.set_dictionary_enabled(false).set_encoding(encoding);
+    }
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    let mut file = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties.build())).unwrap();
+    let mut group = file.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    let names = ["husky", "warthog", "other"].map(ByteArray::from);
+    column.typed::<ByteArrayType>().write_batch(&names, None, None).unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    file.into_inner().unwrap()
+}
+
+#[test]
+fn a_page_that_claims_more_than_its_bytes_hold_is_refused_before_room_is_made_for_it() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("claims.parquet");
+    let refused = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        dataset::read(&path).unwrap_err().to_string()
+    };
+    // the dictionary of `one_column`: kind 2, its sizes, and as the first field of the seventh its number of values
+    let whole = one_column(None);
+    assert!(refused(&whole).contains("column case is missing"), "{}", refused(&whole));
+    assert_eq!(whole[4..7], [0x15, 4, 0x15]);
+    let count = 4 + whole[4..].windows(3).position(|bytes| bytes == [0x4c, 0x15, 6]).unwrap() + 2;
+    // 2^30 as a number of Thrift's takes five bytes
+    let huge = [0x80, 0x80, 0x80, 0x80, 0x08];
+    let with = |place: usize| [&whole[..place], &huge, &whole[place + 1..]].concat();
+    let error = refused(&with(count));
+    assert!(error.contains("a dictionary of 1073741824 values in bytes for at most"), "{error}");
+    let error = refused(&with(7));
+    assert!(error.contains("the page at byte 4 says 1073741824 bytes, at most"), "{error}");
+    for encoding in [Encoding::DELTA_LENGTH_BYTE_ARRAY, Encoding::DELTA_BYTE_ARRAY] {
+        let error = refused(&one_column(Some(encoding)));
+        assert!(error.contains(&format!("the encoding {encoding} is not read")), "{error}");
+    }
 }
 
 #[test]
