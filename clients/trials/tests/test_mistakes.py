@@ -10,7 +10,7 @@ import pytest
 from helpers import FORCES, NED, POSE, Y_UP, accepted, mapping_of, refusal
 
 from wade_trials import TrialsError, import_trials
-from wade_trials.axes import turned_about_up
+from wade_trials.axes import quaternions, rotations, turned_about_up
 from wade_trials.mapping import Column, Imu, Trial, Wrench
 from wade_trials.source import Clock
 
@@ -318,6 +318,47 @@ def test_a_clock_in_milliseconds(tmp_path: Path) -> None:
     ):
         import_trials(mapping_of(file), None)
     accepted(mapping_of(file, clock=Clock("t", "ms")))
+
+
+def test_a_clock_that_counts_frames_or_whole_seconds(tmp_path: Path) -> None:
+    columns = generated.table(generated.record(rate=120))
+    seconds = np.floor(columns["t"]).astype(np.float64)
+    columns["t"] = np.arange(len(seconds), dtype=np.float64) + 17
+    file = generated.write_csv(tmp_path / "run.csv", columns)
+    with pytest.raises(TrialsError, match=r"time.rate_hz: .*counts frames: write rate_hz = .* under \[time\]"):
+        import_trials(mapping_of(file), None)
+    accepted(mapping_of(file, clock=Clock(rate_hz=120.0)))
+    columns["t"] = seconds
+    file = generated.write_csv(tmp_path / "run.csv", columns)
+    with pytest.raises(TrialsError, match=r"time.channel: 99% of the samples of x have the stamp of the one before"):
+        import_trials(mapping_of(file), None)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, 2.4])
+def test_a_conjugate_quaternion(heading: float, tmp_path: Path) -> None:
+    """Where the vehicle drives along the cameras' x axis its bends show it."""
+    columns = generated.table(generated.record(heading=heading))
+    columns |= {name: -columns[name] for name in ("qx", "qy", "qz")}
+    file = generated.write_csv(tmp_path / "run.csv", columns)
+    message = refusal(mapping_of(file))
+    assert "conjugate" in message and 'write quaternion_direction = "body_from_world" under [pose]' in message, message
+    accepted(mapping_of(file, pose=replace(POSE, quaternion_direction="body_from_world")))
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+def test_a_pose_that_jumps(turn: float, tmp_path: Path) -> None:
+    recording = generated.record()
+    middle = len(recording.t) // 2
+    if turn:
+        half = np.array([np.cos(turn / 2), 0, 0, np.sin(turn / 2)])
+        recording.quaternion[middle:] = quaternions(rotations(recording.quaternion[middle:]) @ rotations(half[None])[0])
+    else:
+        recording.position[middle:, 1] += 0.1 + 12.0 / 120
+    file = generated.write_csv(tmp_path / "run.csv", generated.table(recording))
+    message = refusal(mapping_of(file, accept=["motion"]))
+    assert f"from {recording.t[middle - 1]:.3f} s" in message and "faster than any vehicle" in message, message
+    trial = Trial(str(file), generated.WATER_LEVEL, generated.DEPTH, end_s=float(recording.t[middle - 1]))
+    accepted(mapping_of(file, trials={"run": trial}))
 
 
 def test_a_finding_that_is_accepted_does_not_stop_the_import(tmp_path: Path) -> None:

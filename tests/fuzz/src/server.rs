@@ -11,8 +11,9 @@ use tempfile::TempDir;
 use wade::config::Config;
 use wade::server::{self, Running};
 
-/// Longest wait for an answer or the end of a connection: a machine that is busy is no finding.
-pub const PATIENCE: Duration = Duration::from_secs(20);
+/// Longest wait for an answer or the end of a connection, below libFuzzer's own: a machine that is busy is no finding, and one
+/// that builds beside it made a reload take more than 20 s.
+pub const PATIENCE: Duration = Duration::from_secs(80);
 
 /// The folder of the shipped vehicles.
 pub fn vehicles() -> PathBuf {

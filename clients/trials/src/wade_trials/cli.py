@@ -86,6 +86,7 @@ def _parser() -> argparse.ArgumentParser:
 def _clock(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--time", default="", metavar="NAME", help="column of time, in CSV and numpy files")
     parser.add_argument("--time-unit", default="", metavar="UNIT", help="s, ms, us or ns")
+    parser.add_argument("--frame-rate", type=float, default=0.0, metavar="HZ", help="where that column counts frames")
 
 
 def _triple(text: str) -> tuple[float, float, float]:
@@ -96,7 +97,7 @@ def _triple(text: str) -> tuple[float, float, float]:
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    source = open_source(options.file, Clock(options.time, options.time_unit))
+    source = open_source(options.file, Clock(options.time, options.time_unit, options.frame_rate))
     channels = source.channels()
     rows = [(c.name, c.unit or "-", "-" if c.samples is None else f"{c.samples}") for c in channels]
     print(f"{options.file}: {source.format}, {len(channels)} channels")
@@ -111,7 +112,7 @@ def _map(options: argparse.Namespace) -> int:
     if options.out.exists():
         raise TrialsError(options.out, "", "it is there already: remove it or name another file with --out")
     known = Known(
-        clock=Clock(options.time, options.time_unit),
+        clock=Clock(options.time, options.time_unit, options.frame_rate),
         body_name=options.body,
         tracked_point_to_origin_m=options.point_to_origin,
         water_level_m=options.water_level,

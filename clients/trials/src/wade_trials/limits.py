@@ -12,6 +12,11 @@ MIN_SHARE_AT_DEPTH = 0.1
 MOVING = 0.3
 #: Share of a moving vehicle's velocity along body z, and along body y, above which the axes are in doubt: wheels roll.
 MAX_VERTICAL, MAX_LATERAL = 0.3, 0.5
+#: Sine of the angle between velocity and body x, rms, above which a conjugate quaternion that halves it is the right
+#: one: 6 degrees, more than the change of a slope under the wheels makes.
+ASTRAY = 0.1
+#: No vehicle turns faster [rad/s], and what noise of markers adds between two frames [m, rad].
+MAX_TURN, MARKER_NOISE, MARKER_NOISE_TURN = 10.0, 0.02, 0.1
 #: Time between the two frames of a difference [s]: noise of a millimeter makes 0.01 m/s.
 DIFFERENCE = 0.1
 #: Frames of a recording that a check looks at.
@@ -32,5 +37,7 @@ MIN_CORRELATION, MIN_MOTION = 0.7, 0.02
 FACTOR_TOLERANCE = 0.3
 #: Radii of wheels [m].
 WHEEL_RADIUS = (0.05, 1.0)
-#: No recording steps by more than this [s].
+#: No recording steps by as much as this [s].
 LONG_STEP = 1.0
+#: Share of samples with the stamp of the one before above which stamps are rounded: a few are sent twice.
+REPEATED_STAMPS = 0.5

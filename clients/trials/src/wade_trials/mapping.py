@@ -25,6 +25,8 @@ COLUMNS = (
     *("sim_fx", "sim_fy", "sim_fz", "sim_mx", "sim_my", "sim_mz"),
 )
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+#: What a quaternion turns: vectors of the body into the world, or of the world into the body.
+DIRECTIONS = ("world_from_body", "body_from_world")
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ class Pose:
     quaternion: tuple[str, str, str, str]
     #: Order of the four channels, ``wxyz`` or ``xyzw``.
     quaternion_order: str = "wxyz"
+    #: What the quaternion turns, ``world_from_body``, or ``body_from_world``, its conjugate.
+    quaternion_direction: str = "world_from_body"
     position_unit: str = "m"
     #: For each of our world axes (z up) the one of the recording.
     axes: Axes = PRESETS["z up"]
@@ -233,8 +237,9 @@ class _Reader:
             )
         mapping.processing = self.processing(self.table("processing", table))
         time = self.table("time", table)
-        self.no_others("time.", time, ["channel", "unit"])
-        mapping.clock = Clock(self.text("time.channel", time, ""), self.text("time.unit", time, ""))
+        self.no_others("time.", time, ["channel", "unit", "rate_hz"])
+        rate = self.number("time.rate_hz", time, 0.0, 1e-3, 1e6)
+        mapping.clock = Clock(self.text("time.channel", time, ""), self.text("time.unit", time, ""), rate)
         mapping.pose = self.pose(self.table("pose", table)) if "pose" in table else None
         mapping.wrench = self.wrench(self.table("wrench", table)) if "wrench" in table else None
         mapping.imu = self.imu(self.table("imu", table)) if "imu" in table else None
@@ -321,11 +326,14 @@ class _Reader:
         return Processing(self.number("processing.rate_hz", table, 111.0, 1.0, 1e4), window, order)
 
     def pose(self, table: dict[str, Any]) -> Pose:
-        known = ["position", "quaternion", "quaternion_order", "position_unit", "axes", "body_axes"]
-        self.no_others("pose.", table, [*known, "tracked_point_to_origin_m"])
+        known = ["position", "quaternion", "quaternion_order", "quaternion_direction", "position_unit"]
+        self.no_others("pose.", table, [*known, "axes", "body_axes", "tracked_point_to_origin_m"])
         order = self.text("pose.quaternion_order", table, "wxyz")
         if order not in ("wxyz", "xyzw"):
             raise self.fault("pose.quaternion_order", 'it is "wxyz" or "xyzw", the order of the four channels')
+        direction = self.text("pose.quaternion_direction", table, DIRECTIONS[0])
+        if direction not in DIRECTIONS:
+            raise self.fault("pose.quaternion_direction", f'it is "{DIRECTIONS[0]}" or its conjugate "{DIRECTIONS[1]}"')
         axes = self.axes("pose.axes", table)
         body_axes = self.axes("pose.body_axes", table, axes)
         if is_left_handed(axes) != is_left_handed(body_axes):
@@ -342,6 +350,7 @@ class _Reader:
             (position[0], position[1], position[2]),
             (quaternion[0], quaternion[1], quaternion[2], quaternion[3]),
             order,
+            direction,
             self.unit("pose.position_unit", table, "length"),
             axes,
             body_axes,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .axes import matrix, rotations, turned
 from .errors import TrialsError
-from .mapping import WRENCH, Body, Mapping, Pose, Processing, Trial
+from .mapping import DIRECTIONS, WRENCH, Body, Mapping, Pose, Processing, Trial
 from .signal import body_rate, grid, pieces, resample, savitzky_golay, slerp, without_sign_flips
 from .source import Series
 from .units import UNITS, quantity_of
@@ -37,7 +37,10 @@ class Track:
         """Positions [m] and quaternions w x y z in our axes."""
         order = [0, 1, 2, 3] if pose.quaternion_order == "wxyz" else [3, 0, 1, 2]
         scale = UNITS["length"][pose.position_unit]
-        return turned(self.position * scale, self.quaternion[:, order], pose.axes, pose.body_axes)
+        quaternion = self.quaternion[:, order]
+        if pose.quaternion_direction != DIRECTIONS[0]:
+            quaternion = quaternion * np.array([1.0, -1.0, -1.0, -1.0])
+        return turned(self.position * scale, quaternion, pose.axes, pose.body_axes)
 
 
 def window(series: Series, trial: Trial) -> Series:

@@ -68,6 +68,8 @@ class Clock:
 
     channel: str = ""
     unit: str = ""
+    #: Frames a second, where the column counts frames; 0 where it states time [1/s].
+    rate_hz: float = 0.0
 
 
 #: Where the recording has a clock of its own, or a column with a usual name.

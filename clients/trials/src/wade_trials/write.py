@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .axes import axes_text
 from .errors import TrialsError
 from .mapping import FORMAT, Mapping
+from .source import NO_CLOCK
 
 #: Rows that are formatted at once.
 CHUNK = 20_000
@@ -81,7 +82,7 @@ def mapping_text(mapping: Mapping, folder: Path) -> str:
         mass = {} if mapping.body.mass_kg is None else {"mass_kg": mapping.body.mass_kg}
         table("body", {k: v for k, v in vars(mapping.body).items() if k != "mass_kg"} | mass)
     table("processing", vars(mapping.processing))
-    if mapping.clock.channel or mapping.clock.unit:
+    if mapping.clock != NO_CLOCK:
         table("time", {key: value for key, value in vars(mapping.clock).items() if value})
     for name in ("pose", "wrench", "imu"):
         part = getattr(mapping, name)

@@ -6,8 +6,9 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-use super::reading::check_depth;
+use super::reading::check_reading;
 use super::recording::{Recording, RecordingError, RecordingFault, Recordings, at};
+use super::tracking::check_tracking;
 use crate::signal::{
     FilterError, SavitzkyGolay, UniformGrid, angular_velocity, interpolate, pieces, slerp, without_sign_flips,
 };
@@ -221,9 +222,12 @@ pub fn trials_from_recordings(
         check_clock(recording, config.rate_hz).map_err(at(&path))?;
         let kinematics = process(recording, &rig, config)
             .map_err(|source| at(&path)(RecordingFault::Filter { rate_hz: config.rate_hz, source }))?;
-        if let Some(measured) = file.recording[name].depth_m {
-            check_depth(recording, &rig, measured).map_err(at(&path))?;
+        let reading = check_reading(recording, &rig, file.recording[name].depth_m);
+        // frames that are wrong make the whole look wrong, too, but no mistake explains it then
+        if !reading.as_ref().is_err_and(RecordingFault::is_explained) {
+            check_tracking(recording).map_err(at(&path))?;
         }
+        reading.map_err(at(&path))?;
         write(&format!("{name}.csv"), &kinematics.to_csv())?;
     }
     write(MANIFEST_FILE, &manifest.to_toml())

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-use super::reading::{Misreading, explanation};
+use super::reading::{Misreading, direction, explanation};
 use crate::signal::FilterError;
 use crate::trials::{Table, TrialError, csv_text};
 use wade_core::at::At;
@@ -164,6 +164,38 @@ pub enum RecordingFault {
         /// The mistakes that explain it; empty where none do.
         mistakes: Vec<Misreading>,
     },
+    /// Wheels that do not roll ahead.
+    #[error("it moves {astray:.0} degrees off the vehicle's x axis, but wheels roll along it; {}", direction(.mistakes))]
+    Direction {
+        /// Angle between velocity and x, rms [deg].
+        astray: f64,
+        /// The mistakes that explain it; empty where none do.
+        mistakes: Vec<Misreading>,
+    },
+    /// A pose that stays the same to the last bit between frames in which the vehicle moves.
+    #[error(
+        "the pose stays the same from t = {from:.3} s to {to:.3} s while the vehicle moves before or after: tracking was lost; leave those rows out"
+    )]
+    Frozen {
+        /// First frame of it [s].
+        from: f64,
+        /// Last frame of it [s].
+        to: f64,
+    },
+    /// A pose that no vehicle reaches from the one before it.
+    #[error(
+        "from t = {from:.3} s to {to:.3} s it moves by {distance:.3} m and turns by {turn:.0} degrees, faster than any vehicle: markers were taken for others, or tracking was lost; leave the rows before or after out"
+    )]
+    Jump {
+        /// Before it [s].
+        from: f64,
+        /// After it [s].
+        to: f64,
+        /// How far [m].
+        distance: f64,
+        /// By how much [deg].
+        turn: f64,
+    },
     /// Stamps that are no seconds.
     #[error(
         "column t: {rows} rows span {span} s without holes, which are {samples:.0} samples at {rate_hz} Hz: t must be in seconds, or rate_hz be lower"
@@ -186,6 +218,13 @@ pub enum RecordingFault {
         /// Why.
         source: FilterError,
     },
+}
+
+impl RecordingFault {
+    /// True where a mistake in how the recording is read is named.
+    pub(super) fn is_explained(&self) -> bool {
+        matches!(self, Self::Depth { mistakes, .. } | Self::Direction { mistakes, .. } if !mistakes.is_empty())
+    }
 }
 
 pub(super) fn at(path: &Path) -> impl FnOnce(RecordingFault) -> RecordingError {

@@ -438,9 +438,11 @@ fn a_recording_that_contradicts_the_measured_depth_is_refused_with_the_mistake()
     let rotated = |q: &mut UnitQuaternion<f64>, w: f64, x: f64, y: f64, z: f64| {
         *q = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
     };
-    let mistakes: [(&str, Mistake<'_>); 5] = [
+    // the text of the error, and what is said where no depth was measured: the motion alone shows some of them
+    let mistakes: [(&str, Option<&str>, Mistake<'_>); 6] = [
         (
             "y up",
+            None,
             Box::new(|p, q| {
                 *p = Vec3::new(p.x, p.z, -p.y);
                 rotated(q, q.w, q.i, q.k, -q.j);
@@ -448,28 +450,112 @@ fn a_recording_that_contradicts_the_measured_depth_is_refused_with_the_mistake()
         ),
         (
             "(NED)",
+            None,
             Box::new(|p, q| {
                 *p = Vec3::new(p.x, -p.y, -p.z);
                 rotated(q, q.w, q.i, -q.j, -q.k);
             }),
         ),
-        ("order x y z w", Box::new(|_, q| rotated(q, q.i, q.j, q.k, q.w))),
-        ("millimeters", Box::new(|p, _| *p *= 1e3)),
-        ("check water_level_m", Box::new(|p, _| p.z += 0.2)),
+        ("order x y z w", Some("order x y z w"), Box::new(|_, q| rotated(q, q.i, q.j, q.k, q.w))),
+        (
+            "from the frame of the cameras",
+            Some("from the frame of the cameras"),
+            Box::new(|_, q| *q = q.inverse()),
+        ),
+        ("millimeters", Some("millimeters"), Box::new(|p, _| *p *= 1e3)),
+        ("check water_level_m", None, Box::new(|p, _| p.z += 0.2)),
     ];
-    for (said, mistake) in mistakes {
-        // the vehicle of this one does not drive along x, which the order of a quaternion needs to show
+    for (said, without_depth, mistake) in mistakes {
+        // the vehicle of this one does not drive along the x axis of the cameras, which the order of a quaternion needs to show
         let name = sound.recordings.keys().find(|name| name.contains("angle")).expect("one").clone();
         let mut recordings = sound.clone();
         let recording = recordings.recordings.get_mut(&name).expect("there");
         for (position, rotation) in recording.position.iter_mut().zip(&mut recording.rotation) {
             mistake(position, rotation);
         }
-        let error = made(&recordings).expect_err(said).to_string();
-        assert!(error.contains(&format!("{name}.csv")) && error.contains("depth_m"), "{error}");
-        assert!(error.contains(said), "{said}: {error}");
-        // what was not measured cannot contradict
+        let refused = |recordings: &Recordings| made(recordings).expect_err(said).to_string();
+        if said != "from the frame of the cameras" {
+            let error = refused(&recordings);
+            assert!(error.contains(&format!("{name}.csv")) && error.contains("depth_m"), "{error}");
+            assert!(error.contains(said), "{said}: {error}");
+        }
         recordings.file.recording.get_mut(&name).expect("there").depth_m = None;
-        made(&recordings).expect("accepted");
+        match without_depth {
+            Some(said) => assert!(refused(&recordings).contains(said), "{said}: {}", refused(&recordings)),
+            None => made(&recordings).expect("what was not measured cannot contradict"),
+        }
     }
+}
+
+#[test]
+fn rotations_the_other_way_round_show_on_the_ramp_alone() {
+    let (vehicle, folder) = (warthog(), TempDir::new().expect("a folder"));
+    generated::write(folder.path(), &vehicle, 7).expect("written");
+    let sound = Recordings::read(folder.path()).expect("sound");
+    let trials = folder.path().join("trials");
+    let mut missed = Vec::new();
+    for name in sound.recordings.keys() {
+        let mut recordings = sound.clone();
+        recordings.recordings.retain(|other, _| other == name);
+        let recording = recordings.recordings.get_mut(name).expect("there");
+        recording.rotation.iter_mut().for_each(|rotation| *rotation = rotation.inverse());
+        let made = wade_learn::recordings::trials_from_recordings(
+            &recordings,
+            &vehicle,
+            &MocapConfig::default(),
+            &trials,
+        );
+        match made {
+            Err(error) => assert!(error.to_string().contains("write -qx, -qy, -qz"), "{name}: {error}"),
+            Ok(()) => missed.push(name),
+        }
+    }
+    assert!(missed.is_empty(), "{} of {}: {missed:?}", missed.len(), sound.recordings.len());
+}
+
+#[test]
+fn frames_that_tracking_got_wrong_are_named_with_their_time() {
+    let (vehicle, folder) = (warthog(), TempDir::new().expect("a folder"));
+    generated::write(folder.path(), &vehicle, 9).expect("written");
+    let sound = Recordings::read(folder.path()).expect("sound");
+    let trials = folder.path().join("trials");
+    let name = sound.recordings.keys().next().expect("one").clone();
+    let with = |change: &dyn Fn(&mut Recording)| {
+        let mut recordings = sound.clone();
+        change(recordings.recordings.get_mut(&name).expect("there"));
+        wade_learn::recordings::trials_from_recordings(
+            &recordings,
+            &vehicle,
+            &MocapConfig::default(),
+            &trials,
+        )
+        .map_err(|error| error.to_string())
+    };
+    with(&|_| ()).expect("accepted");
+    let middle = sound.recordings[&name].t.len() / 2;
+    let refused = |said: &str, change: &dyn Fn(&mut Recording)| {
+        let error = with(change).expect_err(said);
+        let from = format!("t = {:.3} s to", sound.recordings[&name].t[middle]);
+        assert!(error.contains(&format!("{name}.csv")) && error.contains(said), "{error}");
+        assert!(error.contains(&from), "{from}: {error}");
+    };
+    refused("stays the same", &|recording| {
+        let end = recording.t.iter().position(|t| *t > recording.t[middle] + 0.6).expect("later");
+        let (position, rotation) = (recording.position[middle], recording.rotation[middle]);
+        recording.position[middle..end].fill(position);
+        recording.rotation[middle..end].fill(rotation);
+    });
+    refused("faster than any vehicle", &|recording| {
+        recording.position[middle + 1..].iter_mut().for_each(|position| position.y += 0.3);
+    });
+    refused("faster than any vehicle", &|recording| {
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, 1.0);
+        recording.rotation[middle + 1..].iter_mut().for_each(|rotation| *rotation *= turn);
+    });
+    // markers made while the vehicle faced to the side
+    let error = with(&|recording| {
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+        recording.rotation.iter_mut().for_each(|rotation| *rotation *= turn);
+    });
+    assert!(error.is_err_and(|error| error.contains("must be the vehicle's")));
 }

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 #: The checks that a mapping may accept.
-CHECKS = ("frozen", "depth", "upright", "motion", "speed", "direction", "lift", "gravity", "rates", "angles", "wheels")
+CHECKS = (
+    *("frozen", "depth", "upright", "motion", "speed", "jump", "direction", "lift", "gravity", "rates", "angles"),
+    "wheels",
+)
 Level = Literal["ok", "doubt", "wrong", "skipped"]
 
 

@@ -18,8 +18,19 @@ Array = NDArray[np.float64]
 
 def check_clock(path: Path, channel: str, series: Series) -> None:
     """Refuses steps that look like another unit of time: no other check would mean anything."""
-    step = float(np.median(np.diff(series.t)))
-    if step > limits.LONG_STEP:
+    steps = np.diff(series.t)
+    if np.mean(steps == 0) > limits.REPEATED_STAMPS:
+        later = steps[steps > 0]
+        message = f"{np.mean(steps == 0):.0%} of the samples of {channel} have the stamp of the one before"
+        if len(later):
+            message += f", and the others come {np.median(later):g} s later"
+        advice = "export stamps with fractions of a second, or the number of each frame and its rate_hz under [time]"
+        raise TrialsError(path, "time.channel", f"{message}: {advice}")
+    step = float(np.median(steps))
+    if np.all(steps == 1):
+        message = f"the samples of {channel} are 1 s apart throughout, as where the column counts frames"
+        raise TrialsError(path, "time.rate_hz", f"{message}: write rate_hz = FRAMES A SECOND under [time]")
+    if step >= limits.LONG_STEP:
         unit = "ms" if step < 1e3 else "us" if step < 1e6 else "ns"
         message = f"the samples of {channel} are {step:g} s apart, too long for seconds"
         raise TrialsError(path, "time.unit", f'{message}: write unit = "{unit}" under [time]')

@@ -1,11 +1,14 @@
 """A pose, by the depth at rest, the attitude, the direction of motion and the speed."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import limits
-from ..mapping import Body, Mapping, Pose, Trial
+from ..mapping import DIRECTIONS, Body, Mapping, Pose, Trial
 from ..motion import Track
+from ..signal import GAP_STEPS
 from .finding import Finding
 from .readings import Figures, faults, figures, named, readings
 
@@ -68,8 +71,16 @@ def check_pose(name: str, mapping: Mapping, trial: Trial, track: Track) -> tuple
                 "tracked_point_to_origin_m or depth_m, or leave depth_m out where the trial never reaches that depth"
             )
         findings.append(Finding(check, "wrong", name, field, message, write))
+    elif found.astray > limits.ASTRAY and (other := _conjugate(track, pose, trial, body, max_speed, found.astray)):
+        likely = other
+        off = np.degrees(np.arcsin(found.astray))
+        message = f"it moves {off:.0f} degrees off the vehicle's x axis, but wheels roll along it"
+        message += f"; the recording fits {named(pose, other)}"
+        write = f'quaternion_direction = "{other.quaternion_direction}" under [pose]'
+        findings.append(Finding("motion", "wrong", name, "pose.quaternion_direction", message, write))
     elif found.forward < -0.5:
         findings.append(_backward(name, track, pose, trial, body, max_speed))
+    findings.extend(_jumps(name, track, likely or pose, max_speed))
     return findings, likely
 
 
@@ -84,8 +95,40 @@ def _fitting(
         looks = figures(track, other, trial, body)
         if not faults(looks, trial, max_speed):
             fitting.append((other, changed, looks))
-    fitting.sort(key=lambda item: not item[2].forward > 0)
+    # the one that drives forward, and of those the one that goes straightest
+    fitting.sort(key=lambda item: (not item[2].forward > 0, np.round(np.nan_to_num(item[2].astray), 1)))
     return fitting
+
+
+def _jumps(name: str, track: Track, pose: Pose, max_speed: float) -> list[Finding]:
+    """Steps between two frames that no vehicle makes: one marker was taken for another."""
+    position, quaternion = track.in_our_axes(pose)
+    steps = np.diff(track.t)
+    way = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    turn = 2 * np.arccos(np.clip(np.abs(np.sum(quaternion[1:] * quaternion[:-1], axis=1)), 0, 1))
+    whole = steps <= GAP_STEPS * float(np.median(steps))
+    far = way > max_speed * steps + limits.MARKER_NOISE
+    far |= turn > limits.MAX_TURN * steps + limits.MARKER_NOISE_TURN
+    at = np.flatnonzero(whole & far)
+    if not len(at):
+        return []
+    first, last = at[0], at[-1]
+    message = (
+        f"from {track.t[first]:.3f} s to {track.t[first + 1]:.3f} s it moves by {way[first]:.3f} m and turns by "
+        f"{np.degrees(turn[first]):.0f} degrees, faster than any vehicle"
+    )
+    message += f", and {len(at) - 1} times more up to {track.t[last + 1]:.3f} s" if len(at) > 1 else ""
+    write = f"start_s or end_s, or leave_out_s = [[FROM, TO]], under [trials.{name}], without the frames that are wrong"
+    return [Finding("jump", "wrong", name, "pose.position", message, write)]
+
+
+def _conjugate(track: Track, pose: Pose, trial: Trial, body: Body, max_speed: float, astray: float) -> Pose | None:
+    """The pose with the other direction of the quaternion, where the vehicle then goes far straighter."""
+    way = next(way for way in DIRECTIONS if way != pose.quaternion_direction)
+    other = replace(pose, quaternion_direction=way)
+    looks = figures(track, other, trial, body)
+    goes_straight = looks.astray <= max(limits.ASTRAY, astray / 2)
+    return other if goes_straight and not faults(looks, trial, max_speed) else None
 
 
 def _passed(check: str, found: Figures, trial: Trial) -> str:

@@ -15,7 +15,7 @@ from ..axes import (
     rotations,
     turned_about_up,
 )
-from ..mapping import Body, Pose, Trial
+from ..mapping import DIRECTIONS, Body, Pose, Trial
 from ..motion import Track, depth_of
 from ..units import UNITS
 
@@ -32,6 +32,8 @@ class Figures:
     forward: float
     lateral: float
     vertical: float
+    #: Sine of the angle between velocity and body x, rms; NaN likewise.
+    astray: float
     #: Largest depth but for a twentieth [m], and the share of the frames at the stated depth; NaN where none is stated.
     depth: float
     share_at_depth: float
@@ -67,8 +69,9 @@ def figures(track: Track, pose: Pose, trial: Trial, body: Body) -> Figures:
             near = float(np.count_nonzero(level & (np.abs(deep - trial.depth_m) < limits.DEPTH_TOLERANCE))) / n
     along = float(np.median(share[:, 0]))
     across, upward = (float(np.median(np.abs(share[:, axis]))) for axis in (1, 2))
+    astray = float(np.sqrt(np.mean(np.clip(1 - share[:, 0] ** 2, 0, 1))))
     fast = float(np.quantile(speed[whole], 0.99)) if whole.any() else 0.0
-    return Figures(float(np.median(up[:, 2])), fast, along, across, upward, depth, near)
+    return Figures(float(np.median(up[:, 2])), fast, along, across, upward, astray, depth, near)
 
 
 def faults(found: Figures, trial: Trial, max_speed: float) -> list[str]:
@@ -92,13 +95,17 @@ def readings(pose: Pose) -> list[tuple[Pose, list[str]]]:
     bodies = [turned_about_up(axes, quarters) for axes in PRESETS.values() for quarters in range(4)]
     orders = ("wxyz", "xyzw")
     out = []
-    for order, (world, axes), body, unit in product(orders, PRESETS.items(), bodies, UNITS["length"]):
-        other = replace(pose, quaternion_order=order, axes=axes, body_axes=body, position_unit=unit)
+    for order, way, (world, axes), body, unit in product(orders, DIRECTIONS, PRESETS.items(), bodies, UNITS["length"]):
+        other = replace(
+            pose, quaternion_order=order, quaternion_direction=way, axes=axes, body_axes=body, position_unit=unit
+        )
         if is_left_handed(axes) != is_left_handed(body):
             continue
         changed = []
         if other.quaternion_order != pose.quaternion_order:
             changed.append(f'quaternion_order = "{order}"')
+        if way != pose.quaternion_direction:
+            changed.append(f'quaternion_direction = "{way}"')
         if other.axes != pose.axes:
             changed.append(f"axes = {axes_text(axes)}")
         # body axes that are left out are the world's
@@ -123,6 +130,8 @@ def named(pose: Pose, other: Pose) -> str:
         words.append(MEANING.get(preset, "other axes"))
     if other.quaternion_order != pose.quaternion_order:
         words.append(f"a quaternion in the order {' '.join(other.quaternion_order)}")
+    if other.quaternion_direction != pose.quaternion_direction:
+        words.append("the conjugate quaternion, which turns the world into the body")
     if other.position_unit != pose.position_unit:
         long = {"m": "meters", "mm": "millimeters", "cm": "centimeters", "in": "inches", "ft": "feet"}
         words.append(long[other.position_unit])

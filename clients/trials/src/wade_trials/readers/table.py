@@ -45,6 +45,8 @@ def time_column(path: Path, names: Sequence[str], units: Sequence[str], clock: C
                 f"no column is named t, time or timestamp: write time.channel = NAME; there are: {', '.join(names)}",
             )
         name = candidates[0]
+    if clock.rate_hz:
+        return name, 1 / clock.rate_hz
     text = clock.unit or units[list(names).index(name)]
     if not text:
         end = name.lower().rsplit("_", 1)[-1]
