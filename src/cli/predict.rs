@@ -11,7 +11,7 @@ use wade_core::frame::Vec3;
 use wade_core::model::Model;
 use wade_core::served::Session;
 use wade_learn::files::StagedFile;
-use wade_learn::trials::{Recorded, Remark, acceleration, are_rates, derivative, turning};
+use wade_learn::trials::{Recorded, Remark, acceleration, are_rates, derivative, long_step, turning};
 use wade_wire::State;
 use wade_wire::{Evaluated, Evaluator};
 
@@ -178,6 +178,9 @@ impl Accelerations {
                 recorded.push(a);
             }
             place.push(times.len() - 1);
+        }
+        if let Some(step) = long_step(&times) {
+            eprintln!("{}", Remark::Clock { trial: path.display().to_string(), step });
         }
         let [has_linear, has_angular] = stated;
         let motion =

@@ -377,6 +377,10 @@ fn what_is_written_takes_the_place_of_nothing_else() {
     assert!(predict(&path("a.partial"), &path("a.csv")).status.success());
     assert_eq!(std::fs::read_to_string(path("a.csv")).expect("written").lines().count(), 2);
     assert!(path_has(&path("a.partial"), "0.5"));
+    let milliseconds = "t,vx,vy,vz,depth\n0,0.5,0,0,0.1\n10,0.5,0,0,0.1\n20,0.5,0,0,0.1\n";
+    std::fs::write(path("clock.csv"), milliseconds).expect("written");
+    let said = predict(&path("clock.csv"), &path("b.csv"));
+    assert!(String::from_utf8_lossy(&said.stderr).contains("is t in another unit?"), "{said:?}");
     std::fs::write(path("bad.csv"), "vx,vy,vz,depth\n0.5,0,0,none\n").expect("written");
     assert!(!predict(&path("bad.csv"), &path("a.csv")).status.success());
     assert!(path_has(&path("a.csv"), "in_domain"), "a table that failed leaves the one before");

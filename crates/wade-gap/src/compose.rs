@@ -22,7 +22,7 @@ use super::series::Series;
 use super::statistics::{Z90, quantile};
 use super::traces::drawn;
 use super::verdict::Found;
-use super::{Named, measurement, plausible};
+use super::{Named, contradictions, measurement, plausible};
 use wade_core::condition::Condition;
 use wade_core::digest::hexadecimal;
 use wade_core::effects::{self, Effect};
@@ -137,6 +137,7 @@ pub(super) fn compose(
     said.extend(outside(all));
     if !setting.computed {
         said.extend(plausible::remarks(all, &setting.components));
+        said.extend(contradictions::remarks(all, &trials.manifest, &setting.components));
     }
     said.extend(remarks(&effects));
     said.extend(unpublished(&effects));

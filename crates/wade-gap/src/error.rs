@@ -213,6 +213,64 @@ pub enum GapError {
         /// Folds.
         folds: usize,
     },
+    /// A channel that the hull does not fit into.
+    #[error(
+        "{trial}.csv was run in a channel of {channel} m, and the hull is {hull:.3} m wide: channel_width and channel_widths of trials.toml are in meters"
+    )]
+    NarrowChannel {
+        /// Name of the trial.
+        trial: String,
+        /// Width of the channel [m].
+        channel: f64,
+        /// Width of the hull [m].
+        hull: f64,
+    },
+    /// Wheel speeds in another unit.
+    #[error(
+        "columns wheel_fl to wheel_rr: the wheels roll with a radius of {radius:.4} m, and have one of {wheel:.3} m, as where their speeds are in {unit}: write rad/s"
+    )]
+    WheelUnit {
+        /// Speed over wheel speed [m].
+        radius: f64,
+        /// Of the vehicle's wheels [m].
+        wheel: f64,
+        /// The likely unit.
+        unit: &'static str,
+    },
+    /// A repeat that is another motion.
+    #[error(
+        "{other}.csv does not repeat {trial}.csv as measured.repeats says: at the same time since their start their velocities differ by {apart:.2} m/s, with a speed of {speed:.2} m/s; cut both so that they begin together, or leave the pair out"
+    )]
+    NoRepeat {
+        /// Name of the trial.
+        trial: String,
+        /// Name of the other.
+        other: String,
+        /// Difference of the velocities, rms [m/s].
+        apart: f64,
+        /// Speed, rms [m/s].
+        speed: f64,
+    },
+    /// A channel that stops.
+    #[error(
+        "column {column} of {place}: {count} samples from t = {from:.3} s on are exactly {value} {unit}, where a standard deviation of {spread:.3} {unit} is expected: the channel stopped; leave those rows or the trial out"
+    )]
+    Stopped {
+        /// The trial.
+        place: String,
+        /// The column.
+        column: &'static str,
+        /// When it stopped [s].
+        from: f64,
+        /// How many samples have the value.
+        count: usize,
+        /// The value [N or N m].
+        value: f64,
+        /// Standard deviation of what is expected in them [N or N m].
+        spread: f64,
+        /// The unit.
+        unit: &'static str,
+    },
     /// No trial is in the water.
     #[error(
         "no sample of any trial is in the water: the largest depth is {depth:.3} m, and depth counts upwards from the plane on which the vehicle stands"

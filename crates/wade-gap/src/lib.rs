@@ -3,8 +3,8 @@
 //!
 //! No IO and no clock: trials and a prediction in, a report out, the same for one seed whatever the order of the trials.
 //!
-//! Reading order: `config`, `sampling`, `measurement`, `rates` and `series` (trials to samples with a gap), `plausible` (what
-//! cannot be), `noise` (the floor), `candidates` (the library as columns), `base_drag`, `split` (held-out trials, and folds),
+//! Reading order: `config`, `sampling`, `measurement`, `rates` and `series` (trials to samples with a gap), `plausible` and `contradictions`
+//! (what cannot be), `noise` (the floor), `candidates` (the library as columns), `base_drag`, `split` (held-out trials, and folds),
 //! `design` (the regression), `robust` (errors that hold), `judge` (the gates), `select` and `rivals` (which effects), `shared`
 //! (noise of the motion in both), `nonlinear`, `general` and `lasting` (structure without a name), `features`, `gated`, `locate`
 //! and `carriers` (where), `verdict`, `explanations` (how probable each is), `fit`, `holdout`, `detect` (what would have shown),
@@ -22,6 +22,7 @@ mod carriers;
 mod color;
 mod compose;
 mod config;
+mod contradictions;
 mod design;
 mod detect;
 mod effects_file;

@@ -115,7 +115,7 @@ fn model_error(trials: &[&Series]) -> [f64; 6] {
     std::array::from_fn(|c| (of(with_outside).map(|u| u[c].powi(2)).sum::<f64>() / count).sqrt())
 }
 
-fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {
+pub(super) fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {
     pooled(all, |series| sample_noise(series, component))
 }
 
@@ -152,11 +152,12 @@ pub(super) fn sample_noise(series: &Series, component: usize) -> f64 {
     noise_variance(&values, scales(&series.t)).sqrt()
 }
 
+/// What changes faster is no load [s].
+pub(super) const SLOWEST_SEEN: f64 = 0.08;
+
 /// Octaves below the rate of the samples in which noise is told from signal.
 fn scales(t: &[f64]) -> u32 {
-    /// What changes faster is no load [s].
-    const FAST: f64 = 0.08;
-    (FAST / mean_step(t).max(1e-6)).log2().max(0.0) as u32
+    (SLOWEST_SEEN / mean_step(t).max(1e-6)).log2().max(0.0) as u32
 }
 
 /// The floors of some trials alone, where they come from the trials themselves or these are louder than is stated: noise may

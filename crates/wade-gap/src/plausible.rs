@@ -1,5 +1,7 @@
 //! Trials that cannot be what they are said to be, as far as the prediction beside them tells.
 
+use std::ops::Range;
+
 use super::GapError;
 use super::noise::sample_noise;
 use super::series::Series;
@@ -43,6 +45,8 @@ const ALL: &str = "every trial";
 struct Channel<'a> {
     component: usize,
     trials: Vec<(&'a str, Vec<Pair>)>,
+    /// Time of each sample, by trial [s].
+    times: Vec<&'a [f64]>,
     /// Root mean square of what is expected [N or N m].
     size: f64,
     /// Noise of a sample that three quarters of the trials stay below [N or N m].
@@ -52,8 +56,8 @@ struct Channel<'a> {
 /// Measured and expected [N or N m].
 type Pair = [f64; 2];
 
-/// Refuses trials without water, trials of the same samples, and measured channels that never change where they should, stop
-/// short of it, stand in for each other, have their sign reversed or are in another unit.
+/// Refuses trials without water, trials of the same samples, and measured channels that never change where they should or stop to,
+/// stop short of it, stand in for each other, have their sign reversed or are in another unit.
 pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Result<(), GapError> {
     let is_wet = |immersion: &Immersion| {
         immersion.volume > 0.0 || immersion.panels.iter().any(|panel| panel.fraction > 0.0)
@@ -118,7 +122,8 @@ impl<'a> Channel<'a> {
         let count = trials.iter().map(|(_, pairs)| pairs.len()).sum::<usize>().max(1);
         let size = (expected.sum::<f64>() / count as f64).sqrt();
         let noises: Vec<f64> = all.iter().map(|series| sample_noise(series, component)).collect();
-        Self { component, trials, size, noise: usual(&noises) }
+        let times = all.iter().map(|series| series.t.as_slice()).collect();
+        Self { component, trials, times, size, noise: usual(&noises) }
     }
 
     fn column(&self) -> &'static str {
@@ -140,14 +145,30 @@ impl<'a> Channel<'a> {
         let all: Vec<Pair> = self.trials.iter().flat_map(|(_, pairs)| pairs.iter().copied()).collect();
         self.check_unit(ALL, &all)?;
         self.check_pairs(ALL, &all)?;
-        self.trials.iter().try_for_each(|(name, pairs)| {
+        self.trials.iter().zip(&self.times).try_for_each(|((name, pairs), times)| {
             let [_, _, pp] = products(pairs);
             let place = format!("{name}.csv");
             if pairs.len() >= ENOUGH && self.is_clear((pp / pairs.len() as f64).sqrt()) {
                 self.check_unit(&place, pairs)?;
             }
-            self.check_pairs(&place, pairs)
+            self.check_pairs(&place, pairs)?;
+            self.check_live(place, pairs, times)
         })
+    }
+
+    /// Refuses a channel that keeps one value from some sample on while what is expected goes on.
+    fn check_live(&self, place: String, pairs: &[Pair], times: &[f64]) -> Result<(), GapError> {
+        // a gap is a difference: adding the prediction to it again leaves an error of rounding
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * self.size.max(a.abs());
+        for run in chunks(pairs, |a, b| near(a[0], b[0])) {
+            let spread = spread(&pairs[run.clone()]);
+            if run.len() >= ENOUGH && self.is_clear(spread) {
+                let (value, from, count) = (pairs[run.start][0], times[run.start], run.len());
+                let (column, unit) = (self.column(), self.units().0);
+                return Err(GapError::Stopped { place, column, from, count, value, spread, unit });
+            }
+        }
+        Ok(())
     }
 
     fn check_unit(&self, place: &str, pairs: &[Pair]) -> Result<(), GapError> {
@@ -244,6 +265,19 @@ impl<'a> Channel<'a> {
         };
         Err(GapError::Swapped { place, column: self.column(), other: other.column() })
     }
+}
+
+/// Runs of neighbors that are alike.
+fn chunks(pairs: &[Pair], alike: impl Fn(&Pair, &Pair) -> bool) -> Vec<Range<usize>> {
+    let mut start = 0;
+    pairs
+        .chunk_by(alike)
+        .map(|chunk| {
+            let from = start;
+            start += chunk.len();
+            from..start
+        })
+        .collect()
 }
 
 /// The noise that three quarters of some trials stay below.

@@ -5,6 +5,7 @@ use super::calibrate::calibrate;
 use super::candidates::{Setting, shapes, unavailable};
 use super::color::Color;
 use super::compose::{compose, is_disproved};
+use super::contradictions;
 use super::design::{Design, Rows};
 use super::explanations::weigh;
 use super::general::General;
@@ -59,6 +60,7 @@ pub fn run(
     }
     let (mut all, components) = series(trials, body, predict, config)?;
     plausible::check(&all, &components, is_inferred(&trials.manifest))?;
+    contradictions::check(&all, &trials.manifest, body, rolling_radius(trials))?;
     let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
     check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
     let floors = floors(&all, &naming, &trials.manifest, &components);

@@ -19,7 +19,10 @@ const SAMPLES: usize = 800;
 
 /// Trials with effects planted so that the strongest component of each is `strength` times its noise, and their factors.
 fn with(names: &[&str], strength: f64, seed: u64) -> (Trials, Vec<f64>) {
-    let motions = motions(TRIALS, SAMPLES, seed);
+    with_motions(&motions(TRIALS, SAMPLES, seed), names, strength, seed)
+}
+
+fn with_motions(motions: &[Vec<State>], names: &[&str], strength: f64, seed: u64) -> (Trials, Vec<f64>) {
     let mut sum: Vec<Vec<[f64; 6]>> = motions.iter().map(|m| vec![[0.0; 6]; m.len()]).collect();
     let mut factors = Vec::new();
     for name in names {
@@ -33,7 +36,7 @@ fn with(names: &[&str], strength: f64, seed: u64) -> (Trials, Vec<f64>) {
         }
         factors.push(factor);
     }
-    (trials(&motions, &sum, &Noise::white(NOISE), seed), factors)
+    (trials(motions, &sum, &Noise::white(NOISE), seed), factors)
 }
 
 fn run(trials: &Trials) -> Report {
@@ -830,7 +833,11 @@ fn quiet_repeats_do_not_hide_the_noise_of_the_other_trials() {
 
 #[test]
 fn trials_that_repeat_each_other_are_kept_back_together_and_two_have_no_interval() {
-    let (mut trials, _) = with(&["squat"], 3.0, 18);
+    let mut motions = motions(TRIALS, SAMPLES, 18);
+    for index in 0..10 {
+        motions[index + 10] = motions[index].clone();
+    }
+    let (mut trials, _) = with_motions(&motions, &["squat"], 3.0, 18);
     let pair = |index: usize| vec![format!("run{index:02}"), format!("run{:02}", index + 10)];
     trials.manifest.measured.repeats = (0..10).map(pair).collect();
     let report = run(&trials);
@@ -1042,6 +1049,66 @@ fn a_channel_that_cannot_be_what_it_is_called_is_refused_with_its_trial() {
     // a zero that is off by the weight turns fz about, but not its changes
     let [_, everywhere] = refused(&|measured| all(&mut measured[2], &|x| x - planted::MASS * 9.81));
     assert!(everywhere.is_ok(), "{everywhere:?}");
+}
+
+#[test]
+fn a_channel_that_stops_in_the_middle_is_refused_with_its_time() {
+    let mut trials = with(&["squat"], 3.0, 16).0;
+    let body = wade_gap::body_of(&trials).expect("a body");
+    // over the end of the run, in which the vehicle brakes
+    let at = SAMPLES / 2;
+    let fx = trials.trials[4].measured[0].as_mut().expect("measured");
+    let value = fx[at];
+    fx[at..].fill(value);
+    let from = trials.trials[4].t[at];
+    let error = wade_gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default());
+    let is_named = |e: &GapError| matches!(e, GapError::Stopped { place, column: "fx", from: f, count, .. } if place == "run04.csv" && *f == from && *count == SAMPLES - at);
+    assert!(error.as_ref().is_err_and(is_named), "{:?}", error.err());
+}
+
+#[test]
+fn what_is_stated_is_held_against_the_trials() {
+    let good = with(&["squat"], 3.0, 16).0;
+    let refused = |spoil: &dyn Fn(&mut Trials)| {
+        let mut trials = good.clone();
+        spoil(&mut trials);
+        let body = wade_gap::body_of(&good).expect("a body");
+        wade_gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default())
+    };
+    // inches of a channel that is 3 m wide would pass, its feet and a hull's width in another unit do not
+    let narrow = refused(&|trials| trials.manifest.channel_width = Some(0.9)).expect_err("too narrow");
+    assert!(matches!(narrow, GapError::NarrowChannel { channel: 0.9, hull, .. } if hull == planted::WIDTH));
+    let another = refused(&|trials| {
+        trials.manifest.measured.repeats = vec![vec!["run02".into(), "run03".into()]];
+    });
+    let is_named = |e: &GapError| matches!(e, GapError::NoRepeat { trial, other, .. } if trial == "run02" && other == "run03");
+    assert!(another.as_ref().is_err_and(is_named), "{:?}", another.err());
+    let radius = wade_gap::body_of(&good).expect("a body").wheel_radius;
+    let turning = |factor: f64| {
+        refused(&|trials| {
+            for trial in &mut trials.trials {
+                let speeds = trial.velocity.iter().map(|v| factor * v.x / radius).collect();
+                trial.wheel_speeds[0] = Some(speeds);
+            }
+        })
+    };
+    assert!(turning(1.0).is_ok());
+    for (factor, said) in
+        [(9.549, "revolutions a minute"), (57.3, "degrees a second"), (0.15915, "revolutions a second")]
+    {
+        let error = turning(factor).expect_err(said);
+        assert!(matches!(error, GapError::WheelUnit { unit, .. } if unit == said), "{error}");
+    }
+    let said = |stated: f64| {
+        let report = refused(&|trials| {
+            trials.manifest.sensor_noise.insert("fx".into(), stated);
+        });
+        let remarks = report.expect("a report").remarks;
+        remarks.into_iter().find(|remark| remark.contains("sensor_noise"))
+    };
+    assert_eq!((said(NOISE[0]), said(0.5 * NOISE[0])), (None, None));
+    assert!(said(0.1 * NOISE[0]).is_some_and(|remark| remark.contains("the larger one is used")));
+    assert!(said(100.0 * NOISE[0]).is_some_and(|remark| remark.contains("is taken for noise")));
 }
 
 /// The measured components of a trial.

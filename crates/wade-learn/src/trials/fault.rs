@@ -44,6 +44,18 @@ pub enum Fault {
         /// Columns of the file.
         present: String,
     },
+    /// A depth over the flat ground that the trial's depths contradict.
+    #[error(
+        "nominal_depth.{trial} = {stated}, in meters over the flat ground, but the samples of {trial}.csv lie {deepest:.3} m deep at most: correct the one or the other"
+    )]
+    NominalDepth {
+        /// The trial.
+        trial: String,
+        /// As stated [m].
+        stated: f64,
+        /// Largest depth but for a twentieth of the samples [m].
+        deepest: f64,
+    },
     /// A depth and a water level.
     #[error("columns depth and water_level are both there: give one of the two")]
     TwoLevels,

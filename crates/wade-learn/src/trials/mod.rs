@@ -28,7 +28,7 @@ use wade_core::at::At;
 pub use glitch::Glitch;
 pub use manifest::{Body, MANIFEST_FILE, Manifest, Measured, Method, SimIs, component_of};
 pub use table::{Table, csv_text};
-pub use trial::{Gap, SIMULATED, StillWater, Trial, WHEELS, WRENCH};
+pub use trial::{Gap, SIMULATED, StillWater, Trial, WHEELS, WRENCH, long_step};
 pub use write::{Columns, write};
 
 /// Why measured data was refused. The message names the file, and the row and column where there is one.
@@ -118,6 +118,7 @@ impl Trials {
             let key = "measured.known_loads";
             return Err(At::path(&path)(Fault::UnknownColumn { key, name: name.clone() }));
         }
+        trials.iter().try_for_each(|trial| trial.check_depth(&manifest)).map_err(At::path(&path))?;
         let accelerations_were_rates = settle_convention(&mut trials);
         Ok(Self { manifest, trials, accelerations_were_rates })
     }

@@ -51,6 +51,12 @@ const OPTIONAL: [&str; 17] = [
 /// A median step from this on is no second's fraction any more [s]: the numbers of frames have a step of 1.
 const LONG_STEP: f64 = 1.0;
 
+/// Share of the samples that lie no deeper than the flat ground: a few may be damaged. They may by a wave or a pitch [m].
+const DEEPEST_SHARE: f64 = 0.95;
+const DEPTH_TOLERANCE: f64 = 0.05;
+/// Share of that depth that some samples reach: feet, the unit nearest to a meter, make a third of it.
+const SHALLOWEST: f64 = 0.5;
+
 /// A hole in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
@@ -160,6 +166,20 @@ impl Trial {
         }
     }
 
+    /// Refuses a depth over the flat ground that the depths of the samples contradict. A water level says nothing without a hull, and
+    /// a depth beside a bed clearance is a hull's draft.
+    pub(super) fn check_depth(&self, manifest: &Manifest) -> Result<(), Fault> {
+        let stated = manifest.nominal_depth.get(&self.name).filter(|_| self.bed_clearance.is_none());
+        let (Some(&stated), StillWater::Depth(depths)) = (stated, &self.still_water) else { return Ok(()) };
+        let mut depths = depths.clone();
+        depths.sort_unstable_by(f64::total_cmp);
+        let deepest = depths[(DEEPEST_SHARE * (depths.len() - 1) as f64) as usize];
+        match (SHALLOWEST * stated..=stated + DEPTH_TOLERANCE).contains(&deepest) {
+            true => Ok(()),
+            false => Err(Fault::NominalDepth { trial: self.name.clone(), stated, deepest }),
+        }
+    }
+
     /// The trial of a table that was checked, accelerating as its velocity says.
     fn from_table(table: &Table, manifest: &Manifest) -> Self {
         let t = table.column("t").to_vec();
@@ -253,12 +273,16 @@ impl Trial {
         let unknown = unknown.map(|column| Remark::UnknownColumn { trial: trial(), column: column.clone() });
         let gaps = self.gaps.iter();
         let gaps = gaps.map(|gap| Remark::Gap { trial: trial(), row: gap.row, seconds: gap.seconds });
-        let step = median_step(&self.t).filter(|&step| step >= LONG_STEP);
         let glitches = self.glitches.iter();
         let glitches = glitches.map(|glitch| Remark::Glitch { trial: trial(), glitch: *glitch });
-        let clock = step.map(|step| Remark::Clock { trial: trial(), step });
+        let clock = long_step(&self.t).map(|step| Remark::Clock { trial: trial(), step });
         unknown.chain(gaps).chain(glitches).chain(clock).collect()
     }
+}
+
+/// The median step of stamps that are hardly seconds.
+pub fn long_step(times: &[f64]) -> Option<f64> {
+    median_step(times).filter(|&step| step >= LONG_STEP)
 }
 
 /// Refuses rows of another vehicle than the manifest's.

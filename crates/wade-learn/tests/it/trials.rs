@@ -436,6 +436,8 @@ fn numbers_of_the_manifest_beyond_any_measure_are_refused() {
         ("vehicle = \"w\"\nchannel_width = -inf".to_owned(), "channel_width = -inf must be positive, or inf"),
         ("vehicle = \"w\"\nchannel_width = 1e9".to_owned(), "channel_width = 1000000000 must be between"),
         ("vehicle = \"w\"\n[nominal_depth]\nrun = 200.0".to_owned(), "nominal_depth.run = 200 must be"),
+        ("vehicle = \"w\"\n[nominal_depth]\nrun = 0.1".to_owned(), "run.csv lie 0.200 m deep at most"),
+        ("vehicle = \"w\"\n[nominal_depth]\nrun = 0.66".to_owned(), "nominal_depth.run = 0.66, in meters"),
         ("vehicle = \"w\"\n[sensor_noise]\nfx = 1e9".to_owned(), "sensor_noise.fx = 1000000000 must be"),
         (body("[nan, 0.0, 0.0]", "1.5"), "body.center_of_mass = NaN must be within 1000 m"),
         (body("[0.0, 0.0, -inf]", "1.5"), "body.center_of_mass = -inf must be within 1000 m"),

@@ -1,0 +1,98 @@
+//! What `trials.toml` states, held against the trials: a figure that somebody gave says how the data must look.
+
+use super::GapError;
+use super::noise::{SLOWEST_SEEN, high_frequency};
+use super::series::Series;
+use super::statistics::SEEN_OF_SLOW_NOISE;
+use wade_core::effects::Body;
+use wade_core::frame::Vec3;
+use wade_learn::signal::interpolate;
+use wade_learn::trials::{Manifest, WRENCH};
+
+/// Share of the speed by which two trials that repeat each other differ at most, rms, and the difference that always may be
+/// [m/s]: above the first they are two motions and not one.
+const APART: f64 = 0.5;
+const SLOW: f64 = 0.1;
+/// Share by which a rolling radius may miss that of the wheels: they slip.
+const SLIP: f64 = 0.3;
+/// Units of a wheel's speed in which its number is as many times that in rad/s.
+const TURNS: [(f64, &str); 3] = [
+    (60.0 / std::f64::consts::TAU, "revolutions a minute"),
+    (360.0 / std::f64::consts::TAU, "degrees a second"),
+    (1.0 / std::f64::consts::TAU, "revolutions a second"),
+];
+/// Factor between a stated noise and that of the samples from which they contradict each other: an estimate from a few trials
+/// is good to a third.
+const CONTRADICTS: f64 = 3.0;
+
+/// Refuses channels that the hull does not fit into, trials that repeat others in name alone, and wheels that do not roll with
+/// `rolling_radius` [m] in their unit.
+pub(super) fn check(
+    all: &[Series],
+    manifest: &Manifest,
+    body: &Body,
+    rolling_radius: Option<f64>,
+) -> Result<(), GapError> {
+    let narrow = |series: &&Series| series.channel_width.is_some_and(|width| width <= body.width);
+    if let Some(series) = all.iter().find(narrow) {
+        let channel = series.channel_width.unwrap_or_default();
+        return Err(GapError::NarrowChannel { trial: series.name.clone(), channel, hull: body.width });
+    }
+    if let Some(radius) = rolling_radius {
+        let is_near = |factor: f64| (radius * factor / body.wheel_radius - 1.0).abs() < SLIP;
+        if let Some((_, unit)) = TURNS.into_iter().find(|(factor, _)| is_near(*factor)) {
+            return Err(GapError::WheelUnit { radius, wheel: body.wheel_radius, unit });
+        }
+    }
+    for group in &manifest.measured.repeats {
+        let group: Vec<&Series> =
+            group.iter().filter_map(|name| all.iter().find(|series| series.name == *name)).collect();
+        let Some((first, others)) = group.split_first() else { continue };
+        for other in others {
+            let Some([apart, speed]) = difference(first, other) else { continue };
+            if apart > f64::max(APART * speed, SLOW) {
+                let (trial, other) = (first.name.clone(), other.name.clone());
+                return Err(GapError::NoRepeat { trial, other, apart, speed });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Stated noises that the samples contradict.
+pub(super) fn remarks(all: &[Series], manifest: &Manifest, components: &[usize]) -> Vec<String> {
+    let of = |&component: &usize| {
+        let (name, unit) = (WRENCH[component], if component < 3 { "N" } else { "N m" });
+        let stated = *manifest.sensor_noise.get(name).filter(|stated| **stated > 0.0)?;
+        let seen = high_frequency(all.iter(), component) * all.first()?.averaged.sqrt();
+        let said = if seen > CONTRADICTS * stated {
+            "the larger one is used"
+        } else if seen < SEEN_OF_SLOW_NOISE / CONTRADICTS * stated {
+            "what is smaller than the stated one is taken for noise"
+        } else {
+            return None;
+        };
+        Some(format!(
+            "{name}: trials.toml states a sensor_noise of {stated} {unit}, and samples scatter by {seen:.3} {unit} within {SLOWEST_SEEN} s: {said}; state the standard deviation of one sample"
+        ))
+    };
+    components.iter().filter_map(of).collect()
+}
+
+/// Difference of the velocities of two trials at the same time since their start, and the speed of the faster one, rms [m/s];
+/// `None` where they have no time in common.
+fn difference(a: &Series, b: &Series) -> Option<[f64; 2]> {
+    let since: Vec<f64> = a.t.iter().map(|t| t - a.t[0] + b.t[0]).collect();
+    let last = *b.t.last()?;
+    let common = since.iter().take_while(|t| **t <= last).count();
+    let velocities = |series: &Series| -> [Vec<f64>; 3] {
+        [0, 1, 2].map(|axis| series.conditions.iter().map(|state| state.velocity[axis]).collect())
+    };
+    let other = velocities(b).map(|values| interpolate(&b.t, &values, &since[..common]));
+    let ours = velocities(a);
+    let at = |values: &[Vec<f64>; 3], i: usize| Vec3::new(values[0][i], values[1][i], values[2][i]);
+    let rms = |of: &dyn Fn(usize) -> f64| ((0..common).map(of).sum::<f64>() / common as f64).sqrt();
+    let speed = |values: &[Vec<f64>; 3]| rms(&|i| at(values, i).norm_squared());
+    let apart = rms(&|i| (at(&ours, i) - at(&other, i)).norm_squared());
+    (common > 1).then(|| [apart, speed(&ours).max(speed(&other))])
+}
