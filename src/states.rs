@@ -1,7 +1,10 @@
 //! A table of states: CSV with the columns of a trial, SI units and radians by name.
 
+use std::borrow::Cow;
+
 use serde::Deserialize;
 
+use wade_core::condition::bed_from_word;
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::model::Model;
 use wade_core::vehicle::PerWheel;
@@ -134,6 +137,20 @@ pub struct BadValue {
     pub value: String,
 }
 
+/// The record with the share that a word in column `bed` stands for.
+fn with_numbers<'a>(
+    record: &'a csv::StringRecord,
+    headers: &csv::StringRecord,
+) -> Cow<'a, csv::StringRecord> {
+    let place = headers.iter().position(|header| header == "bed");
+    let word = place.and_then(|place| Some((place, bed_from_word(record.get(place)?)?)));
+    word.map_or(Cow::Borrowed(record), |(place, share)| {
+        let share = share.to_string();
+        let cells = record.iter().enumerate();
+        Cow::Owned(cells.map(|(at, cell)| if at == place { &share } else { cell }).collect())
+    })
+}
+
 impl Row {
     /// Reads a record under these headers.
     pub fn read(
@@ -141,7 +158,7 @@ impl Row {
         headers: &csv::StringRecord,
         wheels: &WheelColumns,
     ) -> Result<Self, BadValue> {
-        let row: Result<Self, csv::Error> = record.deserialize(Some(headers));
+        let row: Result<Self, csv::Error> = with_numbers(record, headers).deserialize(Some(headers));
         let row = row.map_err(|error| {
             let field = match error.kind() {
                 csv::ErrorKind::Deserialize { err, .. } => err.field(),

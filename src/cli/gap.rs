@@ -179,9 +179,10 @@ struct Source {
     /// Settings, TOML
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// How much of the bundle's physical base predicts; effects that were found against less are not applied
-    #[arg(long, value_enum, default_value_t = Terms::Full)]
-    physics: Terms,
+    /// How much of the bundle's physical base predicts; effects that were found against less are not applied [default: physics of
+    /// trials.toml, else full]
+    #[arg(long, value_enum)]
+    physics: Option<Terms>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -197,16 +198,10 @@ impl Gap {
             (Some(Step::Name(source)), _) => source.name(),
             (Some(Step::Fit(source)), _) => source.fit(),
             (Some(Step::Report { source, out }), _) => source.report(&out, None),
-            (Some(Step::Apply { source, .. }), _) if source.physics != Terms::Full => {
-                usage_error("gap apply takes effects that the whole base lacks: leave --physics out")
-            }
             (Some(Step::Apply { source, out, adding }), _) => source.report(&out, Some(&adding)),
             (Some(Step::Bench(bench)), _) => bench.run(),
             (None, Some(_)) if !self.apply && (self.adding.provisional || self.adding.replace) => {
                 usage_error("--provisional and --replace go with --apply")
-            }
-            (None, Some(_)) if self.apply && self.source.physics != Terms::Full => {
-                usage_error("--apply takes effects that the whole base lacks: leave --physics out")
             }
             (None, Some(out)) => self.source.report(&out, self.apply.then_some(&self.adding)),
             (None, None) => usage_error("give --vehicle, --trials and --out, or a step"),
@@ -223,12 +218,17 @@ impl Source {
         Ok(config)
     }
 
-    fn run(&self, library: &Library) -> Result<(Report, Trials)> {
+    fn run(&self, library: &Library, is_applied: bool) -> Result<(Report, Trials)> {
         let (Some(vehicle), Some(folder)) = (&self.vehicle, &self.trials) else {
             usage_error("give --vehicle and --trials")
         };
         let config = self.settings()?;
         let trials = Trials::read(folder)?;
+        if is_applied && self.physics_of(&trials) != Physics::Full {
+            usage_error(
+                "what is applied must be what the whole base lacks: leave --physics and physics of trials.toml out",
+            );
+        }
         if trials.manifest.vehicle != *vehicle {
             let (trials, asked) = (trials.manifest.vehicle.clone(), vehicle.clone());
             return Err(GapError::Vehicle { trials, asked }.into());
@@ -237,8 +237,9 @@ impl Source {
         let report = if has_bundle {
             let model = library.model(vehicle, Isa::available()[0])?;
             let body = Body::of_vehicle(model.vehicle());
-            let config = if is_anothers(&trials) { config } else { config.predicted_by(self.physics.into()) };
-            wade_gap::run(&trials, &body, &mut predictor(&model, self.physics.into()), &config)
+            let physics = self.physics_of(&trials);
+            let config = if is_anothers(&trials) { config } else { config.predicted_by(physics) };
+            wade_gap::run(&trials, &body, &mut predictor(&model, physics), &config)
         } else {
             let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
             let nothing = || format!("there is no vehicle `{vehicle}` ({})", library.origin());
@@ -263,8 +264,13 @@ impl Source {
         Ok((report, trials))
     }
 
+    /// How much of the base predicts.
+    fn physics_of(&self, trials: &Trials) -> Physics {
+        self.physics.map(Physics::from).or(trials.manifest.physics).unwrap_or_default()
+    }
+
     fn locate(&self) -> Result<ExitCode> {
-        let (report, _) = self.run(&self.vehicles.library()?)?;
+        let (report, _) = self.run(&self.vehicles.library()?, false)?;
         let text = match self.json {
             true => pretty(&json!({ "regions": report.regions, "regions_tried": report.regions_tried }))?,
             false => regions(&report),
@@ -274,7 +280,7 @@ impl Source {
     }
 
     fn name(&self) -> Result<ExitCode> {
-        let (report, _) = self.run(&self.vehicles.library()?)?;
+        let (report, _) = self.run(&self.vehicles.library()?, false)?;
         let names: Vec<&str> = report.effects.iter().map(|effect| effect.name).collect();
         let text = match self.json {
             true => pretty(&json!({
@@ -293,7 +299,7 @@ impl Source {
     }
 
     fn fit(&self) -> Result<ExitCode> {
-        let (report, _) = self.run(&self.vehicles.library()?)?;
+        let (report, _) = self.run(&self.vehicles.library()?, false)?;
         let text = match self.json {
             true => pretty(&json!({ "verdict": report.verdict, "effects": report.effects }))?,
             false => parameters(&report),
@@ -308,7 +314,7 @@ impl Source {
             Some(_) => self.vehicles.library_to_write()?,
             None => self.vehicles.library()?,
         };
-        let (report, trials) = self.run(&library)?;
+        let (report, trials) = self.run(&library, apply.is_some())?;
         let json = serde_json::to_string_pretty(&report)? + "\n";
         let page = report.page()?;
         let effects = apply.map(|apply| effects_file(&report, &trials, apply.provisional));

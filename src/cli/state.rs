@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
+use wade_core::condition::bed_from_word;
 use wade_core::frame::up_from_roll_pitch;
 use wade_core::physics::Physics;
 use wade_core::vehicle::{MAX_WHEELS, PerWheel};
@@ -119,11 +120,8 @@ impl From<Terms> for Physics {
 
 /// A share, or one of the two words for its ends.
 fn bed(text: &str) -> Result<f32, String> {
-    match text {
-        "parked" => Ok(0.0),
-        "driving" => Ok(1.0),
-        number => number.parse().map_err(|_| format!("`{number}`: parked, driving or a number from 0 to 1")),
-    }
+    let number = bed_from_word(text).map_or_else(|| text.parse(), |share| Ok(share as f32));
+    number.map_err(|_| format!("`{text}`: parked, driving or a number from 0 to 1"))
 }
 
 impl StateArgs {

@@ -381,6 +381,18 @@ fn what_is_written_takes_the_place_of_nothing_else() {
     std::fs::write(path("clock.csv"), milliseconds).expect("written");
     let said = predict(&path("clock.csv"), &path("b.csv"));
     assert!(String::from_utf8_lossy(&said.stderr).contains("is t in another unit?"), "{said:?}");
+    std::fs::write(path("words.csv"), "vx,vy,vz,depth,bed\n0.5,0,0,0.1,parked\n0.5,0,0,0.1,driving\n")
+        .expect("written");
+    std::fs::write(path("shares.csv"), "vx,vy,vz,depth,bed\n0.5,0,0,0.1,0\n0.5,0,0,0.1,1\n")
+        .expect("written");
+    let loads = |name: &str| {
+        assert!(predict(&path(name), &path("c.csv")).status.success());
+        let text = std::fs::read_to_string(path("c.csv")).expect("written");
+        text.lines().map(|line| line.split(',').skip(5).collect::<Vec<_>>().join(",")).collect::<Vec<_>>()
+    };
+    let of_words = loads("words.csv");
+    assert_eq!(of_words, loads("shares.csv"));
+    assert_ne!(of_words[1], of_words[2], "the bed makes a difference");
     std::fs::write(path("bad.csv"), "vx,vy,vz,depth\n0.5,0,0,none\n").expect("written");
     assert!(!predict(&path("bad.csv"), &path("a.csv")).status.success());
     assert!(path_has(&path("a.csv"), "in_domain"), "a table that failed leaves the one before");

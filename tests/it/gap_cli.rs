@@ -129,6 +129,22 @@ fn a_hidden_added_mass_is_named_and_written() {
     let fitted: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let whole = fitted["effects"][0]["parameters"]["surge"]["value"].as_f64().expect("a number");
     assert!(fitted["effects"][0]["name"] == "added_mass" && whole > surge + 0.05, "{fitted}");
+    // as trials.toml may state as well
+    let stated = TempDir::new().expect("a folder");
+    for entry in std::fs::read_dir(data).expect("trials") {
+        let from = entry.expect("readable").path();
+        std::fs::copy(&from, stated.path().join(from.file_name().expect("a name"))).expect("copied");
+    }
+    let manifest = stated.path().join("trials.toml");
+    let text = std::fs::read_to_string(&manifest).expect("readable");
+    std::fs::write(&manifest, format!("physics = \"quasi_steady\"\n{text}")).expect("written");
+    let folder = stated.path().to_string_lossy();
+    let output = wade(&["gap", "fit", "--vehicle", "warthog", "--trials", &folder, "--json"]);
+    assert_eq!(serde_json::from_slice::<Value>(&output.stdout).expect("JSON"), fitted);
+    let applied = out.join("applied").to_string_lossy().into_owned();
+    let output = wade(&["gap", "--vehicle", "warthog", "--trials", &folder, "--out", &applied, "--apply"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && said.contains("physics of trials.toml"), "{said}");
     assert_eq!(step("locate")["regions"], report["regions"]);
     assert_eq!(step("fit")["effects"][0]["parameters"], effect["parameters"]);
 }

@@ -14,6 +14,15 @@ pub const LEAST_UPRIGHT: f64 = 0.1;
 /// Speed through the water below which the bed's share goes to a half [m/s].
 const SLOW: f64 = 0.02;
 
+/// The share of the motion through the water that is motion over the bed that a word stands for.
+pub fn bed_from_word(word: &str) -> Option<f64> {
+    match word {
+        "parked" => Some(0.0),
+        "driving" => Some(1.0),
+        _ => None,
+    }
+}
+
 /// Whether water reaches under the contact patches of the tires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::trial::WRENCH;
 use super::{Fault, stem};
+use wade_core::physics::Physics;
 
 /// Name of the file.
 pub const MANIFEST_FILE: &str = "trials.toml";
@@ -42,6 +43,9 @@ pub struct Manifest {
     /// Width of the channel [m]; `inf` is open water.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel_width: Option<f64>,
+    /// How much of the bundle's physical base predicts in `wade gap`, which `--physics` overrides.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physics: Option<Physics>,
     /// Mass of the vehicle as it was tested [kg].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,

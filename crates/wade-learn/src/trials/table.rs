@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use super::trial::BED;
 use super::{Fault, TrialError};
 use wade_core::at::At;
+use wade_core::condition::bed_from_word;
 
 /// The numbers of a CSV file, every one finite, with the rows they stand in.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +123,8 @@ fn check_names(headers: &csv::StringRecord, required: &[&str]) -> Result<(), Fau
 }
 
 fn number(row: u64, column: &str, text: &str) -> Result<f64, Fault> {
-    let parsed = text.parse::<f64>().ok().filter(|value| value.is_finite());
+    let word = (column == BED).then(|| bed_from_word(text)).flatten();
+    let parsed = word.or_else(|| text.parse::<f64>().ok()).filter(|value| value.is_finite());
     parsed.ok_or_else(|| Fault::NotANumber { row, column: column.into(), value: text.into() })
 }
 

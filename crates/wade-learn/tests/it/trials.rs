@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tempfile::TempDir;
 use wade_core::condition::GroundContact;
+use wade_core::physics::Physics;
 use wade_learn::trials::{Fault, Method, Remark, Trial, TrialError, Trials, acceleration, derivative};
 
 const MANIFEST: &str = "vehicle = \"warthog\"\n";
@@ -582,4 +583,20 @@ fn accelerations_of_means_are_derivatives_of_means_unless_they_were_measured() {
     // a window of one sample is the sample, and what has no window is left out
     let some = recorded.averaged(&[3..4, 5..6]);
     assert_eq!(some.velocity, [recorded.velocity[3], recorded.velocity[5]]);
+}
+
+#[test]
+fn the_bed_is_a_share_or_one_of_two_words_and_the_manifest_states_the_physics() {
+    let rows = "t,vx,vy,vz,wx,wy,wz,depth,bed\n0,1,0,0,0,0,0,0.2,parked\n0.01,1,0,0,0,0,0,0.2,0.25\n0.02,1,0,0,0,0,0,0.2,driving\n";
+    let manifest = "vehicle = \"w\"\nphysics = \"quasi_steady\"";
+    let sound = read(manifest, &[("run.csv", rows)]).expect("sound");
+    assert_eq!(sound.trials[0].bed.as_deref(), Some(&[0.0, 0.25, 1.0][..]));
+    assert_eq!(sound.manifest.physics, Some(Physics::QuasiSteady));
+    let error = read(manifest, &[("run.csv", &rows.replace("parked", "towed"))]).expect_err("refused");
+    assert!(
+        matches!(&error.fault, Fault::NotANumber { column, value, .. } if column == "bed" && value == "towed")
+    );
+    let error =
+        read("vehicle = \"w\"\nphysics = \"half\"", &[("run.csv", rows)]).expect_err("refused").to_string();
+    assert!(error.contains("trials.toml") && error.contains("hydrostatic"), "{error}");
 }
