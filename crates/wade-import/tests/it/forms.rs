@@ -297,3 +297,51 @@ fn an_sdf_names_one_part_of_a_file_and_turns_wheels_about_axes_of_its_model() {
     let said = import(&[folder.write("robot.sdf", model("boat"))], sixty()).unwrap_err().to_string();
     assert!(said.contains("`boat`") && said.contains("hull, trailer"), "{said}");
 }
+
+/// An ASCII STL as this exporter writes it: its keywords, its line ends and what stands before each line.
+fn ascii_stl(mesh: &Mesh, upper: bool, end: &str, indent: &str) -> String {
+    let word = |text: &str| if upper { text.to_uppercase() } else { text.to_owned() };
+    let corner = |v: &nalgebra::Vector3<f64>| {
+        format!("{indent}{indent}{}\t{:e} {:e}\t{:e}{end}", word("vertex"), v.x, v.y, v.z)
+    };
+    let facet = |face: usize| {
+        let corners: String = mesh.triangle(face).iter().map(corner).collect();
+        let (begin, ends) = (word("facet normal 0 0 0"), word("endloop"));
+        let outer = word("outer loop");
+        format!(
+            "{indent}{begin}{end}{indent}{outer}{end}{corners}{indent}{ends}{end}{}{end}",
+            word("endfacet")
+        )
+    };
+    let facets: String = (0..mesh.faces.len()).map(facet).collect();
+    format!("{} Hull of mine{end}{facets}{}{end}", word("solid"), word("endsolid Hull of mine"))
+}
+
+#[test]
+fn an_stl_is_read_whatever_its_capitals_line_ends_tabs_and_first_bytes_are() {
+    let hull = block(HALF);
+    let mut forms = Vec::new();
+    for upper in [false, true] {
+        for (end, indent) in [("\n", "  "), ("\r\n", "\t"), ("\r", " "), (" ", "")] {
+            let text = ascii_stl(&hull, upper, end, indent);
+            // the rest of the first line is the name, so a file of one line cannot be one
+            let text = if end == " " { text.replacen("mine ", "mine\n", 1) } else { text };
+            forms.extend([text.clone(), format!("\u{feff}{text}"), format!("\n\t{text}\n\n")]);
+        }
+    }
+    let folder = Folder::new();
+    for text in forms {
+        assert_volume(&import(&[folder.write("HULL.STL", &text)], sixty()).unwrap(), VOLUME);
+    }
+    // binary, whatever its header says
+    for header in [&b"solid hull"[..], b"SOLID hull\r\nfacet normal", b"\xef\xbb\xbfsolid"] {
+        let mut bytes = stl(&hull);
+        bytes[..80].fill(b' ');
+        bytes[..header.len()].copy_from_slice(header);
+        assert_volume(&import(&[folder.write("hull.stl", &bytes)], sixty()).unwrap(), VOLUME);
+        bytes.pop();
+        let said = import(&[folder.write("hull.stl", &bytes)], sixty()).unwrap_err().to_string();
+        let declared = format!("declares {} faces", hull.faces.len());
+        assert!(said.contains(&declared) && said.contains("truncated"), "{said}");
+    }
+}
