@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion};
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::Bounds;
+use wade_core::vehicle::plausible::is_usual_length;
 use wade_core::vehicle::spec::Axis;
 
 use crate::limits::LENGTHS;
@@ -155,18 +156,17 @@ fn rotation(forward: Axis, up: Axis) -> Option<UnitQuaternion<f64>> {
 
 /// Meters a unit of the file.
 fn scale(scene: &Scene, options: &Options, length: f64, notes: &mut Vec<String>) -> Result<f64, PlaceError> {
-    let is_usual = |length: f64| (LENGTHS[0]..=LENGTHS[1]).contains(&length);
     let stated = options.scale.or(scene.convention.is_metric.then_some(1.0));
     if let Some(scale) = stated {
         if !(scale > 0.0 && scale.is_finite()) {
             return Err(PlaceError::Scale { scale });
         }
-        if !is_usual(length * scale) {
+        if !is_usual_length(length * scale) {
             return Err(PlaceError::Size { length: length * scale, is_stated: true });
         }
         return Ok(scale);
     }
-    let fitting = UNITS.into_iter().find(|(scale, _)| is_usual(length * scale));
+    let fitting = UNITS.into_iter().find(|(scale, _)| is_usual_length(length * scale));
     let (scale, unit) = fitting.ok_or(PlaceError::Size { length, is_stated: false })?;
     notes.push(format!(
         "unit: {unit}, guessed by size: the longest edge of {length:.4} is {:.4} m; --scale changes it",

@@ -14,6 +14,9 @@ pub const LEAST_LENGTH: f64 = 0.02;
 /// Longest edge of a vehicle [m]: a mining truck.
 pub const MOST_LENGTH: f64 = 20.0;
 
+/// Share by which a length may miss a bound: what f32 leaves of an edge of 2 cm that stands 10 m from the origin.
+const LENGTH_ROUNDING: f64 = 1e-4;
+
 /// Mass over displaced volume below which a body would rise in air [kg/m3]: air at 15 C.
 pub const LEAST_DENSITY: f64 = 1.225;
 
@@ -56,8 +59,9 @@ pub fn check_size(mass: f64, bounds: &Bounds, volume: f64) -> Result<(), Implaus
     Ok(())
 }
 
-fn is_usual_length(length: f64) -> bool {
-    (LEAST_LENGTH..=MOST_LENGTH).contains(&length)
+/// True of the longest edge of a vehicle [m], both bounds included.
+pub fn is_usual_length(length: f64) -> bool {
+    (LEAST_LENGTH * (1.0 - LENGTH_ROUNDING)..=MOST_LENGTH * (1.0 + LENGTH_ROUNDING)).contains(&length)
 }
 
 /// The unit that would make a length usual.

@@ -345,3 +345,27 @@ fn an_stl_is_read_whatever_its_capitals_line_ends_tabs_and_first_bytes_are() {
         assert!(said.contains(&declared) && said.contains("truncated"), "{said}");
     }
 }
+
+#[test]
+fn both_ends_of_the_sizes_that_are_promised_are_imported() {
+    let cube = |edge: f64, offset: f64| {
+        urdf(&link(
+            "base",
+            &format!("xyz=\"{offset} 0 0\""),
+            &format!("<box size=\"{edge} {edge} {edge}\"/>"),
+        ))
+    };
+    for (edge, offset) in [(0.02, 0.0), (0.02, 10.1), (20.0, 0.0), (20.0, 0.3)] {
+        assert_volume(&of_text("robot.urdf", &cube(edge, offset)), edge.powi(3));
+        let mesh = moved([0.5 * edge; 3], &at(offset, 0.0, 0.0));
+        for (drawn, scale) in [(1.0, 1.0), (1e3, 1e-3), (1.0 / 0.0254, 0.0254)] {
+            let mesh = placed(&mesh, &Isometry3::identity(), drawn);
+            let imported = of_stl(&mesh, Options { scale: Some(scale), mass: None, ..sixty() });
+            let volume = imported.floating.displaced_volume;
+            assert!((volume / edge.powi(3) - 1.0).abs() < 1e-3, "{volume} {edge}");
+        }
+    }
+    for edge in [0.0199, 20.1] {
+        assert!(refusal("robot.urdf", &cube(edge, 0.0)).contains("0.02 to 20 m"));
+    }
+}
