@@ -1,5 +1,6 @@
 //! What the import promises, on robots that the tests write themselves.
 
+mod afloat;
 mod bad_input;
 mod forms;
 mod mass;
