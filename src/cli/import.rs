@@ -9,7 +9,7 @@ use wade_core::bundle::{self, Bundle};
 use wade_core::physics::Radiation;
 use wade_core::vehicle::Vehicle;
 use wade_core::vehicle::spec::Axis;
-use wade_import::{Imported, Options, Shapes};
+use wade_import::{Imported, Options, Shapes, Unit};
 
 use super::emit;
 use super::vehicle::summary;
@@ -23,7 +23,7 @@ use wade::config::Config;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   wade vehicle import robot.urdf --out vehicles/robot
-  wade vehicle import hull.stl wheels.stl --scale 0.001 --mass 42 \\
+  wade vehicle import hull.stl wheels.stl --unit mm --mass 42 \\
     --out vehicles/rover --json")]
 pub struct ImportVehicle {
     /// One description with the meshes that it does not find by itself, or meshes that are the parts of one vehicle
@@ -38,7 +38,10 @@ pub struct ImportVehicle {
     /// Mass [kg] [default: the sum of the links]
     #[arg(long, value_name = "KG")]
     mass: Option<f64>,
-    /// Meters a unit of the files [default: what the format says; for STL and OBJ a guess by size]
+    /// Unit of the files [default: what the format says; for STL and OBJ a guess by size and mass]
+    #[arg(long, value_enum, value_name = "UNIT", conflicts_with = "scale")]
+    unit: Option<UnitName>,
+    /// Meters a unit of the files, for units that --unit does not name
     #[arg(long, value_name = "METERS")]
     scale: Option<f64>,
     /// The axis of the files that points forward [default: x; z for glTF]
@@ -66,6 +69,29 @@ enum ShapesName {
     Visual,
     /// Those to collide
     Collision,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum UnitName {
+    /// Meters
+    M,
+    /// Millimeters
+    Mm,
+    /// Centimeters
+    Cm,
+    /// Inches
+    In,
+}
+
+impl From<UnitName> for Unit {
+    fn from(name: UnitName) -> Self {
+        match name {
+            UnitName::M => Self::Meters,
+            UnitName::Mm => Self::Millimeters,
+            UnitName::Cm => Self::Centimeters,
+            UnitName::In => Self::Inches,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -103,7 +129,7 @@ impl ImportVehicle {
         let options = Options {
             name,
             mass: self.mass,
-            scale: self.scale,
+            scale: self.scale.or(self.unit.map(|unit| Unit::from(unit).meters())),
             forward: self.forward.map(Axis::from),
             up: self.up.map(Axis::from),
             seal: self.seal,

@@ -146,10 +146,10 @@ fn inverted_hulls_are_turned_and_it_is_said() {
 #[test]
 fn sizes_that_no_vehicle_has_are_refused_with_the_unit() {
     let body = link("base", "", "<box size=\"300 200 100\"/>");
-    of_text("r.urdf", urdf(&body), &["the longest edge is 300", "0.02 to 20 m", "--scale 0.001"]);
+    of_text("r.urdf", urdf(&body), &["the longest edge is 300", "0.02 to 20 m", "--unit mm"]);
     let folder = Folder::new();
     let file = folder.write("hull.stl", stl(&block([50_000.0, 10.0, 10.0])));
-    refused(&[file], Options::default(), &["in the file's unit", "--scale"]);
+    refused(&[file], Options::default(), &["in the files' unit", "--unit"]);
 }
 
 #[test]

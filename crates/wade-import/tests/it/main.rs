@@ -7,6 +7,7 @@ mod mass;
 mod solids;
 mod time;
 mod tracks;
+mod units;
 mod volume;
 mod wheels;
 mod write;
