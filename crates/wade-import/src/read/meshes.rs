@@ -1,13 +1,15 @@
 //! Mesh files: by themselves the parts of a vehicle, or the shapes of a robot's links.
 
+use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::{Mesh, read_stl};
-use wade_core::geometry::parts::parts;
-use wade_core::geometry::tidy::{weld_tolerance, welded};
+use wade_core::geometry::parts::{find, parts as connected_faces};
+use wade_core::geometry::tidy::{tidy, weld_tolerance, welded};
+use wade_core::geometry::watertight::is_closed;
 
 use super::{Kind, ReadError, bytes, collada, gltf};
 use crate::file_name;
@@ -94,10 +96,10 @@ pub fn fan(corners: &[u32]) -> Vec<[u32; 3]> {
 
 /// A vehicle of meshes alone: a link for each connected part, so that wheels can be recognized by their form.
 pub fn scene(files: &[PathBuf], kinds: &[Kind]) -> Result<Scene, ReadError> {
-    let mut links = Vec::new();
+    let (mut links, mut notes) = (Vec::new(), Vec::new());
     let mut faces = 0;
     for path in files {
-        for part in load(path)? {
+        for part in joined(path, load(path)?, &mut notes) {
             faces += part.mesh.faces.len();
             if faces > MOST_FACES {
                 return Err(ReadError::Faces { path: path.clone(), faces });
@@ -128,8 +130,52 @@ pub fn scene(files: &[PathBuf], kinds: &[Kind]) -> Result<Scene, ReadError> {
         warnings
             .push("glTF and other meshes are mixed: all are taken to have the same axes and unit".to_owned());
     }
-    let notes = vec![format!("{} connected parts in {} files", links.len(), files.len())];
+    notes.push(format!("{} connected parts in {} files", links.len(), files.len()));
     Ok(Scene { links, convention, notes, warnings })
+}
+
+/// The parts of a file, those that are open as one where their edges meet: a group or a material for each face or each side of
+/// a hull splits a solid into pieces of which none is closed.
+fn joined(path: &Path, parts: Vec<Part>, notes: &mut Vec<String>) -> Vec<Part> {
+    let groups = that_meet(&parts);
+    let several: Vec<usize> = groups.iter().map(Vec::len).filter(|pieces| *pieces > 1).collect();
+    if several.is_empty() {
+        return parts;
+    }
+    notes.push(format!(
+        "{}: {} groups that are open alone are joined where their edges meet; parts made of them: {}",
+        file_name(path),
+        several.iter().sum::<usize>(),
+        several.len()
+    ));
+    let whole = |group: &Vec<usize>| {
+        let mut whole = Part { name: parts[group[0]].name.clone(), mesh: Mesh::default() };
+        group.iter().for_each(|piece| whole.mesh.append(&parts[*piece].mesh));
+        whole
+    };
+    groups.iter().map(whole).collect()
+}
+
+/// Indices of open parts that have an edge in common, each group in their order; a closed part is by itself.
+fn that_meet(parts: &[Part]) -> Vec<Vec<usize>> {
+    let (mut all, mut of_face) = (Mesh::default(), Vec::new());
+    for (index, part) in parts.iter().enumerate() {
+        if !is_closed(&tidy(part.mesh.clone()).0) {
+            all.append(&part.mesh);
+            of_face.resize(all.faces.len(), index);
+        }
+    }
+    let (all, _) = welded(&all, weld_tolerance(&all));
+    let mut root: Vec<usize> = (0..parts.len()).collect();
+    for face_group in connected_faces(&all) {
+        for face in &face_group {
+            let (a, b) = (find(&mut root, of_face[face_group[0]]), find(&mut root, of_face[*face]));
+            root[a.max(b)] = a.min(b);
+        }
+    }
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    (0..parts.len()).for_each(|part| groups.entry(find(&mut root, part)).or_default().push(part));
+    groups.into_values().collect()
 }
 
 /// The connected parts of a mesh, its corners joined first: the copies of a corner that a format writes for each face
@@ -138,7 +184,7 @@ fn connected(mesh: &Mesh) -> Vec<Mesh> {
     let (mesh, _) = welded(mesh, weld_tolerance(mesh));
     let solid = |face: &[u32; 3]| face[0] != face[1] && face[1] != face[2] && face[2] != face[0];
     let mesh = Mesh { faces: mesh.faces.iter().copied().filter(solid).collect(), vertices: mesh.vertices };
-    let shells: Vec<Mesh> = parts(&mesh).iter().map(|faces| mesh.part(faces)).collect();
+    let shells: Vec<Mesh> = connected_faces(&mesh).iter().map(|faces| mesh.part(faces)).collect();
     // an inward shell is the cavity of the smallest one around it, or inside out
     let around = |index: usize| {
         let is_around = |other: &usize| *other != index && encloses(&shells[*other], &shells[index]);
