@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use wade_core::bundle::{self, Bundle};
@@ -11,8 +11,8 @@ use wade_core::vehicle::Vehicle;
 use wade_core::vehicle::spec::Axis;
 use wade_import::{Imported, Options, Shapes, Unit};
 
-use super::emit;
 use super::vehicle::summary;
+use super::{emit, interrupt};
 use wade::config::Config;
 
 /// Make a bundle from a robot description or meshes: URDF, SDF, MJCF, STL, OBJ, glTF
@@ -124,6 +124,7 @@ impl ImportVehicle {
     /// Imports and writes the bundle.
     pub fn run(self) -> Result<()> {
         let (folder, name) = self.place()?;
+        interrupt::end_between_writes()?;
         // before the work
         bundle::check_place(&folder, &name)?;
         let options = Options {
@@ -173,13 +174,10 @@ impl ImportVehicle {
 
 /// Writes a vehicle without weights as the next version of the bundle in its place, in one step of the file system.
 fn write_bundle(folder: &Path, vehicle: Vehicle) -> Result<u32> {
-    if let Some(parent) = folder.parent() {
-        std::fs::create_dir_all(parent).with_context(|| parent.display().to_string())?;
-    }
     let radiation = Some(Radiation::estimate(&vehicle));
     let bundle =
         Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance: None, spec: None };
-    Ok(bundle::succeed(folder, bundle)?)
+    Ok(interrupt::whole(|| bundle::succeed(folder, bundle))?)
 }
 
 /// How to look at the vehicle and ask for its forces.

@@ -27,7 +27,7 @@ use wade_learn::panel_code::Capytaine;
 
 use super::import::ImportVehicle;
 use super::running::Running;
-use super::{Vehicles, emit};
+use super::{Vehicles, emit, interrupt};
 
 /// Build, check and show vehicle bundles
 #[derive(Debug, Args)]
@@ -341,6 +341,7 @@ fn versions(name: &str, current: &Kept, others: &[Kept], as_json: bool) -> Resul
 
 fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let spec: VehicleSpec = toml::from_str(spec_text)?;
+    interrupt::end_between_writes()?;
     bundle::check_place(out, &spec.name)?;
     let before = match out.exists() {
         true => Some(bundle::read(out).context("the bundle in place cannot be read; move it away first")?),
@@ -374,7 +375,7 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let spec = Some(spec_text.to_owned());
     let radiation = Some(Radiation::estimate(&vehicle));
     let bundle = Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance, spec };
-    let version = bundle::succeed(out, bundle)?;
+    let version = interrupt::whole(|| bundle::succeed(out, bundle))?;
     let t = vehicle_translation;
     println!("{}: version {version}, answers by physics alone until it is trained", out.display());
     if let Some(Bundle { vehicle, version, trained: Some(_), .. }) = before {
