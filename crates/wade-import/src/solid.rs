@@ -214,7 +214,7 @@ fn outward(
         Some(Ok(None)) => {}
         Some(Ok(Some(repaired))) if repaired.volume() > least => mesh = repaired,
         Some(Err(Error::Cancelled)) => return Err(SolidError::Slow { source_name, faces: mesh.faces.len() }),
-        Some(Err(fault)) => return Err(crossing(format!("{fault:?}"))),
+        Some(Err(fault)) => return Err(crossing(fault_in_words(fault).to_owned())),
         Some(Ok(Some(_))) => return Err(crossing("nothing is left of it".to_owned())),
         None => return Err(crossing("the repair failed".to_owned())),
     }
@@ -229,6 +229,17 @@ fn outward(
     }
     piece.mesh = mesh;
     Ok(())
+}
+
+/// What the library of the union says, in words.
+pub fn fault_in_words(fault: Error) -> &'static str {
+    match fault {
+        Error::NonFiniteVertex => "a coordinate is not a finite number",
+        Error::NotManifold | Error::NotClosed => "it has edges without two faces that agree",
+        Error::ResultTooLarge => "the result is too large",
+        Error::Cancelled => "it takes too long",
+        _ => "the library of the union refuses the mesh",
+    }
 }
 
 /// The mesh without faces that cross each other or lie in its inside; none where it has none.

@@ -19,9 +19,9 @@ use crate::limits::{MOST_DEPTH, MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
 /// The parts of a file, a node each.
 pub fn load(path: &Path) -> Result<Vec<Part>, ReadError> {
     // the library looks up what a file names without asking whether it is there
-    let damaged =
-        |what| Err(ReadError::GltfContent { path: path.to_owned(), what: format!("damaged: {what}") });
-    caught(|| decode(path)).unwrap_or_else(damaged)
+    let what = "damaged: it refers to data that are not there; export the file again".to_owned();
+    caught(|| decode(path))
+        .unwrap_or_else(|_| Err(ReadError::GltfContent { path: path.to_owned(), what }))
 }
 
 fn decode(path: &Path) -> Result<Vec<Part>, ReadError> {
