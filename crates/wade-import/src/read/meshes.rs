@@ -1,21 +1,19 @@
 //! Mesh files: by themselves the parts of a vehicle, or the shapes of a robot's links.
 
-use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::{Mesh, read_stl};
-use wade_core::geometry::parts::{find, parts as connected_faces};
-use wade_core::geometry::tidy::{tidy, weld_tolerance, welded};
-use wade_core::geometry::watertight::is_closed;
+use wade_core::geometry::parts::parts as connected_faces;
+use wade_core::geometry::tidy::{weld_tolerance, welded};
 
-use super::{Kind, ReadError, bytes, collada, gltf};
+use super::{Kind, ReadError, bytes, collada, gltf, without_mark};
 use crate::file_name;
 use crate::limits::{MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
 use crate::scene::{Convention, Joint, Link, Role, Scene, Shape};
-use crate::solid::encloses;
+use crate::solid::{encloses, that_meet};
 
 /// A named part of a mesh file, in the frame of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +60,9 @@ fn check(path: &Path, part: &Part) -> Result<(), ReadError> {
 }
 
 fn obj(path: &Path) -> Result<Vec<Part>, ReadError> {
-    let mut reader = Cursor::new(bytes(path, MOST_MESH_BYTES)?);
+    let bytes = bytes(path, MOST_MESH_BYTES)?;
+    let text = without_mark(&bytes);
+    let mut reader = Cursor::new(text);
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -70,13 +70,32 @@ fn obj(path: &Path) -> Result<Vec<Part>, ReadError> {
         ..Default::default()
     };
     let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default()))
-        .map_err(|fault| ReadError::Obj { path: path.to_owned(), fault })?;
+        .map_err(|fault| ReadError::Obj { path: path.to_owned(), line: damaged_line(text), fault })?;
     let part = |model: tobj::Model| {
         let vertices = model.mesh.positions.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect();
         let faces = model.mesh.indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
         Part { name: model.name, mesh: Mesh { vertices, faces } }
     };
     Ok(models.into_iter().map(part).filter(|part| !part.mesh.faces.is_empty()).collect())
+}
+
+/// The first line, from 1, with a corner that is not three numbers or a face whose corner is none of the file.
+fn damaged_line(bytes: &[u8]) -> Option<usize> {
+    let text = String::from_utf8_lossy(bytes);
+    let corners = text.lines().filter(|line| line.split_ascii_whitespace().next() == Some("v")).count();
+    let is_corner = |word: &str| {
+        let index = word.split('/').next().and_then(|index| index.parse::<i64>().ok());
+        index.is_some_and(|index| index != 0 && index.unsigned_abs() <= corners as u64)
+    };
+    let is_damaged = |line: &str| {
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => words.by_ref().take(3).filter(|word| word.parse::<f64>().is_ok()).count() < 3,
+            Some("f") => !words.all(is_corner),
+            _ => false,
+        }
+    };
+    text.lines().position(is_damaged).map(|before| before + 1)
 }
 
 /// The triangles of a strip: each corner makes one with the two before it, every other one the other way round.
@@ -137,7 +156,8 @@ pub fn scene(files: &[PathBuf], kinds: &[Kind]) -> Result<Scene, ReadError> {
 /// The parts of a file, those that are open as one where their edges meet: a group or a material for each face or each side of
 /// a hull splits a solid into pieces of which none is closed.
 fn joined(path: &Path, parts: Vec<Part>, notes: &mut Vec<String>) -> Vec<Part> {
-    let groups = that_meet(&parts);
+    let meshes: Vec<&Mesh> = parts.iter().map(|part| &part.mesh).collect();
+    let groups = that_meet(&meshes);
     let several: Vec<usize> = groups.iter().map(Vec::len).filter(|pieces| *pieces > 1).collect();
     if several.is_empty() {
         return parts;
@@ -154,28 +174,6 @@ fn joined(path: &Path, parts: Vec<Part>, notes: &mut Vec<String>) -> Vec<Part> {
         whole
     };
     groups.iter().map(whole).collect()
-}
-
-/// Indices of open parts that have an edge in common, each group in their order; a closed part is by itself.
-fn that_meet(parts: &[Part]) -> Vec<Vec<usize>> {
-    let (mut all, mut of_face) = (Mesh::default(), Vec::new());
-    for (index, part) in parts.iter().enumerate() {
-        if !is_closed(&tidy(part.mesh.clone()).0) {
-            all.append(&part.mesh);
-            of_face.resize(all.faces.len(), index);
-        }
-    }
-    let (all, _) = welded(&all, weld_tolerance(&all));
-    let mut root: Vec<usize> = (0..parts.len()).collect();
-    for face_group in connected_faces(&all) {
-        for face in &face_group {
-            let (a, b) = (find(&mut root, of_face[face_group[0]]), find(&mut root, of_face[*face]));
-            root[a.max(b)] = a.min(b);
-        }
-    }
-    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    (0..parts.len()).for_each(|part| groups.entry(find(&mut root, part)).or_default().push(part));
-    groups.into_values().collect()
 }
 
 /// The connected parts of a mesh, its corners joined first: the copies of a corner that a format writes for each face

@@ -2,6 +2,7 @@
 
 mod afloat;
 mod bad_input;
+mod exporters;
 mod forms;
 mod mass;
 mod solids;
