@@ -2,17 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use wade_core::bundle::{self, Bundle};
 use wade_core::physics::Radiation;
 use wade_core::vehicle::Vehicle;
 use wade_core::vehicle::spec::Axis;
-use wade_import::{Imported, Options, Shapes};
+use wade_import::{Imported, Options, Shapes, Unit};
 
-use super::emit;
 use super::vehicle::summary;
+use super::{emit, interrupt};
 use wade::config::Config;
 
 /// Make a bundle from a robot description or meshes: URDF, SDF, MJCF, STL, OBJ, glTF
@@ -23,7 +23,7 @@ use wade::config::Config;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   wade vehicle import robot.urdf --out vehicles/robot
-  wade vehicle import hull.stl wheels.stl --scale 0.001 --mass 42 \\
+  wade vehicle import hull.stl wheels.stl --unit mm --mass 42 \\
     --out vehicles/rover --json")]
 pub struct ImportVehicle {
     /// One description with the meshes that it does not find by itself, or meshes that are the parts of one vehicle
@@ -38,7 +38,10 @@ pub struct ImportVehicle {
     /// Mass [kg] [default: the sum of the links]
     #[arg(long, value_name = "KG")]
     mass: Option<f64>,
-    /// Meters a unit of the files [default: what the format says; for STL and OBJ a guess by size]
+    /// Unit of the files [default: what the format says; for STL and OBJ a guess by size and mass]
+    #[arg(long, value_enum, value_name = "UNIT", conflicts_with = "scale")]
+    unit: Option<UnitName>,
+    /// Meters a unit of the files, for units that --unit does not name
     #[arg(long, value_name = "METERS")]
     scale: Option<f64>,
     /// The axis of the files that points forward [default: x; z for glTF]
@@ -66,6 +69,29 @@ enum ShapesName {
     Visual,
     /// Those to collide
     Collision,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum UnitName {
+    /// Meters
+    M,
+    /// Millimeters
+    Mm,
+    /// Centimeters
+    Cm,
+    /// Inches
+    In,
+}
+
+impl From<UnitName> for Unit {
+    fn from(name: UnitName) -> Self {
+        match name {
+            UnitName::M => Self::Meters,
+            UnitName::Mm => Self::Millimeters,
+            UnitName::Cm => Self::Centimeters,
+            UnitName::In => Self::Inches,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -98,12 +124,13 @@ impl ImportVehicle {
     /// Imports and writes the bundle.
     pub fn run(self) -> Result<()> {
         let (folder, name) = self.place()?;
+        interrupt::end_between_writes()?;
         // before the work
         bundle::check_place(&folder, &name)?;
         let options = Options {
             name,
             mass: self.mass,
-            scale: self.scale,
+            scale: self.scale.or(self.unit.map(|unit| Unit::from(unit).meters())),
             forward: self.forward.map(Axis::from),
             up: self.up.map(Axis::from),
             seal: self.seal,
@@ -147,13 +174,10 @@ impl ImportVehicle {
 
 /// Writes a vehicle without weights as the next version of the bundle in its place, in one step of the file system.
 fn write_bundle(folder: &Path, vehicle: Vehicle) -> Result<u32> {
-    if let Some(parent) = folder.parent() {
-        std::fs::create_dir_all(parent).with_context(|| parent.display().to_string())?;
-    }
     let radiation = Some(Radiation::estimate(&vehicle));
     let bundle =
         Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance: None, spec: None };
-    Ok(bundle::succeed(folder, bundle)?)
+    Ok(interrupt::whole(|| bundle::succeed(folder, bundle))?)
 }
 
 /// How to look at the vehicle and ask for its forces.

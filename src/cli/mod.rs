@@ -8,6 +8,7 @@ mod fmu;
 mod gap;
 mod gap_bench;
 mod import;
+mod interrupt;
 mod log;
 mod log_limit;
 mod outside;

@@ -16,6 +16,7 @@ use wade_core::domain::{Domain, Range};
 use wade_wire::State;
 use wade_wire::shm::Wait;
 
+use super::interrupt::{INTERRUPTED, at_interrupts};
 use super::progress::soak_bar;
 use super::soak_server::{Server, Wanted};
 use super::trust::Trust;
@@ -155,9 +156,6 @@ const TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Longest wait for a server to start.
 const START: Duration = Duration::from_secs(30);
-
-/// Exit status of a program that Ctrl-C ended: 128 and the number of SIGINT.
-const INTERRUPTED: u8 = 130;
 
 impl Transport {
     /// The usual one of an address.
@@ -430,23 +428,13 @@ impl Target<'_> {
 
 /// A flag that Ctrl-C or SIGTERM sets; a second one ends the program at once.
 fn stop_at_interrupt() -> Result<Arc<AtomicBool>> {
-    use tokio::signal::unix::{SignalKind, signal};
     let stop = Arc::new(AtomicBool::new(false));
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let (mut interrupt, mut terminate) = {
-        let _context = runtime.enter();
-        (signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?)
-    };
     let stopped = Arc::clone(&stop);
-    std::thread::Builder::new().name("wade-signals".into()).spawn(move || {
-        runtime.block_on(async {
-            let mut next = async || tokio::select! { _ = interrupt.recv() => {} _ = terminate.recv() => {} };
-            next().await;
-            stopped.store(true, Ordering::Relaxed);
-            eprintln!("interrupted: writing the report of what was measured; again ends at once");
-            next().await;
+    at_interrupts(move || {
+        if stopped.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));
-        });
+        }
+        eprintln!("interrupted: writing the report of what was measured; again ends at once");
     })?;
     Ok(stop)
 }

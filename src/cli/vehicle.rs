@@ -27,7 +27,7 @@ use wade_learn::panel_code::Capytaine;
 
 use super::import::ImportVehicle;
 use super::running::Running;
-use super::{Vehicles, emit};
+use super::{Vehicles, emit, interrupt};
 
 /// Build, check and show vehicle bundles
 #[derive(Debug, Args)]
@@ -341,6 +341,7 @@ fn versions(name: &str, current: &Kept, others: &[Kept], as_json: bool) -> Resul
 
 fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let spec: VehicleSpec = toml::from_str(spec_text)?;
+    interrupt::end_between_writes()?;
     bundle::check_place(out, &spec.name)?;
     let before = match out.exists() {
         true => Some(bundle::read(out).context("the bundle in place cannot be read; move it away first")?),
@@ -374,7 +375,7 @@ fn build(spec_text: &str, stl: &[u8], out: &Path, made: Made) -> Result<()> {
     let spec = Some(spec_text.to_owned());
     let radiation = Some(Radiation::estimate(&vehicle));
     let bundle = Bundle { vehicle, version: 0, trained: None, radiation, effects: None, distance, spec };
-    let version = bundle::succeed(out, bundle)?;
+    let version = interrupt::whole(|| bundle::succeed(out, bundle))?;
     let t = vehicle_translation;
     println!("{}: version {version}, answers by physics alone until it is trained", out.display());
     if let Some(Bundle { vehicle, version, trained: Some(_), .. }) = before {
@@ -444,12 +445,12 @@ fn sdf(mesh: &Mesh, out: &Path) -> Result<()> {
     written.with_context(|| out.display().to_string())?;
     let ([nx, ny, nz], o) = (grid.shape, grid.origin);
     println!(
-        "{}: {nx} x {ny} x {nz} points, {:.4} m apart, from ({:.4}, {:.4}, {:.4}) m in the body frame",
+        "{}: {nx} x {ny} x {nz} points, {:.4} m apart, from ({}, {}, {}) m in the body frame",
         out.display(),
         grid.spacing,
-        o.x,
-        o.y,
-        o.z
+        Rounded(o.x),
+        Rounded(o.y),
+        Rounded(o.z)
     );
     Ok(())
 }
@@ -517,8 +518,12 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
     };
     line(format!("{}, version {}, weights: {}", vehicle.name, bundle.version, told(weights)));
     line(format!(
-        "L W H {:.3} x {:.3} x {:.3} m, ground at z {:.4} m, {:.1} kg",
-        d.length, d.width, d.height, vehicle.z0, vehicle.mass
+        "L W H {:.3} x {:.3} x {:.3} m, ground at z {} m, {:.1} kg",
+        d.length,
+        d.width,
+        d.height,
+        Rounded(vehicle.z0),
+        vehicle.mass
     ));
     line(format!("{:<18} {:<7} {:>8}  centroid [m]            normal", "surface", "kind", "area m2"));
     for s in &vehicle.surfaces {
@@ -527,7 +532,7 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
             let [x, y, z] = [v.x, v.y, v.z].map(|c| (c * 1e3).round() / 1e3 + 0.0);
             format!("{x:7.3} {y:7.3} {z:7.3}")
         };
-        let kind = format!("{:?}", s.kind).to_lowercase();
+        let kind = s.kind.name();
         line(format!(
             "{:<18} {kind:<7} {:>8.4}  {} {}",
             s.name,
@@ -537,13 +542,13 @@ fn show(bundle: &Bundle, kept: &[Kept], as_json: bool) -> Result<()> {
         ));
     }
     for (name, range) in ranges() {
-        line(format!("trained for {name:<20} {:.4} to {:.4}", range.min, range.max));
+        line(format!("trained for {name:<20} {} to {}", Rounded(range.min), Rounded(range.max)));
     }
     for effect in effects {
         line(format!("effect {}: {}", effect.effect().name(), effect.equation));
         for (name, p) in &effect.parameters {
             let unit = if p.unit == "1" { "" } else { &p.unit };
-            line(format!("  {name:<16} {:.4} +- {:.4} {unit}", p.value, p.std));
+            line(format!("  {name:<16} {} +- {:.4} {unit}", Rounded(p.value), p.std));
         }
     }
     for kept in kept {

@@ -103,3 +103,71 @@ fn an_import_that_fails_leaves_nothing_and_keeps_what_was_there() {
     assert_eq!(import(folder.path(), &open, &[]).status.code(), Some(1));
     assert_eq!(bundle::read(&place).unwrap().version, before);
 }
+
+/// Everything in a folder and below it.
+fn listed(folder: &Path) -> Vec<std::path::PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let entries = entries.map(|entry| entry.unwrap().path());
+    let mut all: Vec<_> = entries.flat_map(|path| [listed(&path), vec![path]].concat()).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn a_write_that_fails_leaves_nothing_new_in_the_folder() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("car.urdf");
+    std::fs::write(&file, car()).unwrap();
+    // as a full disk: no file may grow beyond 2 KB, which the hull does
+    let on_a_full_disk = |out: &str| {
+        let limited = "trap '' XFSZ; ulimit -f 4; exec \"$@\"";
+        let arguments = ["vehicle", "import", file.to_str().unwrap(), "--name", "car", "--out", out];
+        let shell = ["-c", limited, "sh", env!("CARGO_BIN_EXE_wade")];
+        Command::new("sh").args(shell).args(arguments).current_dir(folder.path()).output().unwrap()
+    };
+    for out in ["vehicles/car", "deep/er/car", "car"] {
+        let output = on_a_full_disk(out);
+        assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.contains("File too large"), "{said}");
+        assert_eq!(listed(folder.path()), [file.as_path()], "neither folder, lock nor staging");
+    }
+    assert!(import(folder.path(), &car(), &[]).status.success());
+    let (place, before) = (folder.path().join("vehicles/car"), listed(folder.path()));
+    let version = bundle::read(&place).unwrap().version;
+    assert_eq!(on_a_full_disk("vehicles/car").status.code(), Some(1));
+    assert_eq!((listed(folder.path()), bundle::read(&place).unwrap().version), (before, version));
+    // a file where a folder should be
+    let below = file.join("car");
+    assert_eq!(on_a_full_disk(below.to_str().unwrap()).status.code(), Some(1));
+}
+
+#[test]
+fn an_import_that_is_interrupted_leaves_a_whole_bundle_or_nothing() {
+    use nix::sys::signal::{Signal, kill};
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("car.urdf");
+    std::fs::write(&file, car()).unwrap();
+    for (round, signal) in (0..60).zip([Signal::SIGINT, Signal::SIGTERM].into_iter().cycle()) {
+        let out = folder.path().join(format!("vehicles{round}/car"));
+        let arguments = ["vehicle", "import", file.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        let mut child = Command::new(env!("CARGO_BIN_EXE_wade"))
+            .args(arguments)
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(2 * round));
+        let _ = kill(nix::unistd::Pid::from_raw(child.id() as i32), signal);
+        child.wait().unwrap();
+        let vehicles = out.parent().unwrap();
+        if vehicles.exists() {
+            bundle::read(&out).unwrap();
+            assert_eq!(
+                std::fs::read_dir(vehicles).unwrap().count(),
+                2,
+                "the bundle and its lock: {:?}",
+                listed(vehicles)
+            );
+        }
+    }
+}

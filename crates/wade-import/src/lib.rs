@@ -21,7 +21,7 @@ mod wheels;
 
 use std::path::{Path, PathBuf};
 
-pub use place::PlaceError;
+pub use place::{PlaceError, Unit};
 pub use read::ReadError;
 pub use solid::SolidError;
 pub use unite::UniteError;
@@ -71,7 +71,7 @@ pub struct Options {
     pub name: String,
     /// Mass [kg]; default: the sum of the links.
     pub mass: Option<f64>,
-    /// Meters a unit of the files; default: 1 for robots and glTF, guessed by size for STL and OBJ.
+    /// Meters a unit of the files; default: 1 for robots and glTF, guessed by size and mass for STL and OBJ.
     pub scale: Option<f64>,
     /// The axis of the files that points forward; default: x, for glTF z.
     pub forward: Option<Axis>,
@@ -171,7 +171,7 @@ pub fn import(files: &[PathBuf], options: &Options) -> Result<Imported, ImportEr
     if faces > MOST_FACES {
         return Err(ImportError::TooManyFaces { faces });
     }
-    let placement = Placement::of(&scene, &chosen, options, &mut notes)?;
+    let placement = Placement::of(&scene, &chosen, options, (&mut notes, &mut warnings))?;
     let mut pieces: Vec<Piece> = chosen.into_iter().map(|piece| placement.piece(piece)).collect();
     let watch = Watch::start();
     solid::close_all(&mut pieces, options.seal, &watch, &mut warnings)?;

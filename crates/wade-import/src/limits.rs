@@ -1,5 +1,6 @@
 //! Every bound and threshold of the import, with its unit and meaning.
 
+use wade_core::condition::FRESH_WATER;
 use wade_core::vehicle::plausible::{LEAST_LENGTH, MOST_LENGTH};
 
 /// Largest description file: URDF, SDF, MJCF [bytes]. Public robots have up to 1 MB.
@@ -31,6 +32,13 @@ pub const FACETS: u32 = 96;
 
 /// Mean density assumed where no file and no option states a mass [kg/m3]: a vehicle that floats with 40 % under water.
 pub const ASSUMED_DENSITY: f64 = 400.0;
+
+/// Longest edge of most wading robots and vehicles [m]: among several units that fit, one in which it lies here is taken.
+pub const TYPICAL_LENGTHS: [f64; 2] = [0.1, 6.0];
+
+/// Mass over volume from which, and up to which, the level at which a vehicle floats lies inside its hull [kg/m3]: rigid foam to
+/// fresh water.
+pub const FLOATING_DENSITY: [f64; 2] = [20.0, FRESH_WATER];
 
 /// Smallest volume of a shape over the cube of its diagonal; below it is a sheet without inside.
 pub const LEAST_VOLUME_SHARE: f64 = 1e-9;

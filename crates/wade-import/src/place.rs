@@ -3,23 +3,67 @@
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion};
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::Bounds;
+use wade_core::vehicle::plausible::is_usual_length;
 use wade_core::vehicle::spec::Axis;
 
-use crate::limits::LENGTHS;
+use crate::limits::{ASSUMED_DENSITY, FLOATING_DENSITY, LENGTHS, TYPICAL_LENGTHS};
 use crate::scene::{Inertial, Joint, Link, Scene, Shape};
 use crate::shapes::scaled;
 use crate::solid::Piece;
 use crate::{Options, wheels};
 
-/// Units in which meshes are drawn: meters a unit, and the name.
-const UNITS: [(f64, &str); 4] =
-    [(1.0, "meters"), (1e-3, "millimeters"), (1e-2, "centimeters"), (0.0254, "inches")];
+/// A unit in which meshes are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// 1 m.
+    Meters,
+    /// 0.001 m.
+    Millimeters,
+    /// 0.01 m.
+    Centimeters,
+    /// 0.0254 m.
+    Inches,
+}
+
+impl Unit {
+    /// Every unit, the most frequent first: of those that fit alike the first is taken.
+    pub const ALL: [Self; 4] = [Self::Meters, Self::Millimeters, Self::Centimeters, Self::Inches];
+
+    /// Its length [m].
+    pub fn meters(self) -> f64 {
+        match self {
+            Self::Meters => 1.0,
+            Self::Millimeters => 1e-3,
+            Self::Centimeters => 1e-2,
+            Self::Inches => 0.0254,
+        }
+    }
+
+    /// The word of the option.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Meters => "m",
+            Self::Millimeters => "mm",
+            Self::Centimeters => "cm",
+            Self::Inches => "in",
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Meters => "meters",
+            Self::Millimeters => "millimeters",
+            Self::Centimeters => "centimeters",
+            Self::Inches => "inches",
+        }
+    }
+}
 
 /// Axes or a size that make no vehicle.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlaceError {
     /// Forward and up along one line.
-    #[error("--forward {forward:?} and --up {up:?} lie along one line: name two different axes")]
+    #[error("--forward {} and --up {} lie along one line: name two different axes", axis_name(*.forward), axis_name(*.up))]
     Axes {
         /// The one.
         forward: Axis,
@@ -34,8 +78,8 @@ pub enum PlaceError {
     },
     /// A size that no vehicle has.
     #[error(
-        "the longest edge is {length:.6} m{}, and vehicles have {} to {} m; state the unit of the file: --scale 0.001 for millimeters, 1 for meters",
-        if *is_stated { "" } else { " in the file's unit" }, LENGTHS[0], LENGTHS[1]
+        "the longest edge is {length:.6} {}, and vehicles have {} to {} m; state the unit of the files: --unit mm, cm, in or m, or --scale with the meters of another",
+        if *is_stated { "m" } else { "in the files' unit" }, LENGTHS[0], LENGTHS[1]
     )]
     Size {
         /// The longest edge.
@@ -61,7 +105,7 @@ impl Placement {
         scene: &Scene,
         pieces: &[Piece],
         options: &Options,
-        notes: &mut Vec<String>,
+        (notes, warnings): (&mut Vec<String>, &mut Vec<String>),
     ) -> Result<Self, PlaceError> {
         let stated = options.forward.is_some() || options.up.is_some();
         let is_open = !stated && !scene.convention.is_metric;
@@ -69,9 +113,11 @@ impl Placement {
         let (forward, up) = guess.map_or((scene.convention.forward, scene.convention.up), |(axes, _)| axes);
         let (forward, up) = (options.forward.unwrap_or(forward), options.up.unwrap_or(up));
         let rotation = rotation(forward, up).ok_or(PlaceError::Axes { forward, up })?;
-        let bounds = Bounds::around(pieces.iter().flat_map(|piece| &piece.mesh.vertices));
-        let length = bounds.ok_or(PlaceError::Empty)?.extent().max();
-        let scale = scale(scene, options, length, notes)?;
+        let drawn = Drawn::of(pieces).ok_or(PlaceError::Empty)?;
+        let scale = match options.scale.or(scene.convention.is_metric.then_some(1.0)) {
+            Some(scale) => drawn.checked(scale)?,
+            None => drawn.guessed(options.mass, notes, warnings)?.meters(),
+        };
         let by = match (stated, guess) {
             (true, _) => "as stated".to_owned(),
             (false, Some((_, wheels))) => {
@@ -153,26 +199,88 @@ fn rotation(forward: Axis, up: Axis) -> Option<UnitQuaternion<f64>> {
     (left.norm() > 0.5).then(|| UnitQuaternion::from_matrix(&Matrix3::from_rows(&rows)))
 }
 
-/// Meters a unit of the file.
-fn scale(scene: &Scene, options: &Options, length: f64, notes: &mut Vec<String>) -> Result<f64, PlaceError> {
-    let is_usual = |length: f64| (LENGTHS[0]..=LENGTHS[1]).contains(&length);
-    let stated = options.scale.or(scene.convention.is_metric.then_some(1.0));
-    if let Some(scale) = stated {
+/// Sizes of what the files hold, in their unit.
+#[derive(Debug, Clone, Copy)]
+struct Drawn {
+    /// Longest edge of the box around all.
+    length: f64,
+    /// Sum over the pieces, of open ones as far as they have one, at most that of the box.
+    volume: f64,
+}
+
+impl Drawn {
+    fn of(pieces: &[Piece]) -> Option<Self> {
+        let bounds = Bounds::around(pieces.iter().flat_map(|piece| &piece.mesh.vertices))?;
+        let sum: f64 = pieces.iter().map(|piece| piece.mesh.volume().abs()).sum();
+        Some(Self { length: bounds.extent().max(), volume: sum.min(bounds.extent().product()) })
+    }
+
+    /// A scale that is stated.
+    fn checked(&self, scale: f64) -> Result<f64, PlaceError> {
         if !(scale > 0.0 && scale.is_finite()) {
             return Err(PlaceError::Scale { scale });
         }
-        if !is_usual(length * scale) {
-            return Err(PlaceError::Size { length: length * scale, is_stated: true });
-        }
-        return Ok(scale);
+        let length = self.length * scale;
+        if is_usual_length(length) { Ok(scale) } else { Err(PlaceError::Size { length, is_stated: true }) }
     }
-    let fitting = UNITS.into_iter().find(|(scale, _)| is_usual(length * scale));
-    let (scale, unit) = fitting.ok_or(PlaceError::Size { length, is_stated: false })?;
-    notes.push(format!(
-        "unit: {unit}, guessed by size: the longest edge of {length:.4} is {:.4} m; --scale changes it",
-        length * scale
-    ));
-    Ok(scale)
+
+    /// The unit in which the mass floats, or else the one of a usual size; the warning names the others that would do.
+    fn guessed(
+        &self,
+        mass: Option<f64>,
+        notes: &mut Vec<String>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Unit, PlaceError> {
+        let fits: Vec<Unit> =
+            Unit::ALL.into_iter().filter(|unit| is_usual_length(self.length * unit.meters())).collect();
+        let mass = mass.filter(|mass| *mass > 0.0 && mass.is_finite() && self.volume > 0.0);
+        let floating = mass.map_or_else(Vec::new, |mass| self.floating(&fits, mass));
+        let (unit, others, by) = match floating.first() {
+            Some(unit) => (*unit, &floating, "by size and mass"),
+            None => (self.of_usual_size(&fits)?, &fits, "by size"),
+        };
+        let length = |unit: Unit| format!("{:.4} m in {}", self.length * unit.meters(), unit.words());
+        notes.push(format!(
+            "unit: {}, guessed {by}: the longest edge of {:.4} is {}; --unit or --scale changes it",
+            unit.words(),
+            self.length,
+            length(unit)
+        ));
+        let others: Vec<String> =
+            others.iter().filter(|other| **other != unit).map(|unit| length(*unit)).collect();
+        if !others.is_empty() {
+            let way_out = match (mass, floating.is_empty()) {
+                (None, _) => ", or the mass with --mass KG".to_owned(),
+                (Some(mass), true) => format!("; in none of them {mass} kg float"),
+                (Some(_), false) => String::new(),
+            };
+            warnings.push(format!(
+                "no file states its unit: {} are taken, so that the longest edge is {}; it would be {}; state the unit with --unit {}{way_out}",
+                unit.words(),
+                length(unit),
+                others.join(", "),
+                Unit::ALL.map(Unit::name).join("|")
+            ));
+        }
+        Ok(unit)
+    }
+
+    /// The units in which the vehicle floats with its deck dry, the one first whose density is nearest to the usual one.
+    fn floating(&self, fits: &[Unit], mass: f64) -> Vec<Unit> {
+        let density = |unit: &Unit| mass / (self.volume * unit.meters().powi(3));
+        let floats = |unit: &Unit| (FLOATING_DENSITY[0]..FLOATING_DENSITY[1]).contains(&density(unit));
+        let distance = |unit: &Unit| (density(unit) / ASSUMED_DENSITY).ln().abs();
+        let mut floating: Vec<Unit> = fits.iter().copied().filter(floats).collect();
+        floating.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        floating
+    }
+
+    fn of_usual_size(&self, fits: &[Unit]) -> Result<Unit, PlaceError> {
+        let is_typical =
+            |unit: &&Unit| (TYPICAL_LENGTHS[0]..=TYPICAL_LENGTHS[1]).contains(&(self.length * unit.meters()));
+        let unit = fits.iter().find(is_typical).or(fits.first()).copied();
+        unit.ok_or(PlaceError::Size { length: self.length, is_stated: false })
+    }
 }
 
 fn direction(axis: Axis) -> Vec3 {

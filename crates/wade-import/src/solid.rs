@@ -9,9 +9,9 @@ use manifold_rust::types::{Error, MeshGLP, PolyVert, WindingRule};
 use wade_core::caught::caught;
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::{Bounds, Mesh};
-use wade_core::geometry::parts::{Hole, holes, parts};
+use wade_core::geometry::parts::{Hole, find, holes, parts};
 use wade_core::geometry::seal::seal;
-use wade_core::geometry::tidy::{tidy, turned};
+use wade_core::geometry::tidy::{tidy, turned, weld_tolerance, welded};
 use wade_core::geometry::watertight::{hull_share, is_closed};
 
 use crate::limits::{HOLLOW_SHARE, LEAST_VOLUME_SHARE, MOST_UNION_SECONDS};
@@ -122,15 +122,15 @@ pub fn choose(scene: &Scene, shapes: Shapes, warnings: &mut Vec<String>) -> Vec<
                 true => format!("`{}`", link.name),
                 false => format!("link `{}`, {}", link.name, shape.source),
             };
-            pieces.push(Piece { link: index, source, mesh: shape.mesh.clone(), wheel: None });
+            pieces.push(Piece { link: index, source, mesh: shape.mesh, wheel: None });
         }
     }
     pieces
 }
 
-fn of_link<'a>(link: &'a Link, shapes: Shapes, warnings: &mut Vec<String>) -> Vec<&'a Shape> {
-    let of = |role: Role| -> Vec<&Shape> {
-        link.shapes.iter().filter(|shape| shape.role == role || shape.role == Role::Both).collect()
+fn of_link(link: &Link, shapes: Shapes, warnings: &mut Vec<String>) -> Vec<Shape> {
+    let of = |role: Role| {
+        joined(link.shapes.iter().filter(|shape| shape.role == role || shape.role == Role::Both).collect())
     };
     let (visual, collision) = (of(Role::Visual), of(Role::Collision));
     match shapes {
@@ -149,6 +149,43 @@ fn of_link<'a>(link: &'a Link, shapes: Shapes, warnings: &mut Vec<String>) -> Ve
             _ => visual,
         },
     }
+}
+
+/// Shapes, those that are open as one where their edges meet: exporters write a file for each material.
+fn joined(shapes: Vec<&Shape>) -> Vec<Shape> {
+    let meshes: Vec<&Mesh> = shapes.iter().map(|shape| &shape.mesh).collect();
+    let whole = |group: Vec<usize>| {
+        let mut whole = shapes[group[0]].clone();
+        for other in &group[1..] {
+            whole.mesh.append(meshes[*other]);
+            whole.source = format!("{}, {}", whole.source, shapes[*other].source);
+        }
+        whole
+    };
+    that_meet(&meshes).into_iter().map(whole).collect()
+}
+
+/// Indices of open meshes that have an edge in common, each group in their order; a closed mesh is by itself.
+pub fn that_meet(meshes: &[&Mesh]) -> Vec<Vec<usize>> {
+    let mut root: Vec<usize> = (0..meshes.len()).collect();
+    let (mut all, mut of_face) = (Mesh::default(), Vec::new());
+    // one alone meets no other
+    for (index, mesh) in meshes.iter().enumerate().filter(|_| meshes.len() > 1) {
+        if !is_closed(&tidy((*mesh).clone()).0) {
+            all.append(mesh);
+            of_face.resize(all.faces.len(), index);
+        }
+    }
+    let (all, _) = welded(&all, weld_tolerance(&all));
+    for face_group in parts(&all) {
+        for face in &face_group {
+            let (a, b) = (find(&mut root, of_face[face_group[0]]), find(&mut root, of_face[*face]));
+            root[a.max(b)] = a.min(b);
+        }
+    }
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    (0..meshes.len()).for_each(|mesh| groups.entry(find(&mut root, mesh)).or_default().push(mesh));
+    groups.into_values().collect()
 }
 
 /// Makes a piece a closed mesh with its faces outward.
@@ -214,7 +251,7 @@ fn outward(
         Some(Ok(None)) => {}
         Some(Ok(Some(repaired))) if repaired.volume() > least => mesh = repaired,
         Some(Err(Error::Cancelled)) => return Err(SolidError::Slow { source_name, faces: mesh.faces.len() }),
-        Some(Err(fault)) => return Err(crossing(format!("{fault:?}"))),
+        Some(Err(fault)) => return Err(crossing(fault_in_words(fault).to_owned())),
         Some(Ok(Some(_))) => return Err(crossing("nothing is left of it".to_owned())),
         None => return Err(crossing("the repair failed".to_owned())),
     }
@@ -229,6 +266,17 @@ fn outward(
     }
     piece.mesh = mesh;
     Ok(())
+}
+
+/// What the library of the union says, in words.
+pub fn fault_in_words(fault: Error) -> &'static str {
+    match fault {
+        Error::NonFiniteVertex => "a coordinate is not a finite number",
+        Error::NotManifold | Error::NotClosed => "it has edges without two faces that agree",
+        Error::ResultTooLarge => "the result is too large",
+        Error::Cancelled => "it takes too long",
+        _ => "the library of the union refuses the mesh",
+    }
 }
 
 /// The mesh without faces that cross each other or lie in its inside; none where it has none.

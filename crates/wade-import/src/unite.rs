@@ -10,7 +10,7 @@ use wade_core::geometry::watertight::is_closed;
 
 use crate::at;
 use crate::limits::{MOST_UNION_SECONDS, REPORTED_CAVITY, REPORTED_OVERLAP_SHARE};
-use crate::solid::{Piece, encloses, from_exchange, to_exchange};
+use crate::solid::{Piece, encloses, fault_in_words, from_exchange, to_exchange};
 use crate::watch::Watch;
 
 /// The hull of all shapes.
@@ -129,7 +129,13 @@ fn union_of(
                 return Err(UniteError::Slow { source_name, faces: sum.num_tri() + other.num_tri() });
             }
             _ if is_sound(&union) => sum = union,
-            fault => return Err(UniteError::Failed { source_name, fault: format!("{fault:?}") }),
+            Error::NoError => {
+                let fault = "the volume of the result is not between those of its parts".to_owned();
+                return Err(UniteError::Failed { source_name, fault });
+            }
+            fault => {
+                return Err(UniteError::Failed { source_name, fault: fault_in_words(fault).to_owned() });
+            }
         }
     }
     let (mesh, ids) = from_exchange(&sum.get_mesh_glp(0));

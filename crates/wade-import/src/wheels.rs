@@ -214,7 +214,9 @@ fn across(axis: &Vec3) -> (Vec3, Vec3) {
 }
 
 fn direction(axis: &Vec3) -> String {
-    format!("({:.2}, {:.2}, {:.2})", axis.x + 0.0, axis.y + 0.0, axis.z + 0.0)
+    // a rounded zero has no sign
+    let [x, y, z] = [axis.x, axis.y, axis.z].map(|c| (c * 100.0).round() / 100.0 + 0.0);
+    format!("({x:.2}, {y:.2}, {z:.2})")
 }
 
 /// Number of parts that look like wheels in the axes of the body.

@@ -9,7 +9,7 @@ use wade_core::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
 use wade_core::model::{COLUMNS, Jacobian};
 use wade_core::physics::Physics;
 use wade_core::served::ServedVehicle;
-use wade_core::vehicle::{MAX_WHEELS, PerWheel, Surface, SurfaceKind};
+use wade_core::vehicle::{MAX_WHEELS, PerWheel, Surface};
 
 use super::evaluator::Evaluated;
 use super::proto::{self, state::Attitude};
@@ -476,17 +476,9 @@ fn box_ranges(file: &EffectsFile) -> Vec<proto::BoxRange> {
 }
 
 fn surface(surface: &Surface) -> proto::Surface {
-    let kind = match surface.kind {
-        SurfaceKind::Bottom => "bottom",
-        SurfaceKind::Front => "front",
-        SurfaceKind::Rear => "rear",
-        SurfaceKind::Side => "side",
-        SurfaceKind::Wheel => "wheel",
-        SurfaceKind::Track => "track",
-    };
     proto::Surface {
         name: surface.name.clone(),
-        kind: kind.into(),
+        kind: surface.kind.name().into(),
         centroid_m: Some(vector3(&surface.centroid)),
         normal: Some(vector3(&surface.normal)),
         area_m2: surface.area,

@@ -130,11 +130,14 @@ pub fn succeed(directory: &Path, bundle: Bundle) -> Result<u32, BundleError> {
 /// place a bundle gets the number after its own `version`. Gives the new versions.
 pub fn succeed_together(bundles: Vec<(PathBuf, Bundle)>) -> Result<Vec<u32>, BundleError> {
     // in one order, so that two writers do not wait for each other
-    let mut folders: Vec<&PathBuf> = bundles.iter().map(|(directory, _)| directory).collect();
+    let mut folders: Vec<PathBuf> = bundles.iter().map(|(directory, _)| directory.clone()).collect();
     folders.sort();
     folders.dedup();
-    let _locks: Vec<lock::Lock> =
-        folders.into_iter().map(|folder| lock::exclusive(folder)).collect::<Result<_, _>>()?;
+    let folders: Vec<&Path> = folders.iter().map(PathBuf::as_path).collect();
+    lock::exclusively(&folders, || succeed_locked(bundles))
+}
+
+fn succeed_locked(bundles: Vec<(PathBuf, Bundle)>) -> Result<Vec<u32>, BundleError> {
     let mut staged: Vec<Next> = Vec::new();
     for (directory, bundle) in bundles {
         let next = Next::stage(&directory, bundle);
@@ -202,7 +205,10 @@ impl Next {
 /// Puts a kept version in its place again, and keeps the one that is there: by default the newest before it that was not
 /// taken back. Gives the version that is in place now.
 pub fn roll_back(directory: &Path, to: Option<u32>) -> Result<u32, BundleError> {
-    let _lock = lock::exclusive(directory)?;
+    lock::exclusively(&[directory], || roll_back_locked(directory, to))
+}
+
+fn roll_back_locked(directory: &Path, to: Option<u32>) -> Result<u32, BundleError> {
     let current = if directory.exists() { Some(version_in(directory)?) } else { None };
     let version =
         choice(directory, current, to)?.ok_or(Fault::NotKept { asked: to }).map_err(At::path(directory))?;
@@ -213,11 +219,12 @@ pub fn roll_back(directory: &Path, to: Option<u32>) -> Result<u32, BundleError> 
         return Err(At::path(&kept)(Fault::KeptVersion { found: bundle.version }));
     }
     let staged = staging_of(directory, &bundle.vehicle.name);
-    copy_folder(&kept, &staged).map_err(|error| At::path(&staged)(error.into()))?;
-    match current {
-        Some(current) => put(&staged, directory, current)?,
-        None => place::place(&staged, directory).map_err(|error| At::path(directory)(error.into()))?,
-    }
+    let copied = copy_folder(&kept, &staged).map_err(|error| At::path(&staged)(error.into()));
+    let placed = copied.and_then(|()| match current {
+        Some(current) => put(&staged, directory, current),
+        None => place::place(&staged, directory).map_err(|error| At::path(directory)(error.into())),
+    });
+    placed.inspect_err(|_| drop(fs::remove_dir_all(&staged)))?;
     mark(directory, version)?;
     Ok(version)
 }
@@ -240,7 +247,10 @@ pub(super) fn choice(
 
 /// Takes the bundle out of its folder, to the versions, so that what stands behind it, version `behind`, is served again.
 pub(super) fn withdraw(directory: &Path, behind: u32) -> Result<(), BundleError> {
-    let _lock = lock::exclusive(directory)?;
+    lock::exclusively(&[directory], || withdraw_locked(directory, behind))
+}
+
+fn withdraw_locked(directory: &Path, behind: u32) -> Result<(), BundleError> {
     let kept = place_of(directory, version_in(directory)?);
     let withdraw = || {
         let _ = fs::remove_dir_all(&kept);
@@ -296,6 +306,8 @@ fn put(staged: &Path, directory: &Path, before: u32) -> Result<(), BundleError> 
     };
     move_all().map_err(|fault| {
         let _ = fs::remove_dir_all(staged);
+        // fails of folders that hold something
+        kept.ancestors().skip(1).take(2).take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
         At::path(&kept)(fault)
     })
 }

@@ -1,10 +1,12 @@
 //! One writer of a bundle at a time, and no reader in the middle of a write.
 //!
-//! The lock is a file beside the bundle, `.<name>.lock`, which stays: a lock whose file is removed protects nobody. The
-//! system gives it back when its process ends, however that ends.
+//! The lock is a file beside the bundle, `.<name>.lock`, which stays once a bundle is written: readers look for it. A write that
+//! fails takes away the file that it made, and who waited for that file makes the next one. The system gives the lock back
+//! when its process ends, however that ends.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -20,7 +22,31 @@ const ATTEMPTS: u32 = 2000;
 /// Held until it is dropped.
 #[derive(Debug)]
 pub struct Lock {
-    _file: File,
+    file: File,
+    path: PathBuf,
+    /// True where the file was not there before.
+    is_new: bool,
+    /// Folders that were made for it, the innermost first.
+    folders: Vec<PathBuf>,
+}
+
+impl Lock {
+    /// Gives the lock back and takes away what was made for it.
+    fn abandon(self) {
+        if self.is_new {
+            // still locked: who waits for it sees that the file is no longer there
+            let _ = fs::remove_file(&self.path);
+        }
+        // fails of a folder that others have filled since
+        self.folders.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
+    }
+
+    /// False of a file that its former holder took away, or that was made anew.
+    fn is_in_place(&self) -> io::Result<bool> {
+        let identity = |metadata: Metadata| (metadata.dev(), metadata.ino());
+        let own = identity(self.file.metadata()?);
+        Ok(fs::metadata(&self.path).is_ok_and(|metadata| identity(metadata) == own))
+    }
 }
 
 fn path_of(directory: &Path) -> PathBuf {
@@ -28,31 +54,71 @@ fn path_of(directory: &Path) -> PathBuf {
     directory.with_file_name(format!(".{name}.lock"))
 }
 
+/// Does work on bundles that no other writer or reader looks at. Work that fails leaves no lock where there was none.
+pub fn exclusively<T>(
+    directories: &[&Path],
+    work: impl FnOnce() -> Result<T, BundleError>,
+) -> Result<T, BundleError> {
+    let mut locks = Vec::new();
+    let locked =
+        directories.iter().try_for_each(|directory| exclusive(directory).map(|lock| locks.push(lock)));
+    let done = locked.and_then(|()| work());
+    if done.is_err() {
+        locks.into_iter().for_each(Lock::abandon);
+    }
+    done
+}
+
 /// Waits for other writers and readers of a bundle, and keeps them out.
-pub fn exclusive(directory: &Path) -> Result<Lock, BundleError> {
+fn exclusive(directory: &Path) -> Result<Lock, BundleError> {
     let path = path_of(directory);
-    let lock = || {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path)?;
-        if !wait(|| file.try_lock())? {
+    let lock = || loop {
+        let mut lock = open(&path)?;
+        if !wait(|| lock.file.try_lock())? {
             let by = fs::read_to_string(&path).unwrap_or_default();
             return Err(Fault::Locked { by: by.trim().to_owned() });
         }
-        // for whoever waits in vain
-        file.set_len(0)?;
-        writeln!(file, "process {}", std::process::id())?;
-        Ok(Lock { _file: file })
+        if lock.is_in_place()? {
+            // for whoever waits in vain
+            lock.file.set_len(0)?;
+            writeln!(lock.file, "process {}", std::process::id())?;
+            return Ok(lock);
+        }
     };
     lock().map_err(At::path(&path))
 }
 
-/// Waits for a writer of a bundle, and keeps writers out. `None` where there never was one, or where it takes too long.
-pub fn shared(directory: &Path) -> Option<Lock> {
+fn open(path: &Path) -> io::Result<Lock> {
+    let folders = missing_folders(path);
+    let made = path.parent().map_or(Ok(()), fs::create_dir_all);
+    let options = || OpenOptions::new().read(true).write(true).clone();
+    let opened = made.and_then(|()| match options().create_new(true).open(path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            Ok((options().create(true).truncate(false).open(path)?, false))
+        }
+        created => Ok((created?, true)),
+    });
+    match opened {
+        Ok((file, is_new)) => Ok(Lock { file, path: path.to_owned(), is_new, folders }),
+        Err(error) => {
+            folders.iter().for_each(|folder| drop(fs::remove_dir(folder)));
+            Err(error)
+        }
+    }
+}
+
+/// The folders above a file that are not there, the innermost first.
+fn missing_folders(path: &Path) -> Vec<PathBuf> {
+    let above = path.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty());
+    above.take_while(|folder| !folder.exists()).map(Path::to_owned).collect()
+}
+
+/// Waits for a writer of a bundle, and keeps writers out until the file is dropped. `None` where there never was one, or where
+/// it takes too long.
+pub fn shared(directory: &Path) -> Option<File> {
     let file = File::open(path_of(directory)).ok()?;
     let locked = wait(|| file.try_lock_shared()).unwrap_or(false);
-    locked.then_some(Lock { _file: file })
+    locked.then_some(file)
 }
 
 fn wait(lock: impl Fn() -> Result<(), TryLockError>) -> io::Result<bool> {

@@ -321,12 +321,13 @@ pub fn check_place(directory: &Path, name: &str) -> Result<(), BundleError> {
 /// Writes a bundle beside its place and then puts it there, so that a reader sees the one before or this one. The one
 /// before is deleted.
 pub fn write(directory: &Path, bundle: &Bundle) -> Result<(), BundleError> {
-    let _lock = lock::exclusive(directory)?;
-    let staged = stage(directory, bundle)?;
-    place::place(&staged, directory).map_err(|error| At::path(directory)(error.into()))?;
-    // the one before
-    let _ = fs::remove_dir_all(staged);
-    Ok(())
+    lock::exclusively(&[directory], || {
+        let staged = stage(directory, bundle)?;
+        let placed = place::place(&staged, directory).map_err(|error| At::path(directory)(error.into()));
+        // the one before, or what could not be placed
+        let _ = fs::remove_dir_all(staged);
+        placed
+    })
 }
 
 /// Writes a bundle beside its place.
@@ -365,7 +366,10 @@ fn stage(directory: &Path, bundle: &Bundle) -> Result<PathBuf, BundleError> {
         files.iter().try_for_each(|(name, bytes)| place::write_synced(&staged.join(name), bytes))?;
         place::sync_folder(&staged)
     };
-    stage().map_err(|error| At::path(&staged)(error.into()))?;
+    stage().map_err(|error| {
+        let _ = fs::remove_dir_all(&staged);
+        At::path(&staged)(error.into())
+    })?;
     Ok(staged)
 }
 

@@ -1,5 +1,7 @@
 //! Hydrostatic pressure integrated exactly over the wet part of a hull.
 
+use nalgebra::Unit;
+
 use super::immersion::{WetTriangle, depth_moments, wet_triangles};
 use super::mesh::Mesh;
 use super::surfaces::Hull;
@@ -38,15 +40,27 @@ pub fn hydrostatics(mesh: &Mesh, plane: &WaterPlane, density: f64, about: &Vec3)
 /// Depth at which a level hull of `mass` [kg] floats in fresh water [m]; the height of the hull where it sinks.
 pub fn float_depth(mesh: &Mesh, z0: f64, mass: f64) -> f64 {
     let top = mesh.bounds().map_or(z0, |bounds| bounds.max.z);
-    let (mut sinks, mut floats) = (0.0, top - z0);
+    depth_that_carries(mesh, mass, top - z0, |depth| WaterPlane::level(z0, depth))
+}
+
+/// Water plane across `up` on which a hull of `mass` [kg] floats in fresh water; over its highest corner where it sinks.
+pub fn float_plane(mesh: &Mesh, up: Unit<Vec3>, mass: f64) -> WaterPlane {
+    let heights = || mesh.vertices.iter().map(|vertex| up.dot(vertex));
+    let (lowest, highest) =
+        (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+    let plane = |depth: f64| WaterPlane { normal: up, offset: lowest + depth };
+    plane(depth_that_carries(mesh, mass, highest - lowest, plane))
+}
+
+fn depth_that_carries(mesh: &Mesh, mass: f64, most: f64, plane: impl Fn(f64) -> WaterPlane) -> f64 {
+    let (mut sinks, mut floats) = (0.0, most);
     // the displaced volume grows with depth: bisection to a micrometer, or as far as numbers go
     while floats - sinks > 1e-6 {
         let depth = 0.5 * (sinks + floats);
         if depth <= sinks || depth >= floats {
             break;
         }
-        let displaced =
-            hydrostatics(mesh, &WaterPlane::level(z0, depth), FRESH_WATER, &Vec3::zeros()).displaced_volume;
+        let displaced = hydrostatics(mesh, &plane(depth), FRESH_WATER, &Vec3::zeros()).displaced_volume;
         if displaced * FRESH_WATER < mass { sinks = depth } else { floats = depth }
     }
     floats

@@ -35,12 +35,13 @@ pub fn parts(mesh: &Mesh) -> Vec<Vec<usize>> {
     parts
 }
 
-fn find(root: &mut [usize], mut face: usize) -> usize {
-    while root[face] != face {
-        root[face] = root[root[face]];
-        face = root[face];
+/// First member of the set that a member belongs to, by the member that each one points to.
+pub fn find(root: &mut [usize], mut member: usize) -> usize {
+    while root[member] != member {
+        root[member] = root[root[member]];
+        member = root[member];
     }
-    face
+    member
 }
 
 /// The undirected edges of a face, and whether the face runs along each from the smaller index to the larger.

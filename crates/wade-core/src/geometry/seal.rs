@@ -38,7 +38,8 @@ impl fmt::Display for Sealing {
                 said.push(format!("parts {}: {what}", list(parts)));
             }
         }
-        let volumes = (self.volume_before * 1e3, self.volume_after * 1e3);
+        // inside out it is negative
+        let volumes = (self.volume_before.abs() * 1e3, self.volume_after * 1e3);
         write!(f, "{}; volume {:.3} l before, {:.3} l after", said.join("; "), volumes.0, volumes.1)
     }
 }

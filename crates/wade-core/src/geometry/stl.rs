@@ -11,6 +11,11 @@ pub const MAX_FACES: usize = 2_000_000;
 const HEADER: usize = 84;
 const RECORD: usize = 50;
 
+const SOLID: &[u8] = b"solid";
+
+/// What some Windows programs begin a text with.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Why an STL file was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StlError {
@@ -60,11 +65,14 @@ pub enum StlError {
 /// Reads a binary or ASCII STL in the file's own frame and unit; corners that are equal in f32 become one vertex.
 ///
 /// Stored normals are ignored: the winding decides. Faces without area are kept, since a mesh may need them to be closed;
-/// `tidy` drops those that it does not need.
+/// `tidy` drops those that it does not need. A binary file may begin with `solid`, as its length tells what it is.
 pub fn read_stl(bytes: &[u8]) -> Result<Mesh, StlError> {
     let is_binary =
         declared_faces(bytes).is_some_and(|n| n.checked_mul(RECORD) == Some(bytes.len() - HEADER));
-    if !is_binary && bytes.trim_ascii_start().starts_with(b"solid") {
+    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes).trim_ascii_start();
+    let is_ascii = text.get(..SOLID.len()).is_some_and(|word| word.eq_ignore_ascii_case(SOLID));
+    // the face count of a binary header has a zero byte, and text has none: a damaged binary file is refused as one
+    if !is_binary && is_ascii && !bytes.iter().take(HEADER).any(|byte| *byte == 0) {
         return read_ascii(bytes);
     }
     read_binary(bytes)
@@ -94,39 +102,69 @@ fn read_binary(bytes: &[u8]) -> Result<Mesh, StlError> {
 }
 
 fn read_ascii(bytes: &[u8]) -> Result<Mesh, StlError> {
-    let text = String::from_utf8_lossy(bytes);
-    let (mut welder, mut corners, mut count, mut last, mut closed) =
-        (Welder::default(), [[0f32; 3]; 3], 0, 0, false);
+    let text = String::from_utf8_lossy(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes));
+    let mut reader = AsciiReader::default();
+    let mut last = 0;
     for (index, line) in text.lines().enumerate() {
-        let fail = |expected| StlError::Grammar { line: index + 1, expected };
-        let mut words = line.split_ascii_whitespace();
-        let Some(keyword) = words.next() else {
-            continue;
-        };
-        last = index + 1;
-        closed = keyword == "endsolid";
+        // old programs end lines with a bare carriage return
+        for part in line.split('\r') {
+            let mut words = part.split_ascii_whitespace();
+            while let Some(word) = words.next() {
+                last = index + 1;
+                reader.read(&word.to_ascii_lowercase(), &mut words, last)?;
+            }
+        }
+    }
+    if reader.is_ended {
+        reader.welder.finish()
+    } else {
+        Err(StlError::Grammar { line: last, expected: "`endsolid`: the file ends early" })
+    }
+}
+
+/// Where the reader of an ASCII file is.
+#[derive(Default)]
+struct AsciiReader {
+    welder: Welder,
+    corners: [[f32; 3]; 3],
+    count: usize,
+    is_ended: bool,
+}
+
+impl AsciiReader {
+    /// Takes a keyword in lower case and what belongs to it.
+    fn read<'a>(
+        &mut self,
+        keyword: &str,
+        words: &mut impl Iterator<Item = &'a str>,
+        line: usize,
+    ) -> Result<(), StlError> {
+        let fail = |expected| StlError::Grammar { line, expected };
+        self.is_ended = keyword == "endsolid";
         match keyword {
-            "solid" | "facet" | "endfacet" | "endsolid" => {}
-            "outer" => count = 0,
+            // the rest of the line is a name
+            "solid" | "endsolid" => words.for_each(drop),
+            "normal" => words.take(3).for_each(drop),
+            "facet" | "endfacet" | "loop" => {}
+            "outer" => {
+                words.next();
+                self.count = 0;
+            }
             "vertex" => {
-                let corner = corners.get_mut(count).ok_or(fail("three corners a facet"))?;
+                let corner = self.corners.get_mut(self.count).ok_or(fail("three corners a facet"))?;
                 for value in corner.iter_mut() {
                     *value = words
                         .next()
-                        .and_then(|w| w.parse().ok())
+                        .and_then(|word| word.parse().ok())
                         .ok_or(fail("three numbers after `vertex`"))?;
                 }
-                count += 1;
+                self.count += 1;
             }
-            "endloop" if count == 3 => welder.push(corners)?,
+            "endloop" if self.count == 3 => self.welder.push(self.corners)?,
             "endloop" => return Err(fail("three corners a facet")),
             _ => return Err(fail("an STL keyword")),
         }
-    }
-    if closed {
-        welder.finish()
-    } else {
-        Err(StlError::Grammar { line: last, expected: "`endsolid`: the file ends early" })
+        Ok(())
     }
 }
 

@@ -51,6 +51,18 @@ pub enum SurfaceKind {
 }
 
 impl SurfaceKind {
+    /// Its name in files and reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bottom => "bottom",
+            Self::Front => "front",
+            Self::Rear => "rear",
+            Self::Side => "side",
+            Self::Wheel => "wheel",
+            Self::Track => "track",
+        }
+    }
+
     /// True of what has a shaft whose speed can be stated.
     pub fn turns(self) -> bool {
         matches!(self, Self::Wheel | Self::Track)

@@ -1,11 +1,14 @@
 //! Is a vehicle of a size, a mass and a trim that vehicles have? Its wrong unit is a plausible number to everything else.
 
+use std::f64::consts::PI;
 use std::fmt;
+
+use nalgebra::{Unit, UnitQuaternion};
 
 use super::Vehicle;
 use crate::condition::FRESH_WATER;
 use crate::frame::{Vec3, WaterPlane};
-use crate::geometry::hydrostatics::{float_depth, hydrostatics};
+use crate::geometry::hydrostatics::{float_depth, float_plane, hydrostatics};
 use crate::geometry::mesh::Bounds;
 
 /// Shortest longest edge of a vehicle [m]: a toy.
@@ -13,6 +16,9 @@ pub const LEAST_LENGTH: f64 = 0.02;
 
 /// Longest edge of a vehicle [m]: a mining truck.
 pub const MOST_LENGTH: f64 = 20.0;
+
+/// Share by which a length may miss a bound: what f32 leaves of an edge of 2 cm that stands 10 m from the origin.
+const LENGTH_ROUNDING: f64 = 1e-4;
 
 /// Mass over displaced volume below which a body would rise in air [kg/m3]: air at 15 C.
 pub const LEAST_DENSITY: f64 = 1.225;
@@ -22,6 +28,9 @@ pub const MOST_DENSITY: f64 = 22_590.0;
 
 /// Mass over displaced volume of vehicles as they are built [kg/m3]: rigid foam to solid steel.
 const USUAL_DENSITY: [f64; 2] = [20.0, 7_850.0];
+
+/// Largest angle afloat up to which the righting moment is taken as linear [rad]: the error is of the order of its square.
+const LINEAR_TRIM: f64 = 0.1;
 
 /// Angle between the keel and the water afloat above which the center of mass is questioned [rad]: 10 degrees.
 const MOST_TRIM: f64 = 0.175;
@@ -56,8 +65,9 @@ pub fn check_size(mass: f64, bounds: &Bounds, volume: f64) -> Result<(), Implaus
     Ok(())
 }
 
-fn is_usual_length(length: f64) -> bool {
-    (LEAST_LENGTH..=MOST_LENGTH).contains(&length)
+/// True of the longest edge of a vehicle [m], both bounds included.
+pub fn is_usual_length(length: f64) -> bool {
+    (LEAST_LENGTH * (1.0 - LENGTH_ROUNDING)..=MOST_LENGTH * (1.0 + LENGTH_ROUNDING)).contains(&length)
 }
 
 /// The unit that would make a length usual.
@@ -76,9 +86,9 @@ pub struct Floating {
     pub displaced_volume: f64,
     /// Depth at which it floats level [m]; `None` where it sinks.
     pub depth: Option<f64>,
-    /// Angle by which the nose goes down afloat, to first order [rad]; `None` where it sinks or has no stable trim.
+    /// Angle by which the nose goes down afloat, in (-pi, pi] [rad]; `None` where it sinks or has no stable trim.
     pub pitch: Option<f64>,
-    /// Angle by which the right side goes down afloat, to first order [rad]; `None` where it sinks or capsizes.
+    /// Angle by which the right side goes down afloat, in (-pi, pi] [rad]; `None` where it sinks or capsizes.
     pub roll: Option<f64>,
 }
 
@@ -106,7 +116,7 @@ impl Floating {
 }
 
 /// Angle of equilibrium about an axis of the body, from the righting moment about the center of mass level and a
-/// thousandth of a radian over [rad].
+/// thousandth of a radian over [rad]; `None` where it capsizes.
 fn trim(vehicle: &Vehicle, depth: f64, axis: Vec3) -> Option<f64> {
     const STEP: f64 = 1e-3;
     let moment = |angle: f64| {
@@ -119,7 +129,40 @@ fn trim(vehicle: &Vehicle, depth: f64, axis: Vec3) -> Option<f64> {
     };
     let (level, over, under) = (moment(0.0), moment(STEP), moment(-STEP));
     let stiffness = (under - over) / (2.0 * STEP);
-    (stiffness > 0.0).then(|| level / stiffness)
+    (stiffness > 0.0).then(|| level / stiffness).map(|first_order| match first_order.abs() <= LINEAR_TRIM {
+        true => first_order,
+        false => large_trim(vehicle, axis, first_order.signum()),
+    })
+}
+
+/// The first stable angle about an axis of the body beyond the level position, in (-pi, pi] [rad]: steps to where the
+/// moment changes its sign, then bisection. The displaced volume is that of the mass at every angle.
+fn large_trim(vehicle: &Vehicle, axis: Vec3, direction: f64) -> f64 {
+    const STEP: f64 = PI / 36.0;
+    const BISECTIONS: u32 = 16;
+    let drives_on = |angle: f64| {
+        let turn = UnitQuaternion::from_axis_angle(&Unit::new_normalize(axis), -angle * direction);
+        let plane = float_plane(&vehicle.hull.mesh, turn * Vec3::z_axis(), vehicle.mass);
+        let still = hydrostatics(&vehicle.hull.mesh, &plane, FRESH_WATER, &vehicle.center_of_mass);
+        still.wrench.moment.dot(&axis) * direction > 0.0
+    };
+    let mut on = 0.0;
+    while on < 2.0 * PI && drives_on(on + STEP) {
+        on += STEP;
+    }
+    let mut back = on + STEP;
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (on + back);
+        if drives_on(middle) { on = middle } else { back = middle }
+    }
+    let angle = on * direction;
+    if angle > PI {
+        angle - 2.0 * PI
+    } else if angle <= -PI {
+        angle + 2.0 * PI
+    } else {
+        angle
+    }
 }
 
 /// The water plane across `up` through the point of the level one above the center of flotation, which keeps the

@@ -19,16 +19,25 @@ use crate::limits::{MOST_DEPTH, MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
 /// The parts of a file, a node each.
 pub fn load(path: &Path) -> Result<Vec<Part>, ReadError> {
     // the library looks up what a file names without asking whether it is there
-    let damaged =
-        |what| Err(ReadError::GltfContent { path: path.to_owned(), what: format!("damaged: {what}") });
-    caught(|| decode(path)).unwrap_or_else(damaged)
+    let what = "damaged: it refers to data that are not there; export the file again".to_owned();
+    caught(|| decode(path)).unwrap_or_else(|_| Err(ReadError::GltfContent { path: path.to_owned(), what }))
 }
 
 fn decode(path: &Path) -> Result<Vec<Part>, ReadError> {
-    let Gltf { document, blob } = Gltf::from_slice(&bytes(path, MOST_MESH_BYTES)?)
-        .map_err(|fault| ReadError::Gltf { path: path.to_owned(), fault })?;
-    let buffers = buffers(path, &document, blob)?;
+    let damaged = |fault| ReadError::Gltf { path: path.to_owned(), fault };
     let content = |what: String| ReadError::GltfContent { path: path.to_owned(), what };
+    let Gltf { document, blob } =
+        Gltf::from_slice_without_validation(&bytes(path, MOST_MESH_BYTES)?).map_err(damaged)?;
+    let mut json = document.into_json();
+    // the library refuses every extension that it does not know, also those of how a surface looks
+    let required = std::mem::take(&mut json.extensions_required);
+    if let Some(name) = required.iter().find(|name| !is_of_looks(name)) {
+        return Err(content(format!(
+            "requires the extension {name}, which is not read: export it without compression, quantization and instances"
+        )));
+    }
+    let document = Document::from_json(json).map_err(damaged)?;
+    let buffers = buffers(path, &document, blob)?;
     check_views(&document, &buffers).map_err(content)?;
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let roots: Vec<Node<'_>> = match &scene {
@@ -73,6 +82,11 @@ fn decode(path: &Path) -> Result<Vec<Part>, ReadError> {
         open.extend(node.children().map(|child| (child, transform, depth + 1)));
     }
     Ok(parts)
+}
+
+/// True of an extension of materials, textures and lights, which change no shape.
+fn is_of_looks(extension: &str) -> bool {
+    ["_materials_", "_texture_", "_lights_"].iter().any(|word| extension.contains(word))
 }
 
 /// Points and lines have none.

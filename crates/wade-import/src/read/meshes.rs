@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use nalgebra::Isometry3;
 use wade_core::frame::Vec3;
 use wade_core::geometry::mesh::{Mesh, read_stl};
-use wade_core::geometry::parts::parts;
+use wade_core::geometry::parts::parts as connected_faces;
 use wade_core::geometry::tidy::{weld_tolerance, welded};
 
-use super::{Kind, ReadError, bytes, collada, gltf};
+use super::{Kind, ReadError, bytes, collada, gltf, without_mark};
 use crate::file_name;
 use crate::limits::{MOST_FACES, MOST_LINKS, MOST_MESH_BYTES};
 use crate::scene::{Convention, Joint, Link, Role, Scene, Shape};
-use crate::solid::encloses;
+use crate::solid::{encloses, that_meet};
 
 /// A named part of a mesh file, in the frame of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +60,9 @@ fn check(path: &Path, part: &Part) -> Result<(), ReadError> {
 }
 
 fn obj(path: &Path) -> Result<Vec<Part>, ReadError> {
-    let mut reader = Cursor::new(bytes(path, MOST_MESH_BYTES)?);
+    let bytes = bytes(path, MOST_MESH_BYTES)?;
+    let text = without_mark(&bytes);
+    let mut reader = Cursor::new(text);
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -68,13 +70,32 @@ fn obj(path: &Path) -> Result<Vec<Part>, ReadError> {
         ..Default::default()
     };
     let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default()))
-        .map_err(|fault| ReadError::Obj { path: path.to_owned(), fault })?;
+        .map_err(|fault| ReadError::Obj { path: path.to_owned(), line: damaged_line(text), fault })?;
     let part = |model: tobj::Model| {
         let vertices = model.mesh.positions.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect();
         let faces = model.mesh.indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
         Part { name: model.name, mesh: Mesh { vertices, faces } }
     };
     Ok(models.into_iter().map(part).filter(|part| !part.mesh.faces.is_empty()).collect())
+}
+
+/// The first line, from 1, with a corner that is not three numbers or a face whose corner is none of the file.
+fn damaged_line(bytes: &[u8]) -> Option<usize> {
+    let text = String::from_utf8_lossy(bytes);
+    let corners = text.lines().filter(|line| line.split_ascii_whitespace().next() == Some("v")).count();
+    let is_corner = |word: &str| {
+        let index = word.split('/').next().and_then(|index| index.parse::<i64>().ok());
+        index.is_some_and(|index| index != 0 && index.unsigned_abs() <= corners as u64)
+    };
+    let is_damaged = |line: &str| {
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => words.by_ref().take(3).filter(|word| word.parse::<f64>().is_ok()).count() < 3,
+            Some("f") => !words.all(is_corner),
+            _ => false,
+        }
+    };
+    text.lines().position(is_damaged).map(|before| before + 1)
 }
 
 /// The triangles of a strip: each corner makes one with the two before it, every other one the other way round.
@@ -94,10 +115,10 @@ pub fn fan(corners: &[u32]) -> Vec<[u32; 3]> {
 
 /// A vehicle of meshes alone: a link for each connected part, so that wheels can be recognized by their form.
 pub fn scene(files: &[PathBuf], kinds: &[Kind]) -> Result<Scene, ReadError> {
-    let mut links = Vec::new();
+    let (mut links, mut notes) = (Vec::new(), Vec::new());
     let mut faces = 0;
     for path in files {
-        for part in load(path)? {
+        for part in joined(path, load(path)?, &mut notes) {
             faces += part.mesh.faces.len();
             if faces > MOST_FACES {
                 return Err(ReadError::Faces { path: path.clone(), faces });
@@ -128,8 +149,31 @@ pub fn scene(files: &[PathBuf], kinds: &[Kind]) -> Result<Scene, ReadError> {
         warnings
             .push("glTF and other meshes are mixed: all are taken to have the same axes and unit".to_owned());
     }
-    let notes = vec![format!("{} connected parts in {} files", links.len(), files.len())];
+    notes.push(format!("{} connected parts in {} files", links.len(), files.len()));
     Ok(Scene { links, convention, notes, warnings })
+}
+
+/// The parts of a file, those that are open as one where their edges meet: a group or a material for each face or each side of
+/// a hull splits a solid into pieces of which none is closed.
+fn joined(path: &Path, parts: Vec<Part>, notes: &mut Vec<String>) -> Vec<Part> {
+    let meshes: Vec<&Mesh> = parts.iter().map(|part| &part.mesh).collect();
+    let groups = that_meet(&meshes);
+    let several: Vec<usize> = groups.iter().map(Vec::len).filter(|pieces| *pieces > 1).collect();
+    if several.is_empty() {
+        return parts;
+    }
+    notes.push(format!(
+        "{}: {} groups that are open alone are joined where their edges meet; parts made of them: {}",
+        file_name(path),
+        several.iter().sum::<usize>(),
+        several.len()
+    ));
+    let whole = |group: &Vec<usize>| {
+        let mut whole = Part { name: parts[group[0]].name.clone(), mesh: Mesh::default() };
+        group.iter().for_each(|piece| whole.mesh.append(&parts[*piece].mesh));
+        whole
+    };
+    groups.iter().map(whole).collect()
 }
 
 /// The connected parts of a mesh, its corners joined first: the copies of a corner that a format writes for each face
@@ -138,7 +182,7 @@ fn connected(mesh: &Mesh) -> Vec<Mesh> {
     let (mesh, _) = welded(mesh, weld_tolerance(mesh));
     let solid = |face: &[u32; 3]| face[0] != face[1] && face[1] != face[2] && face[2] != face[0];
     let mesh = Mesh { faces: mesh.faces.iter().copied().filter(solid).collect(), vertices: mesh.vertices };
-    let shells: Vec<Mesh> = parts(&mesh).iter().map(|faces| mesh.part(faces)).collect();
+    let shells: Vec<Mesh> = connected_faces(&mesh).iter().map(|faces| mesh.part(faces)).collect();
     // an inward shell is the cavity of the smallest one around it, or inside out
     let around = |index: usize| {
         let is_around = |other: &usize| *other != index && encloses(&shells[*other], &shells[index]);

@@ -106,6 +106,8 @@ struct Reader<'a, 'input> {
     driven: HashSet<&'a str>,
     mesh_folder: &'a str,
     is_degrees: bool,
+    /// True where a range is a limit without saying so.
+    has_autolimits: bool,
     euler: &'a str,
     /// What looks wrong.
     warnings: Vec<String>,
@@ -135,6 +137,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             driven: actuators.filter_map(|actuator| actuator.attribute("joint")).collect(),
             mesh_folder: setting("meshdir").or(setting("assetdir")).unwrap_or_default(),
             is_degrees: setting("angle") != Some("radian"),
+            has_autolimits: setting("autolimits") != Some("false"),
             euler: setting("eulerseq").unwrap_or("xyz"),
             warnings: Vec::new(),
         })
@@ -245,19 +248,12 @@ impl<'a, 'input> Reader<'a, 'input> {
         pose: &Isometry3<f64>,
     ) -> Result<Joint, ReadError> {
         let joints = self.children(body, "joint", pose, class)?;
-        let [Placed { element: joint, above: pose, class }] = joints[..] else {
+        // of several the last one turns the shapes, those before it steer or spring
+        let turning = joints.iter().rfind(|joint| self.turns_without_limit(joint));
+        let Some(&Placed { element: joint, above: pose, class }) = turning else {
             return Ok(if joints.is_empty() { Joint::Fixed } else { Joint::Other });
         };
         let name = joint.attribute("name").unwrap_or_default();
-        let is_limited = match self.attribute(joint, class, "limited") {
-            Some("true") => true,
-            Some("false") => false,
-            _ => self.attribute(joint, class, "range").is_some(),
-        };
-        let is_hinge = self.attribute(joint, class, "type").unwrap_or("hinge") == "hinge";
-        if !is_hinge || (is_limited && !self.driven.contains(name)) {
-            return Ok(Joint::Other);
-        }
         let axis = Vec3::from(self.vector(joint, class, "axis")?.unwrap_or([0.0, 0.0, 1.0]));
         let Some(unit) = axis.try_normalize(1e-9) else {
             return Err(joint.fault("has an axis of length zero".to_owned()));
@@ -265,6 +261,17 @@ impl<'a, 'input> Reader<'a, 'input> {
         let at = Vec3::from(self.vector(joint, class, "pos")?.unwrap_or([0.0; 3]));
         let origin = (pose * nalgebra::Point3::from(at)).coords;
         Ok(Joint::Turning { name: name.to_owned(), axis: pose.rotation * unit, origin })
+    }
+
+    fn turns_without_limit(&self, joint: &Placed<'a, 'input>) -> bool {
+        let attribute = |name| self.attribute(joint.element, joint.class, name);
+        let is_limited = match attribute("limited") {
+            Some("true") => true,
+            Some("false") => false,
+            _ => self.has_autolimits && attribute("range").is_some(),
+        };
+        let is_driven = self.driven.contains(joint.element.attribute("name").unwrap_or_default());
+        attribute("type").unwrap_or("hinge") == "hinge" && (!is_limited || is_driven)
     }
 
     /// Position and attitude of an element in its parent.
@@ -280,9 +287,6 @@ impl<'a, 'input> Reader<'a, 'input> {
     ) -> Result<UnitQuaternion<f64>, ReadError> {
         let angle = |value: f64| if self.is_degrees { value.to_radians() } else { value };
         let no_direction = || element.fault("has a direction of length zero".to_owned());
-        if let Some([w, x, y, z]) = self.vector(element, class, "quat")? {
-            return UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9).ok_or_else(no_direction);
-        }
         if let Some([x, y, z, turn]) = self.vector(element, class, "axisangle")? {
             let axis = nalgebra::Unit::try_new(Vec3::new(x, y, z), 1e-9).ok_or_else(no_direction)?;
             return Ok(UnitQuaternion::from_axis_angle(&axis, angle(turn)));
@@ -303,7 +307,11 @@ impl<'a, 'input> Reader<'a, 'input> {
         if let Some(z) = self.vector::<3>(element, class, "zaxis")? {
             return Ok(towards(&Vec3::from(z)));
         }
-        Ok(UnitQuaternion::identity())
+        // last: in MuJoCo the other forms replace a quaternion, which may be that of the defaults
+        let Some([w, x, y, z]) = self.vector(element, class, "quat")? else {
+            return Ok(UnitQuaternion::identity());
+        };
+        UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9).ok_or_else(no_direction)
     }
 
     /// Small letters turn about the axes that moved, capitals about those that stand.

@@ -68,8 +68,8 @@ pub enum ReadError {
     #[error("{}: {fault}", .path.display())]
     Stl { path: PathBuf, fault: StlError },
     /// A damaged OBJ.
-    #[error("{}: {fault}", .path.display())]
-    Obj { path: PathBuf, fault: tobj::LoadError },
+    #[error("{}{}: {fault}", .path.display(), line.map_or_else(String::new, |line| format!(", line {line}")))]
+    Obj { path: PathBuf, line: Option<usize>, fault: tobj::LoadError },
     /// A damaged glTF.
     #[error("{}: {fault}", .path.display())]
     Gltf { path: PathBuf, fault: ::gltf::Error },
@@ -193,6 +193,21 @@ fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, ReadError> {
     Ok(bytes)
 }
 
+/// The text of a description in UTF-8, or in UTF-16 where it begins with the mark of its byte order.
 fn text(path: &Path) -> Result<String, ReadError> {
-    Ok(String::from_utf8_lossy(&bytes(path, MOST_DESCRIPTION_BYTES)?).into_owned())
+    let bytes = bytes(path, MOST_DESCRIPTION_BYTES)?;
+    let wide = |unit: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes.chunks_exact(2).skip(1).map(|pair| unit([pair[0], pair[1]])).collect();
+        String::from_utf16_lossy(&units)
+    };
+    Ok(match bytes[..] {
+        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
+        _ => String::from_utf8_lossy(without_mark(&bytes)).into_owned(),
+    })
+}
+
+/// Bytes of UTF-8 without the mark that some programs begin a text with.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }

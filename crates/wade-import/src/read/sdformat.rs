@@ -167,10 +167,11 @@ fn joint(element: Element<'_, '_>, frames: &Frames<'_, '_>) -> Result<Joint, Rea
     if kind == "fixed" {
         return Ok(Joint::Fixed);
     }
-    let axis = element.child("axis");
+    // the first axis of two steers
+    let axis = element.child(if kind == "revolute2" { "axis2" } else { "axis" });
     let is_turning = match kind {
         "continuous" => true,
-        "revolute" => axis.map_or(Ok(true), turns_without_limit)?,
+        "revolute" | "revolute2" => axis.map_or(Ok(true), turns_without_limit)?,
         _ => false,
     };
     if !is_turning {

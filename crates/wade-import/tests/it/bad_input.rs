@@ -146,10 +146,10 @@ fn inverted_hulls_are_turned_and_it_is_said() {
 #[test]
 fn sizes_that_no_vehicle_has_are_refused_with_the_unit() {
     let body = link("base", "", "<box size=\"300 200 100\"/>");
-    of_text("r.urdf", urdf(&body), &["the longest edge is 300", "0.02 to 20 m", "--scale 0.001"]);
+    of_text("r.urdf", urdf(&body), &["the longest edge is 300", "0.02 to 20 m", "--unit mm"]);
     let folder = Folder::new();
     let file = folder.write("hull.stl", stl(&block([50_000.0, 10.0, 10.0])));
-    refused(&[file], Options::default(), &["in the file's unit", "--scale"]);
+    refused(&[file], Options::default(), &["in the files' unit", "--unit"]);
 }
 
 #[test]
@@ -235,4 +235,26 @@ fn no_mesh_that_crosses_itself_makes_the_import_panic() {
     }
     println!("{made} made, {refusals} refused");
     assert!(made > 30, "{made} of 60");
+}
+
+#[test]
+fn messages_hold_words_of_the_options_and_no_names_of_the_program() {
+    use wade_core::vehicle::spec::Axis;
+    let folder = Folder::new();
+    let file = folder.write("hull.stl", stl(&block([0.2, 0.1, 0.1])));
+    let options = Options { forward: Some(Axis::PlusX), up: Some(Axis::MinusX), ..Options::default() };
+    refused(&[file], options, &["--forward x and --up -x lie along one line"]);
+    // the index of a position beyond its buffer, where the library panics
+    let damaged =
+        crate::write::gltf(&[("a", block([0.1; 3]), "")]).replace("\"POSITION\":0", "\"POSITION\":9");
+    of_text("r.gltf", damaged, &["r.gltf"]);
+    // and so that it stays: no message is made of a debug form
+    let sources = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for entry in [sources.clone(), sources.join("read")].iter().flat_map(|at| std::fs::read_dir(at).unwrap())
+    {
+        let path = entry.unwrap().path();
+        let text = if path.is_file() { std::fs::read_to_string(&path).unwrap() } else { String::new() };
+        let program = text.split("#[cfg(test)]").next().unwrap();
+        assert!(!program.contains(":?}"), "{}", path.display());
+    }
 }

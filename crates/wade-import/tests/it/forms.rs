@@ -297,3 +297,145 @@ fn an_sdf_names_one_part_of_a_file_and_turns_wheels_about_axes_of_its_model() {
     let said = import(&[folder.write("robot.sdf", model("boat"))], sixty()).unwrap_err().to_string();
     assert!(said.contains("`boat`") && said.contains("hull, trailer"), "{said}");
 }
+
+/// An ASCII STL as this exporter writes it: its keywords, its line ends and what stands before each line.
+fn ascii_stl(mesh: &Mesh, upper: bool, end: &str, indent: &str) -> String {
+    let word = |text: &str| if upper { text.to_uppercase() } else { text.to_owned() };
+    let corner = |v: &nalgebra::Vector3<f64>| {
+        format!("{indent}{indent}{}\t{:e} {:e}\t{:e}{end}", word("vertex"), v.x, v.y, v.z)
+    };
+    let facet = |face: usize| {
+        let corners: String = mesh.triangle(face).iter().map(corner).collect();
+        let (begin, ends) = (word("facet normal 0 0 0"), word("endloop"));
+        let outer = word("outer loop");
+        format!(
+            "{indent}{begin}{end}{indent}{outer}{end}{corners}{indent}{ends}{end}{}{end}",
+            word("endfacet")
+        )
+    };
+    let facets: String = (0..mesh.faces.len()).map(facet).collect();
+    format!("{} Hull of mine{end}{facets}{}{end}", word("solid"), word("endsolid Hull of mine"))
+}
+
+#[test]
+fn an_stl_is_read_whatever_its_capitals_line_ends_tabs_and_first_bytes_are() {
+    let hull = block(HALF);
+    let mut forms = Vec::new();
+    for upper in [false, true] {
+        for (end, indent) in [("\n", "  "), ("\r\n", "\t"), ("\r", " "), (" ", "")] {
+            let text = ascii_stl(&hull, upper, end, indent);
+            // the rest of the first line is the name, so a file of one line cannot be one
+            let text = if end == " " { text.replacen("mine ", "mine\n", 1) } else { text };
+            forms.extend([text.clone(), format!("\u{feff}{text}"), format!("\n\t{text}\n\n")]);
+        }
+    }
+    let folder = Folder::new();
+    for text in forms {
+        assert_volume(&import(&[folder.write("HULL.STL", &text)], sixty()).unwrap(), VOLUME);
+    }
+    // binary, whatever its header says
+    for header in [&b"solid hull"[..], b"SOLID hull\r\nfacet normal", b"\xef\xbb\xbfsolid"] {
+        let mut bytes = stl(&hull);
+        bytes[..80].fill(b' ');
+        bytes[..header.len()].copy_from_slice(header);
+        assert_volume(&import(&[folder.write("hull.stl", &bytes)], sixty()).unwrap(), VOLUME);
+        bytes.pop();
+        let said = import(&[folder.write("hull.stl", &bytes)], sixty()).unwrap_err().to_string();
+        let declared = format!("declares {} faces", hull.faces.len());
+        assert!(said.contains(&declared) && said.contains("truncated"), "{said}");
+    }
+}
+
+#[test]
+fn both_ends_of_the_sizes_that_are_promised_are_imported() {
+    let cube = |edge: f64, offset: f64| {
+        urdf(&link(
+            "base",
+            &format!("xyz=\"{offset} 0 0\""),
+            &format!("<box size=\"{edge} {edge} {edge}\"/>"),
+        ))
+    };
+    for (edge, offset) in [(0.02, 0.0), (0.02, 10.1), (20.0, 0.0), (20.0, 0.3)] {
+        assert_volume(&of_text("robot.urdf", &cube(edge, offset)), edge.powi(3));
+        let mesh = moved([0.5 * edge; 3], &at(offset, 0.0, 0.0));
+        for (drawn, scale) in [(1.0, 1.0), (1e3, 1e-3), (1.0 / 0.0254, 0.0254)] {
+            let mesh = placed(&mesh, &Isometry3::identity(), drawn);
+            let imported = of_stl(&mesh, Options { scale: Some(scale), mass: None, ..sixty() });
+            let volume = imported.floating.displaced_volume;
+            assert!((volume / edge.powi(3) - 1.0).abs() < 1e-3, "{volume} {edge}");
+        }
+    }
+    for edge in [0.0199, 20.1] {
+        assert!(refusal("robot.urdf", &cube(edge, 0.0)).contains("0.02 to 20 m"));
+    }
+}
+
+/// An OBJ in which a word begins a group of faces, by number; the corners stand there once, or once more for each group.
+fn grouped_obj(mesh: &Mesh, word: &str, is_shared: bool, group_of: impl Fn(usize) -> usize) -> String {
+    let corners = |mesh: &Mesh| -> String {
+        mesh.vertices.iter().map(|v| format!("v {} {} {}\r\n", v.x, v.y, v.z)).collect()
+    };
+    let groups = (0..mesh.faces.len()).map(&group_of).max().unwrap() + 1;
+    let mut text = if is_shared { corners(mesh) } else { String::new() };
+    for group in 0..groups {
+        let faces = (0..mesh.faces.len()).filter(|face| group_of(*face) == group).collect::<Vec<_>>();
+        let own = if is_shared { mesh.clone() } else { mesh.part(&faces) };
+        let listed = if is_shared { faces } else { (0..own.faces.len()).collect() };
+        text += &format!("{word} piece_{group}\r\n");
+        if !is_shared {
+            text += &corners(&own);
+        }
+        for face in listed {
+            // from the last corner back
+            let [a, b, c] = own.faces[face].map(|corner| i64::from(corner) - own.vertices.len() as i64);
+            text += &format!("f {a} {b} {c}\r\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn groups_of_an_obj_that_are_closed_together_alone_are_one_solid() {
+    let hull = block(HALF);
+    let folder = Folder::new();
+    for word in ["o", "g", "usemtl"] {
+        for is_shared in [true, false] {
+            // a group for each face, two open halves, and two with no order in them
+            let ways: [&dyn Fn(usize) -> usize; 3] =
+                [&|face| face, &|face| usize::from(face >= hull.faces.len() / 2), &|face| face * 7 % 5];
+            for group_of in ways {
+                let text = grouped_obj(&hull, word, is_shared, group_of);
+                let imported = import(&[folder.write("hull.obj", text)], sixty()).unwrap();
+                assert_volume(&imported, VOLUME);
+                // a material begins no group
+                let is_said =
+                    imported.notes.iter().any(|note| note.contains("joined where their edges meet"));
+                assert!(is_said || word == "usemtl", "{:?}", imported.notes);
+            }
+        }
+    }
+    // wheels with a group for each facet stay wheels, the hull one part
+    let wheel = |x: f64, y: f64| {
+        let pose = Isometry3::new([x, y, -0.15].into(), [std::f64::consts::FRAC_PI_2, 0.0, 0.0].into());
+        placed(&crate::write::ring(0.02, 0.12, 0.04, 48), &pose, 1.0)
+    };
+    let wheels = [wheel(0.3, 0.4), wheel(0.3, -0.4), wheel(-0.3, 0.4), wheel(-0.3, -0.4)];
+    let rover = with(&hull, &wheels);
+    let text = grouped_obj(&rover, "g", false, |face| face);
+    let imported = import(&[folder.write("rover.obj", text)], sixty()).unwrap();
+    assert_eq!(imported.wheels.len(), 4);
+    let ring =
+        48.0 / 2.0 * (std::f64::consts::TAU / 48.0).sin() * (0.12_f64.powi(2) - 0.02_f64.powi(2)) * 0.08;
+    assert_volume(&imported, VOLUME + 4.0 * ring);
+    // a hole stays a hole, once and for the whole
+    let mut open = hull.clone();
+    open.faces.pop();
+    let file = folder.write("open.obj", grouped_obj(&open, "g", false, |face| face));
+    let said = import(&[file], sixty()).unwrap_err().to_string();
+    assert!(said.contains("holes: 1;") && !said.contains("open too"), "{said}");
+    // a closed part beside open ones stays as it is
+    let parts = with(&hull, &[moved([0.1; 3], &at(0.0, 0.0, 0.25))]);
+    let text =
+        grouped_obj(&parts, "g", true, |face| if face < hull.faces.len() { face } else { hull.faces.len() });
+    assert_volume(&import(&[folder.write("parts.obj", text)], sixty()).unwrap(), VOLUME + 8e-3);
+}
