@@ -1,4 +1,4 @@
-//! What `trials.toml` states, held against the trials: a figure that somebody gave says how the data must look.
+//! What `trials.toml` states, compared with the trials: a figure that somebody gave says how the data must look.
 
 use super::GapError;
 use super::noise::{SLOWEST_SEEN, high_frequency};

@@ -41,7 +41,7 @@ impl Lock {
         self.folders.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
     }
 
-    /// False of a file that its former holder took away, or that was made anew.
+    /// False of a file that its former holder took away, or that was made again.
     fn is_in_place(&self) -> io::Result<bool> {
         let identity = |metadata: Metadata| (metadata.dev(), metadata.ino());
         let own = identity(self.file.metadata()?);

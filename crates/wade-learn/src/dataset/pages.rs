@@ -1,4 +1,4 @@
-//! What the pages of a Parquet file claim, held against the bytes that are there: the reader of Parquet makes room for
+//! What the pages of a Parquet file claim, compared with the bytes that are there: the reader of Parquet makes room for
 //! the claim first and looks afterwards.
 
 use std::fs::File;
