@@ -138,6 +138,23 @@ fn bad_input_names_the_file_and_writes_nothing() {
     let message = case("millimeters", &|path| edit(path, 6, &|cells| cells[1] = "2500".into()));
     assert!(message.contains(csv) && message.contains("row 6, column x"), "{message}");
     let message = case("jump", &|path| edit(path, 30, &|cells| cells[1] = "90".into()));
+    assert!(
+        message.contains(csv) && message.contains("t = 0.225 s to 0.234 s it moves by 91.848 m"),
+        "{message}"
+    );
+    // what the recording itself does not show, its trial does
+    let message = case("deep", &|path| {
+        let count = std::fs::read_to_string(path.join(csv)).expect("readable").lines().count();
+        let lower = |cells: &mut Vec<String>| {
+            let z: f64 = cells[3].parse().expect("a number");
+            cells[3] = (z - 30.0).to_string();
+        };
+        (2..=count).for_each(|row| edit(path, row, &lower));
+        let described = path.join("recordings.toml");
+        let text = std::fs::read_to_string(&described).expect("readable");
+        let unmeasured: Vec<&str> = text.lines().filter(|line| !line.starts_with("depth_m")).collect();
+        std::fs::write(described, unmeasured.join("\n")).expect("written");
+    });
     assert!(message.contains(csv) && message.contains("after resampling to 111 Hz"), "{message}");
     let message = case("short", &|path| {
         let text = std::fs::read_to_string(path.join(csv)).expect("readable");
