@@ -402,7 +402,7 @@ fn describe(file: &Path, html: Option<&Path>, as_json: bool, vehicles: &Vehicles
     let kind = |vehicle: &str, surface: &str| {
         let vehicle = known.get(&vehicle.to_owned())?;
         let kind = vehicle.surfaces[vehicle.surface_index(surface)?].kind;
-        Some(format!("{kind:?}").to_lowercase())
+        Some(kind.name().to_owned())
     };
     let summary = Summary::of(&data, &kind);
     if let Some(written) = written {

@@ -1,7 +1,7 @@
 //! What `trials.toml` states, compared with the trials: a figure that somebody gave says how the data must look.
 
 use super::GapError;
-use super::noise::{SLOWEST_SEEN, high_frequency};
+use super::noise::{SLOWEST_SEEN, groups, high_frequency};
 use super::series::Series;
 use super::statistics::SEEN_OF_SLOW_NOISE;
 use wade_core::effects::Body;
@@ -44,9 +44,7 @@ pub(super) fn check(
             return Err(GapError::WheelUnit { radius, wheel: body.wheel_radius, unit });
         }
     }
-    for group in &manifest.measured.repeats {
-        let group: Vec<&Series> =
-            group.iter().filter_map(|name| all.iter().find(|series| series.name == *name)).collect();
+    for group in groups(all, manifest) {
         let Some((first, others)) = group.split_first() else { continue };
         for other in others {
             let Some([apart, speed]) = difference(first, other) else { continue };

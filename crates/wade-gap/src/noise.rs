@@ -180,14 +180,18 @@ pub(super) fn floors_of(
     own
 }
 
+/// The trials of each list of trials that repeat each other.
+pub(super) fn groups<'a>(all: &'a [Series], manifest: &'a Manifest) -> impl Iterator<Item = Vec<&'a Series>> {
+    let of = |name: &String| all.iter().find(|series| series.name == *name);
+    manifest.measured.repeats.iter().map(move |group| group.iter().filter_map(of).collect())
+}
+
 /// Noise of trials that repeat each other over its high-frequency part in these trials, as a ratio of standard deviations: the
 /// median over pairs of half the variance of their difference, at the same time since their start, over that part. A ratio,
 /// since the repeated trials may be quieter or louder than the others.
 fn repeats(all: &[Series], manifest: &Manifest, component: usize) -> Option<f64> {
     let mut ratios = Vec::new();
-    for group in &manifest.measured.repeats {
-        let group: Vec<&Series> =
-            group.iter().filter_map(|name| all.iter().find(|series| series.name == *name)).collect();
+    for group in groups(all, manifest) {
         for (index, a) in group.iter().enumerate() {
             for b in &group[index + 1..] {
                 let fast = 0.5 * (sample_noise(a, component).powi(2) + sample_noise(b, component).powi(2));

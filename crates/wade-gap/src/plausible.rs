@@ -156,11 +156,14 @@ impl<'a> Channel<'a> {
         })
     }
 
+    /// True of one recorded value: a gap is a difference, and adding the prediction to it again leaves an error of rounding.
+    fn is_same(&self, a: f64, b: f64) -> bool {
+        (a - b).abs() <= 1e-9 * self.size.max(a.abs())
+    }
+
     /// Refuses a channel that keeps one value from some sample on while what is expected goes on.
     fn check_live(&self, place: String, pairs: &[Pair], times: &[f64]) -> Result<(), GapError> {
-        // a gap is a difference: adding the prediction to it again leaves an error of rounding
-        let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * self.size.max(a.abs());
-        for run in chunks(pairs, |a, b| near(a[0], b[0])) {
+        for run in chunks(pairs, |a, b| self.is_same(a[0], b[0])) {
             let spread = spread(&pairs[run.clone()]);
             if run.len() >= ENOUGH && self.is_clear(spread) {
                 let (value, from, count) = (pairs[run.start][0], times[run.start], run.len());
@@ -199,10 +202,8 @@ impl<'a> Channel<'a> {
         }
         let (column, unit, place) = (self.column(), self.units().0, place.to_owned());
         let whole = spread(pairs);
-        // a gap is a difference: adding the prediction to it again leaves an error of rounding
         let first = pairs[0][0];
-        let near = 1e-9 * self.size.max(first.abs());
-        if pairs.iter().all(|[measured, _]| (measured - first).abs() <= near) && self.is_clear(whole) {
+        if pairs.iter().all(|[measured, _]| self.is_same(first, *measured)) && self.is_clear(whole) {
             return Err(GapError::Dead { place, column, value: first, spread: whole, unit });
         }
         if self.is_clear(whole) && is_mirrored(pairs) {

@@ -70,6 +70,11 @@ class Pose:
     #: Vector from the tracked point to the body origin, body frame [m].
     tracked_point_to_origin_m: Triple = (0.0, 0.0, 0.0)
 
+    @property
+    def is_conjugate(self) -> bool:
+        """True where the quaternion turns vectors of the world into the body."""
+        return self.quaternion_direction != DIRECTIONS[0]
+
 
 @dataclass(frozen=True)
 class Wrench:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .axes import matrix, rotations, turned
 from .errors import TrialsError
-from .mapping import DIRECTIONS, WRENCH, Body, Mapping, Pose, Processing, Trial
+from .mapping import WRENCH, Body, Mapping, Pose, Processing, Trial
 from .signal import body_rate, grid, pieces, resample, savitzky_golay, slerp, without_sign_flips
 from .source import Series
 from .units import UNITS, quantity_of
@@ -38,7 +38,7 @@ class Track:
         order = [0, 1, 2, 3] if pose.quaternion_order == "wxyz" else [3, 0, 1, 2]
         scale = UNITS["length"][pose.position_unit]
         quaternion = self.quaternion[:, order]
-        if pose.quaternion_direction != DIRECTIONS[0]:
+        if pose.is_conjugate:
             quaternion = quaternion * np.array([1.0, -1.0, -1.0, -1.0])
         return turned(self.position * scale, quaternion, pose.axes, pose.body_axes)
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from .axes import PRESETS, axes_text
 from .checks import Finding
-from .mapping import DIRECTIONS, WRENCH, Mapping
+from .mapping import WRENCH, Mapping
 
 
 def table(rows: Sequence[tuple[str, ...]], header: tuple[str, ...]) -> str:
@@ -49,7 +49,7 @@ def mapping_table(mapping: Mapping) -> str:
         fields = basis("pose.position", "pose.position_unit", "pose.axes")
         rows.append((together(pose.position), "vx vy vz, depth", pose.position_unit, axis(pose.axes), fields))
         turn = f"{axis(pose.body_axes)}, {' '.join(pose.quaternion_order)}"
-        turn += "" if pose.quaternion_direction == DIRECTIONS[0] else ", conjugate"
+        turn += ", conjugate" if pose.is_conjugate else ""
         fields = basis("pose.quaternion_order", "pose.quaternion_direction", "pose.body_axes", "pose.quaternion")
         rows.append((together(pose.quaternion), "wx wy wz, roll pitch yaw", "1", turn, fields))
         arm = "({}, {}, {}) m to the body origin".format(*pose.tracked_point_to_origin_m)

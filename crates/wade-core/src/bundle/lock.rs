@@ -91,10 +91,10 @@ fn exclusive(directory: &Path) -> Result<Lock, BundleError> {
 fn open(path: &Path) -> io::Result<Lock> {
     let folders = missing_folders(path);
     let made = path.parent().map_or(Ok(()), fs::create_dir_all);
-    let options = || OpenOptions::new().read(true).write(true).clone();
-    let opened = made.and_then(|()| match options().create_new(true).open(path) {
+    let opened = made.and_then(|()| match File::create_new(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            Ok((options().create(true).truncate(false).open(path)?, false))
+            let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
+            Ok((file, false))
         }
         created => Ok((created?, true)),
     });

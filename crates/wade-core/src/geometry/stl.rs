@@ -69,11 +69,12 @@ pub enum StlError {
 pub fn read_stl(bytes: &[u8]) -> Result<Mesh, StlError> {
     let is_binary =
         declared_faces(bytes).is_some_and(|n| n.checked_mul(RECORD) == Some(bytes.len() - HEADER));
-    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes).trim_ascii_start();
-    let is_ascii = text.get(..SOLID.len()).is_some_and(|word| word.eq_ignore_ascii_case(SOLID));
+    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let is_ascii =
+        text.trim_ascii_start().get(..SOLID.len()).is_some_and(|word| word.eq_ignore_ascii_case(SOLID));
     // the face count of a binary header has a zero byte, and text has none: a damaged binary file is refused as one
     if !is_binary && is_ascii && !bytes.iter().take(HEADER).any(|byte| *byte == 0) {
-        return read_ascii(bytes);
+        return read_ascii(text);
     }
     read_binary(bytes)
 }
@@ -102,7 +103,7 @@ fn read_binary(bytes: &[u8]) -> Result<Mesh, StlError> {
 }
 
 fn read_ascii(bytes: &[u8]) -> Result<Mesh, StlError> {
-    let text = String::from_utf8_lossy(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes));
+    let text = String::from_utf8_lossy(bytes);
     let mut reader = AsciiReader::default();
     let mut last = 0;
     for (index, line) in text.lines().enumerate() {

@@ -32,37 +32,27 @@ use spec::BodyFromStl;
 /// Most surfaces a vehicle may have.
 pub const MAX_SURFACES: usize = 64;
 
-/// What a surface is to the flow; the order of the first five is the one-hot order of the network's input.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SurfaceKind {
-    /// Faces down.
-    Bottom,
-    /// Faces forward.
-    Front,
-    /// Faces backward.
-    Rear,
-    /// Faces sideways.
-    Side,
-    /// A wheel.
-    Wheel,
-    /// A track: a belt that runs round about the body's y.
-    Track,
+crate::named_enum! {
+    /// What a surface is to the flow; the order of the first five is the one-hot order of the network's input.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum SurfaceKind {
+        /// Faces down.
+        Bottom => "bottom",
+        /// Faces forward.
+        Front => "front",
+        /// Faces backward.
+        Rear => "rear",
+        /// Faces sideways.
+        Side => "side",
+        /// A wheel.
+        Wheel => "wheel",
+        /// A track: a belt that runs round about the body's y.
+        Track => "track",
+    }
 }
 
 impl SurfaceKind {
-    /// Its name in files and reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Bottom => "bottom",
-            Self::Front => "front",
-            Self::Rear => "rear",
-            Self::Side => "side",
-            Self::Wheel => "wheel",
-            Self::Track => "track",
-        }
-    }
-
     /// True of what has a shaft whose speed can be stated.
     pub fn turns(self) -> bool {
         matches!(self, Self::Wheel | Self::Track)

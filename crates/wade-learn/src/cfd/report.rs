@@ -243,7 +243,7 @@ impl Report {
         let kinds: BTreeMap<String, String> = vehicle
             .surfaces
             .iter()
-            .map(|surface| (surface.name.clone(), format!("{:?}", surface.kind).to_lowercase()))
+            .map(|surface| (surface.name.clone(), surface.kind.name().to_owned()))
             .collect();
         let summary = Summary::of(&dataset, &|_, surface| kinds.get(surface).cloned());
         let title = format!("CFD campaign: {}", self.vehicle);

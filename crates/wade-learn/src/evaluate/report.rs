@@ -173,7 +173,7 @@ impl VehicleReport {
             mean_moment_nm: known.map(|moments| mean_magnitude(moments.iter())),
             models: heat.entries.iter().map(|entry| ModelReport::new(entry, &forces, &moments)).collect(),
             surfaces: groups(vehicle, heat, |surface| vehicle.surfaces[surface].name.clone()),
-            kinds: groups(vehicle, heat, |s| format!("{:?}", vehicle.surfaces[s].kind).to_lowercase()),
+            kinds: groups(vehicle, heat, |s| vehicle.surfaces[s].kind.name().to_owned()),
             slices: slices(heat, &forces),
             calibration: calibration(under_evaluation, &heat.states),
             paper: paper::of(&vehicle.name),

@@ -1,6 +1,6 @@
 //! Motion-capture recordings: the form on disk (`recording`), mistakes in their axes and units (`reading`), frames that
-//! tracking got wrong (`tracking`), how they become
-//! trials (`mocap`), and recordings that are generated after the source paper's table of trials (`generated`).
+//! tracking got wrong (`tracking`), how they become trials (`mocap`), and recordings that are
+//! generated after the source paper's table of trials (`generated`).
 
 pub mod generated;
 mod mocap;

@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 def check_clock(path: Path, channel: str, series: Series) -> None:
     """Refuses steps that look like another unit of time: no other check would mean anything."""
     steps = np.diff(series.t)
-    if np.mean(steps == 0) > limits.REPEATED_STAMPS:
+    repeated = np.mean(steps == 0)
+    if repeated > limits.REPEATED_STAMPS:
         later = steps[steps > 0]
-        message = f"{np.mean(steps == 0):.0%} of the samples of {channel} have the stamp of the one before"
+        message = f"{repeated:.0%} of the samples of {channel} have the stamp of the one before"
         if len(later):
             message += f", and the others come {np.median(later):g} s later"
         advice = "export stamps with fractions of a second, or the number of each frame and its rate_hz under [time]"

@@ -124,8 +124,7 @@ def _jumps(name: str, track: Track, pose: Pose, max_speed: float) -> list[Findin
 
 def _conjugate(track: Track, pose: Pose, trial: Trial, body: Body, max_speed: float, astray: float) -> Pose | None:
     """The pose with the other direction of the quaternion, where the vehicle then goes far straighter."""
-    way = next(way for way in DIRECTIONS if way != pose.quaternion_direction)
-    other = replace(pose, quaternion_direction=way)
+    other = replace(pose, quaternion_direction=DIRECTIONS[0 if pose.is_conjugate else 1])
     looks = figures(track, other, trial, body)
     goes_straight = looks.astray <= max(limits.ASTRAY, astray / 2)
     return other if goes_straight and not faults(looks, trial, max_speed) else None
