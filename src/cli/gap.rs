@@ -405,7 +405,7 @@ fn check_loss(
 }
 
 /// The model's answers with its uncertainty. What waves remember starts with each run.
-fn predictor(model: &Model, physics: Physics) -> impl FnMut(&Asked<'_>) -> Predicted {
+pub(super) fn predictor(model: &Model, physics: Physics) -> impl FnMut(&Asked<'_>) -> Predicted {
     let (mut workspace, mut forces) = (Workspace::new(), Forces::default());
     let mut memory = Memory::of_recording();
     move |asked| {

@@ -4,12 +4,16 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use wade_core::vehicle::shipped;
-use wade_gap::{Config, GapError, Predicted};
+use wade_core::condition::Condition;
+use wade_core::effects::Body;
+use wade_core::model::Model;
+use wade_core::physics::Physics;
+use wade_core::vehicle::{Vehicle, shipped};
+use wade_gap::{Asked, Config, GapError, Predicted};
 use wade_gap_bench::answer::Answer;
 use wade_gap_bench::baselines::Method;
 use wade_gap_bench::case::{Case, Family, cases};
@@ -18,12 +22,13 @@ use wade_gap_bench::motion;
 use wade_gap_bench::real::{falling_balls, kvlcc2, rm2_rotor};
 use wade_gap_bench::score::{Row, rows, table};
 use wade_gap_bench::{
-    Hull, Outcome, Prediction, Progress, Schedule, Setup, Simulator, Tool, ToolError, command_tool, folder,
-    run,
+    Hull, Modeled, Outcome, Prediction, Progress, Schedule, Setup, Simulator, Tool, ToolError, Wrench6,
+    command_tool, folder, run,
 };
 use wade_learn::trials::Trials;
 
-use super::emit;
+use super::gap::predictor;
+use super::{Vehicles, emit};
 
 /// Hide effects in generated trials; score what the workflow and plain regressions say of them
 #[derive(Debug, Args)]
@@ -32,6 +37,7 @@ use super::emit;
   wade gap bench --cases 69 --seed 1 --out bench/
   wade gap bench --cases 6 --families null,single --size slice --out bench/
   wade gap bench --cases 69 --only squat --no-baselines --keep --out bench/
+  wade gap bench --vehicle warthog --size slice --out bench/
   wade gap bench --motion --copies 5 --seed 1 --out bench/
   wade gap bench --tool 'mytool --trials {trials} --out {out}' --out bench/
   wade gap bench import kvlcc2 --from kvlcc2_roll_decay/ --out trials/
@@ -105,6 +111,11 @@ struct Bench {
     /// Families of cases [default: all but timing]
     #[arg(long, value_delimiter = ',')]
     families: Vec<FamilyName>,
+    /// A vehicle whose bundle predicts, with the error that it states, in place of a generated box without one
+    #[arg(long, value_name = "NAME", conflicts_with = "motion")]
+    vehicle: Option<String>,
+    #[command(flatten)]
+    vehicles: Vehicles,
     /// Only the cases whose name holds this
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
@@ -188,12 +199,36 @@ impl Bench {
         if self.motion {
             return self.run_motion(out);
         }
-        let hull = Hull::generated_box();
-        let simulator = Simulator { hull: &hull, prediction: Prediction::Analytic, vehicle: "generated-box" };
-        let warthog = shipped::warthog()?.vehicle()?;
+        let model = self.vehicle.as_deref().map(|name| self.vehicles.model(name)).transpose()?;
+        let Some(model) = &model else {
+            let hull = Hull::generated_box();
+            let prediction = Prediction::Analytic;
+            let simulator = Simulator { hull: &hull, prediction, vehicle: "generated-box" };
+            return self.run_on(out, &shipped::warthog()?.vehicle()?, simulator, &workflow);
+        };
+        let vehicle = model.vehicle();
+        let body = Body::of_vehicle(vehicle);
+        if !body.has_four_wheels() {
+            bail!("{}: the benchmark hides effects of four wheels, and the vehicle has others", vehicle.name);
+        }
+        let hull = Hull::of_vehicle(vehicle);
+        let answers = |run: &[wade_gap_bench::Asked]| modeled(model, run);
+        let workflow = |trials: &Trials| answer(trials, &body, &mut predictor(model, Physics::Full));
+        let prediction = Prediction::Model(&answers);
+        self.run_on(out, vehicle, Simulator { hull: &hull, prediction, vehicle: &vehicle.name }, &workflow)
+    }
+
+    /// All cases, in runs of the paper's schedule as a vehicle drives them.
+    fn run_on(
+        &self,
+        out: &Path,
+        driven: &Vehicle,
+        simulator: Simulator,
+        workflow: &Tool,
+    ) -> Result<ExitCode> {
         let schedule = match self.size {
-            Size::Full => Schedule::full(&warthog, self.seed),
-            Size::Slice => Schedule::slice(&warthog, self.seed),
+            Size::Full => Schedule::full(driven, self.seed),
+            Size::Slice => Schedule::slice(driven, self.seed),
         };
         let mut cases = cases(&self.families(), self.cases, self.seed);
         if let Some(text) = &self.only {
@@ -206,7 +241,7 @@ impl Bench {
                     .with_context(|| place.display().to_string())?;
             }
         }
-        let outcomes = self.outcomes(&cases, &schedule, simulator);
+        let outcomes = self.outcomes(&cases, &schedule, simulator, workflow);
         std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
         let json = self.json(&outcomes)?;
         std::fs::write(out.join("results.json"), &json).with_context(|| out.display().to_string())?;
@@ -274,10 +309,11 @@ impl Bench {
         cases: &[Case],
         schedule: &Schedule,
         simulator: Simulator,
+        workflow: &Tool,
     ) -> BTreeMap<String, Outcome> {
         type Boxed<'a> = Box<dyn Fn(&Trials) -> Result<Answer, ToolError> + 'a>;
         let mut tools: Vec<(String, Boxed)> = Vec::new();
-        tools.push(("wade gap".to_owned(), Box::new(workflow)));
+        tools.push(("wade gap".to_owned(), Box::new(|trials: &Trials| workflow(trials))));
         if let Some(command) = &self.tool {
             tools.push(("tool".to_owned(), Box::new(command_tool(command))));
         }
@@ -307,6 +343,7 @@ impl Bench {
             "commit": env!("WADE_COMMIT"),
             "cases_of_each_family": self.cases,
             "seed": self.seed,
+            "vehicle": self.vehicle,
             "size": format!("{:?}", self.size).to_lowercase(),
             "tool": self.tool,
             "tools": tools,
@@ -315,18 +352,48 @@ impl Bench {
     }
 }
 
-/// The workflow, on trials in memory.
+/// A bundle's answers to a run.
+fn modeled(model: &Model, run: &[wade_gap_bench::Asked]) -> Vec<Modeled> {
+    let mut predict = predictor(model, Physics::Full);
+    let mut before = None;
+    let mut answer = |asked: &wade_gap_bench::Asked| {
+        let t = asked.state.t;
+        let condition = Condition { velocity: asked.through_water, ..asked.state.condition() };
+        let Predicted { wrench, uncertainty, .. } = predict(&Asked {
+            condition: &condition,
+            wheel_speeds: Some(asked.state.wheels.into()),
+            time_step: before.map_or(0.0, |before| t - before),
+        });
+        before = Some(t);
+        let (f, m) = (wrench.force, wrench.moment);
+        Modeled { wrench: Wrench6::new(f.x, f.y, f.z, m.x, m.y, m.z), deviation: Wrench6::from(uncertainty) }
+    };
+    run.iter().map(&mut answer).collect()
+}
+
+/// The workflow on trials that bring their prediction and their body.
 fn workflow(trials: &Trials) -> Result<Answer, ToolError> {
-    let refused = |error: GapError| ToolError::Refused(Box::new(error));
     let body = wade_gap::body_of(trials).map_err(refused)?;
-    let report =
-        wade_gap::run(trials, &body, &mut |_| Predicted::default(), &Config::default()).map_err(refused)?;
+    answer(trials, &body, &mut |_| Predicted::default())
+}
+
+/// What the workflow answers to trials in memory.
+fn answer(
+    trials: &Trials,
+    body: &Body,
+    predict: &mut dyn FnMut(&Asked<'_>) -> Predicted,
+) -> Result<Answer, ToolError> {
+    let report = wade_gap::run(trials, body, predict, &Config::default()).map_err(refused)?;
     let answer = Answer::from_report(&serde_json::to_value(report)?)?;
     // a verdict that its own numbers contradict is no answer
     match answer.contradiction() {
         Some(why) => Err(ToolError::Refused(why.into())),
         None => Ok(answer),
     }
+}
+
+fn refused(error: GapError) -> ToolError {
+    ToolError::Refused(Box::new(error))
 }
 
 fn text(outcomes: &BTreeMap<String, Outcome>) -> String {

@@ -3,6 +3,8 @@
 
 use std::path::PathBuf;
 
+use wade_core::condition::Condition;
+use wade_core::frame::Vec3;
 use wade_core::vehicle::shipped;
 use wade_gap::{Config, Predicted, Report, Verdict};
 use wade_gap_bench::answer::Answer;
@@ -12,7 +14,10 @@ use wade_gap_bench::generate::{gap, generate, predicted};
 use wade_gap_bench::hidden::{Effect, Hidden};
 use wade_gap_bench::real::{kvlcc2, rm2_rotor};
 use wade_gap_bench::score::{Judged, rows};
-use wade_gap_bench::{Hull, NoiseKind, Prediction, Schedule, Setup, Simulator, Tool, folder, motion, run};
+use wade_gap_bench::{
+    Asked, Hull, Modeled, NoiseKind, Prediction, Schedule, Setup, Simulator, Tool, Wrench6, folder, motion,
+    run,
+};
 use wade_learn::trials::Trials;
 
 fn schedule() -> Schedule {
@@ -82,8 +87,9 @@ fn every_effect_has_its_strength_and_the_gap_is_noise_and_it() {
         assert!(closure > 0.75, "{}: {closure}", case.name);
         let (mut rest, mut count) = (0.0, 0.0);
         for (trial, change) in generated.trials.trials.iter().zip(&truth.change) {
+            let predicted = predicted(trial, &simulator);
             for (i, change) in change.iter().enumerate() {
-                let left = gap(trial, i, &predicted(trial, i, &simulator)) - change;
+                let left = gap(trial, i, &predicted[i]) - change;
                 rest += left[0] * left[0];
                 count += 1.0;
             }
@@ -120,8 +126,8 @@ fn nulls_have_no_structure_beyond_their_kind() {
     let (mut product, mut square) = ([0.0; 4], 0.0);
     for trial in &generated.trials.trials {
         // the force along y is measured by a cell alone where nothing moves along y
-        let values: Vec<f64> =
-            (0..trial.len()).map(|i| gap(trial, i, &predicted(trial, i, &simulator))[1]).collect();
+        let predicted = predicted(trial, &simulator);
+        let values: Vec<f64> = (0..trial.len()).map(|i| gap(trial, i, &predicted[i])[1]).collect();
         for i in 0..values.len() - 3 {
             square += values[i] * values[i];
             (0..4).for_each(|lag| product[lag] += values[i] * values[i + lag]);
@@ -134,10 +140,15 @@ fn nulls_have_no_structure_beyond_their_kind() {
 fn the_warthog_s_own_model_can_be_the_prediction() {
     let vehicle = shipped::warthog().unwrap().vehicle().unwrap();
     let hull = Hull::of_vehicle(&vehicle);
-    let model = |condition: &wade_core::condition::Condition| {
-        let forces = wade_core::analytic::loads(&vehicle, condition);
-        let force: wade_core::frame::Vec3 = forces.iter().sum();
-        wade_core::wrench::Wrench { force, moment: wade_core::frame::Vec3::zeros() }
+    // the deviation of one force, the others being sure
+    let deviation = Wrench6::new(20.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let model = |run: &[Asked]| {
+        let answer = |asked: &Asked| {
+            let condition = Condition { velocity: asked.through_water, ..asked.state.condition() };
+            let force: Vec3 = wade_core::analytic::loads(&vehicle, &condition).iter().sum();
+            Modeled { wrench: Wrench6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0), deviation }
+        };
+        run.iter().map(answer).collect()
     };
     let simulator = Simulator { hull: &hull, prediction: Prediction::Model(&model), vehicle: "warthog" };
     let mut coarse = schedule();
@@ -146,6 +157,21 @@ fn the_warthog_s_own_model_can_be_the_prediction() {
     assert!((generated.truth.strengths[0] / 3.0 - 1.0).abs() < 1e-3);
     assert!(generated.trials.manifest.body.is_none());
     assert!(generated.trials.trials.iter().all(|trial| trial.simulated[0].is_none()));
+    // what the model states of itself is in the floor, of that force alone
+    let quiet = |run: &[Asked]| {
+        let without = |answer: Modeled| Modeled { deviation: Wrench6::zeros(), ..answer };
+        model(run).into_iter().map(without).collect()
+    };
+    let nulls = || (0..12).map(|seed| Case { seed, ..cases(&[Family::Null], 1, 1).remove(0) });
+    let mean = |prediction: Prediction| -> Wrench6 {
+        let simulator = Simulator { prediction, ..simulator };
+        nulls().map(|null| generate(&null, &coarse, simulator).truth.floor.map(|f| f * f)).sum::<Wrench6>()
+            / 12.0
+    };
+    let (sure, unsure) = (mean(Prediction::Model(&quiet)), mean(Prediction::Model(&model)));
+    let added = f64::sqrt(unsure[0] - sure[0]);
+    assert!((added / 20.0 - 1.0).abs() < 0.3, "{added}");
+    assert!((unsure[1] / sure[1] - 1.0).abs() < 0.1, "{unsure} {sure}");
 }
 
 #[test]

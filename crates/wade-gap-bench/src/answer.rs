@@ -84,9 +84,16 @@ pub struct HeldOut {
 /// Size of the gap of a component over all trials.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 struct Size {
-    /// True where its interval lies above what noise and the model's own error can be.
-    #[serde(default)]
-    above_floor: bool,
+    /// Interval of its root mean square.
+    interval: Option<[f64; 2]>,
+    /// Of noise and the model's own error.
+    expected_at_most: Option<f64>,
+}
+
+impl Size {
+    fn is_above_what_is_expected(&self) -> bool {
+        self.interval.zip(self.expected_at_most).is_some_and(|(interval, expected)| interval[0] > expected)
+    }
 }
 
 /// What is expected of a component without anything missing.
@@ -139,9 +146,9 @@ impl Answer {
         let GapReport { held_out, size, floors } = &self.gap;
         match self.verdict {
             Verdict::NothingMissing => {
-                let above = size.iter().find(|(_, size)| size.above_floor);
+                let above = size.iter().find(|(_, size)| size.is_above_what_is_expected());
                 above.map(|(name, _)| {
-                    format!("nothing is missing, and the gap of {name} lies above its floor")
+                    format!("nothing is missing, and the gap of {name} lies above what is expected")
                 })
             }
             Verdict::Named => {
@@ -236,8 +243,11 @@ mod tests {
         assert_eq!(why(&held(39.0, 0.6)), None, "a fifth of the squared gap");
         assert!(why(&held(45.0, 0.5)).unwrap().contains("most of the gap of fx"));
         assert!(why(&held(9.0, -0.1)).unwrap().contains("grows"));
-        let size = |above: bool| serde_json::json!({"verdict": "nothing_missing", "gap": {"size": {"fz": {"above_floor": above}}}});
-        assert_eq!(why(&size(false)), None);
-        assert!(why(&size(true)).unwrap().contains("gap of fz lies above its floor"));
+        let size = |expected: f64| {
+            let fz = serde_json::json!({"interval": [4.0, 6.0], "expected_at_most": expected});
+            serde_json::json!({"verdict": "nothing_missing", "gap": {"size": {"fz": fz}}})
+        };
+        assert_eq!(why(&size(4.1)), None);
+        assert!(why(&size(3.9)).unwrap().contains("gap of fz lies above what is expected"));
     }
 }

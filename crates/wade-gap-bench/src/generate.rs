@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use super::case::Case;
 use super::hidden::{Hidden, Parameter, Setting, parameters, strength};
 use super::noise::{CELL, QUANTUM, SmoothError, left_by_dropouts, of_wrench, recorded, rounded};
+use super::simulator::Modeled;
 use super::track::{CHANNEL, DENSITY};
-use super::{NoiseKind, Region, Schedule, Simulator, State, Track, Wrench6};
+use super::{NoiseKind, Prediction, Region, Schedule, Simulator, State, Track, Wrench6};
 use wade_core::frame::Vec3;
 use wade_learn::random::Random;
 use wade_learn::signal::{SavitzkyGolay, UniformGrid, interpolate, pieces};
@@ -63,12 +64,14 @@ pub fn generate(case: &Case, schedule: &Schedule, simulator: Simulator) -> Gener
     let session = tracks.last().map_or(1.0, |track| track.session_time + 10.0);
     let setting = Setting { simulator, session };
     let measured = if case.inferred { [true, true, false, false, false, true] } else { [true; 6] };
-    let exact: Vec<Vec<Wrench6>> = tracks
-        .iter()
-        .map(|track| track.states.iter().map(|state| simulator.predict(state) + state.known_load).collect())
-        .collect();
+    let modeled: Vec<Vec<Modeled>> =
+        tracks.iter().map(|track| simulator.predict_run(&track.states)).collect();
+    let exact = |(track, modeled): (&Track, &Vec<Modeled>)| {
+        track.states.iter().zip(modeled).map(|(state, modeled)| modeled.wrench + state.known_load).collect()
+    };
+    let exact: Vec<Vec<Wrench6>> = tracks.iter().zip(&modeled).map(exact).collect();
     let (instruments, noise_seed) = (random.fork(), random.fork());
-    let scene = Scene { case, setting, tracks: &tracks, exact: &exact, measured };
+    let scene = Scene { case, setting, tracks: &tracks, modeled: &modeled, exact: &exact, measured };
     let at = |scale: f64| scene.instruments(scale, &mut noise_seed.clone());
     let scale = scene.scale(&at(1.0).floor, &mut instruments.clone());
     let seen = at(scale);
@@ -82,6 +85,9 @@ struct Scene<'a> {
     case: &'a Case,
     setting: Setting<'a>,
     tracks: &'a [Track],
+    /// The model's answer to the exact motion.
+    modeled: &'a [Vec<Modeled>],
+    /// What would be measured with nothing hidden.
     exact: &'a [Vec<Wrench6>],
     measured: [bool; 6],
 }
@@ -110,16 +116,26 @@ impl Scene<'_> {
         let kind = self.case.noise;
         let error = SmoothError::new(&mut random.fork());
         let own = if kind == NoiseKind::SurrogateError { 0.5 * scale } else { 0.0 };
+        // what is served errs by what it states, whatever the instruments
+        let stated = match self.setting.simulator.prediction {
+            Prediction::Analytic => None,
+            Prediction::Model(_) => Some(SmoothError::new(&mut random.fork())),
+        };
         let (mut tracks, mut predicted, mut noise) = (Vec::new(), Vec::new(), Vec::new());
-        for track in self.tracks {
+        for (track, modeled) in self.tracks.iter().zip(self.modeled) {
             let mut random = random.fork();
             let recorded = recorded(track, scale.min(CAMERAS), &mut random);
-            let simulator = &self.setting.simulator;
-            predicted.push(recorded.states.iter().map(|state| simulator.predict(state)).collect::<Vec<_>>());
+            let answers = self.setting.simulator.predict_run(&recorded.states);
+            predicted.push(answers.iter().map(|answer| answer.wrench).collect::<Vec<_>>());
             let mut cell = of_wrench(kind, track, scale, &mut random);
             if own > 0.0 {
                 for (sum, state) in cell.iter_mut().zip(&track.states) {
                     *sum += error.at(state).component_mul(&Wrench6::from(CELL)) * own;
+                }
+            }
+            if let Some(error) = &stated {
+                for ((sum, state), modeled) in cell.iter_mut().zip(&track.states).zip(modeled) {
+                    *sum += error.at(state).component_mul(&modeled.deviation);
                 }
             }
             noise.push(cell);
@@ -264,7 +280,7 @@ impl Scene<'_> {
         let states = || self.tracks.iter().flat_map(|track| &track.states);
         let known_loads =
             HUNG.iter().enumerate().filter(|(axis, _)| states().any(|state| state.known_load[*axis] != 0.0));
-        let is_analytic = matches!(simulator.prediction, super::Prediction::Analytic);
+        let is_analytic = matches!(simulator.prediction, Prediction::Analytic);
         Manifest {
             vehicle: simulator.vehicle.to_owned(),
             generated: Some(format!(
@@ -314,7 +330,7 @@ impl Scene<'_> {
         let turning = angular_velocity.iter().zip(&velocity);
         let acceleration = rate.iter().zip(turning).map(|(rate, (omega, v))| rate + omega.cross(v)).collect();
         let simulated: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| {
-            let analytic = matches!(self.setting.simulator.prediction, super::Prediction::Analytic);
+            let analytic = matches!(self.setting.simulator.prediction, Prediction::Analytic);
             analytic.then(|| kept.iter().map(|&i| predicted[i][c]).collect())
         });
         let known_loads = (0..3).map(|axis| (HUNG[axis], of(&|state| state.known_load[axis])));
@@ -397,18 +413,24 @@ pub fn gap(trial: &Trial, sample: usize, predicted: &Wrench6) -> Wrench6 {
     Wrench6::from_fn(|c, _| trial.measured[c].as_ref().map_or(0.0, |values| values[sample] - predicted[c]))
 }
 
-/// What the sensor should read in a sample: the columns of the simulator, else the simulator's answer to the recorded state,
-/// and the known loads.
-pub fn predicted(trial: &Trial, sample: usize, simulator: &Simulator) -> Wrench6 {
-    let mut known = Wrench6::zeros();
-    for (name, values) in &trial.known_loads {
-        component_of(name).into_iter().for_each(|component| known[component] += values[sample]);
-    }
+/// What the sensor should read in the samples of a trial: the columns of the simulator, else the simulator's answers to the
+/// recorded states, and the known loads.
+pub fn predicted(trial: &Trial, simulator: &Simulator) -> Vec<Wrench6> {
+    let known = |sample: usize| {
+        let mut known = Wrench6::zeros();
+        for (name, values) in &trial.known_loads {
+            component_of(name).into_iter().for_each(|component| known[component] += values[sample]);
+        }
+        known
+    };
     if trial.simulated[0].is_some() {
-        let simulated = |c: usize| trial.simulated[c].as_ref().map_or(0.0, |values| values[sample]);
-        return known + Wrench6::from_fn(|c, _| simulated(c));
+        let simulated =
+            |sample: usize, c: usize| trial.simulated[c].as_ref().map_or(0.0, |values| values[sample]);
+        return (0..trial.len())
+            .map(|sample| known(sample) + Wrench6::from_fn(|c, _| simulated(sample, c)))
+            .collect();
     }
-    let state = State {
+    let state = |sample: usize| State {
         t: trial.t[sample],
         velocity: trial.velocity[sample],
         angular_velocity: trial.angular_velocity[sample],
@@ -416,9 +438,15 @@ pub fn predicted(trial: &Trial, sample: usize, simulator: &Simulator) -> Wrench6
         angular_acceleration: trial.angular_acceleration[sample],
         attitude: [trial.roll[sample], trial.pitch[sample], trial.yaw[sample]],
         depth: trial.depth(sample, simulator.hull.z0),
+        wheels: trial.wheel_speeds.each_ref().map(|speeds| speeds.as_ref().map_or(0.0, |s| s[sample])),
         ..State::default()
     };
-    known + simulator.predict(&state)
+    let of_piece = |piece: std::ops::Range<usize>| {
+        let states: Vec<State> = piece.clone().map(state).collect();
+        simulator.predict_run(&states).into_iter().zip(piece)
+    };
+    let pieces = pieces(&trial.t).into_iter();
+    pieces.flat_map(of_piece).map(|(answer, sample)| answer.wrench + known(sample)).collect()
 }
 
 /// Closure by the true change: scaled to fit every other second, judged on the rest, in floors. Halves of the trials would
@@ -427,11 +455,12 @@ fn closure(trials: &[Trial], truth: &Truth, simulator: &Simulator) -> Option<f64
     if truth.effects.is_empty() {
         return None;
     }
+    let predictions: Vec<Vec<Wrench6>> = trials.iter().map(|trial| predicted(trial, simulator)).collect();
     let standardized = |parity: usize| {
-        trials.iter().zip(&truth.change).flat_map(move |(trial, change)| {
+        trials.iter().zip(&predictions).zip(&truth.change).flat_map(move |((trial, predictions), change)| {
             let chosen = (0..trial.len()).filter(move |&i| trial.t[i] as usize % 2 == parity);
             chosen.flat_map(move |i| {
-                let gap = gap(trial, i, &predicted(trial, i, simulator));
+                let gap = gap(trial, i, &predictions[i]);
                 let on = |c: &usize| trial.measured[*c].is_some() && truth.floor[*c] > 0.0;
                 let pair = |c: usize| [gap[c] / truth.floor[c], change[i][c] / truth.floor[c]];
                 (0..6).filter(on).map(pair).collect::<Vec<_>>()

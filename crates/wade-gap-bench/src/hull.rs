@@ -80,7 +80,7 @@ impl Hull {
             mass: vehicle.mass,
             z0: vehicle.z0,
             center_of_mass: vehicle.center_of_mass,
-            wheel: [0.305, 0.254],
+            wheel: wheel_of(vehicle),
             filled: (0..=SLICES).map(volume).collect(),
         }
     }
@@ -142,6 +142,12 @@ impl Hull {
         }
         sum
     }
+}
+
+/// Radius and width of the first wheel; 0 of a vehicle that has none [m].
+fn wheel_of(vehicle: &Vehicle) -> [f64; 2] {
+    let bounds = vehicle.wheels().first().and_then(|&wheel| vehicle.hull.bounds_of(wheel));
+    bounds.map_or([0.0; 2], |bounds| [0.5 * bounds.extent().x, bounds.extent().y])
 }
 
 /// A force acting at an arm from the center of mass.

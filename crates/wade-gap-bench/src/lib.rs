@@ -38,7 +38,7 @@ pub use noise::{Gaussian, NoiseKind};
 pub use region::{Feature, Region};
 pub use run::{Outcome, Progress, Setup, Tool, ToolError, command_tool, run};
 pub use schedule::{Plan, Schedule};
-pub use simulator::{Prediction, Simulator};
+pub use simulator::{Asked, Model, Modeled, Prediction, Simulator};
 pub use track::{State, Track};
 
 /// Force and moment about the center of mass, body frame, in the order of [`wade_learn::trials::WRENCH`] [N, N m].

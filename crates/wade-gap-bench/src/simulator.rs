@@ -2,9 +2,7 @@
 
 use super::track::DENSITY;
 use super::{Hull, State, Wrench6};
-use wade_core::condition::Condition;
 use wade_core::frame::Vec3;
-use wade_core::wrench::Wrench;
 
 /// Drag coefficients of the box on its wet front and side: a blunt body's, chosen.
 pub(super) const DRAG: [f64; 2] = [1.2, 1.5];
@@ -14,8 +12,29 @@ pub(super) const DRAG: [f64; 2] = [1.2, 1.5];
 pub enum Prediction<'a> {
     /// Hydrostatics of the hull's columns and drag that grows with the square of the speed.
     Analytic,
-    /// A model, such as a shipped vehicle's; wrench about the center of mass.
-    Model(&'a dyn Fn(&Condition) -> Wrench),
+    /// A model, such as a shipped vehicle's.
+    Model(&'a Model<'a>),
+}
+
+/// A model's answers to the samples of a run, in which it may remember those before.
+pub type Model<'a> = dyn Fn(&[Asked]) -> Vec<Modeled> + 'a;
+
+/// A sample that a model is asked about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asked {
+    /// The state, whose velocity over ground is that of the vehicle.
+    pub state: State,
+    /// Velocity through the water, body frame [m/s].
+    pub through_water: Vec3,
+}
+
+/// A model's answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Modeled {
+    /// Wrench about the center of mass.
+    pub wrench: Wrench6,
+    /// The standard deviation that the model states.
+    pub deviation: Wrench6,
 }
 
 /// A body and what is predicted for it.
@@ -30,21 +49,34 @@ pub struct Simulator<'a> {
 }
 
 impl Simulator<'_> {
-    /// Wrench in still water.
+    /// Wrench in still water, of a sample alone.
     pub fn predict(&self, state: &State) -> Wrench6 {
         self.predict_moving(state, &state.velocity)
     }
 
-    /// Wrench with another velocity through the water, body frame [m/s].
+    /// Wrench with another velocity through the water, body frame [m/s], of a sample alone.
     pub fn predict_moving(&self, state: &State, through_water: &Vec3) -> Wrench6 {
         match self.prediction {
             Prediction::Analytic => {
                 self.hull.buoyancy(state, DENSITY, |_, _| 0.0) + self.drag(state, through_water)
             }
             Prediction::Model(model) => {
-                let wrench = model(&Condition { velocity: *through_water, ..state.condition() });
-                let (f, m) = (wrench.force, wrench.moment);
-                Wrench6::new(f.x, f.y, f.z, m.x, m.y, m.z)
+                let asked = Asked { state: *state, through_water: *through_water };
+                model(&[asked]).first().map_or_else(Wrench6::zeros, |answer| answer.wrench)
+            }
+        }
+    }
+
+    /// Wrenches of a run in still water, and what the model states of them; an analytic simulation states nothing.
+    pub fn predict_run(&self, states: &[State]) -> Vec<Modeled> {
+        match self.prediction {
+            Prediction::Analytic => {
+                let exact = |state| Modeled { wrench: self.predict(state), deviation: Wrench6::zeros() };
+                states.iter().map(exact).collect()
+            }
+            Prediction::Model(model) => {
+                let asked = |state: &State| Asked { state: *state, through_water: state.velocity };
+                model(&states.iter().map(asked).collect::<Vec<_>>())
             }
         }
     }

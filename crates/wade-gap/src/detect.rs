@@ -37,8 +37,10 @@ pub struct GapSize {
     pub interval: [f64; 2],
     /// What noise alone would show.
     pub noise_floor: f64,
-    /// True where the interval lies above the floor, above all noise that a floor of its source may have missed, and above what a
-    /// smooth error of the stated size can be.
+    /// The most that is expected with nothing missing: the floor, all noise that a floor of its source may have missed, and what a
+    /// smooth model error of the stated size is in 19 of 20 draws at most.
+    pub expected_at_most: f64,
+    /// True where the interval lies above what is expected at most.
     pub above_floor: bool,
 }
 
@@ -72,9 +74,9 @@ pub(super) fn sizes<'a>(
         let seen = if setting.computed { 1.0 } else { floors[component].source.least_seen() };
         let left_out = left_out(trials.clone(), floors[component].source, component);
         let model = floors[component].model * error.at_most(place);
-        let noise = floors[component].total().hypot(model).hypot(left_out);
-        let above_floor = seen * interval[0] > noise;
-        let size = GapSize { rms: rms(&squares), interval, noise_floor, above_floor };
+        let expected_at_most = floors[component].total().hypot(model).hypot(left_out) / seen;
+        let above_floor = interval[0] > expected_at_most;
+        let size = GapSize { rms: rms(&squares), interval, noise_floor, expected_at_most, above_floor };
         (WRENCH[component], size)
     };
     setting.components.iter().enumerate().map(of).collect()

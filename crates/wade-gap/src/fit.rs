@@ -2,9 +2,10 @@
 //!
 //! Least squares on the rows of the design. Intervals: a bootstrap over trials, or over blocks where few trials excite an effect,
 //! its ends moved out for the few that there are (the expanded percentile of Hesterberg, The American Statistician 2015) and
-//! as far as the robust error reaches, and what the formula itself leaves open.
+//! as far as the robust error reaches, what the formula itself leaves open, and what the model's own error is taken for: it is
+//! one function of the state in all trials, so that no scatter between them shows it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::Serialize;
 
 use super::Config;
@@ -119,6 +120,7 @@ pub(super) fn fit(
             whole.solve(&DVector::from_iterator(best.len(), own.chain(moved))) * FORMULA
         })
         .collect();
+    let leaks = [leaks, model_leaks(design, &columns, &moved, &whole)].concat();
     let open = |i: usize, j: usize| {
         let own = if i == j { (formula(used[i].0) * values[i]).powi(2) } else { 0.0 };
         own + leaks.iter().map(|leak| leak[i] * leak[j]).sum::<f64>() / (scale[i] * scale[j])
@@ -158,6 +160,23 @@ pub(super) fn fit(
         })
         .collect();
     Some(Fit { values, covariance, intervals, provisional, shape_std })
+}
+
+/// What an error of the model of one standard deviation, in each of the ways in which it may be off, changes in the estimates.
+fn model_leaks(
+    design: &Design,
+    columns: &[usize],
+    moved: &[DVector<f64>],
+    whole: &Cholesky<f64, Dyn>,
+) -> Vec<DVector<f64>> {
+    let own = columns.iter().map(|&column| design.error.products(design.x.column(column).as_slice()));
+    let products: Vec<Vec<f64>> =
+        own.chain(moved.iter().map(|column| design.error.products(column.as_slice()))).collect();
+    let weights = products.first().map_or(0, Vec::len);
+    let leak = |weight: usize| {
+        whole.solve(&DVector::from_iterator(products.len(), products.iter().map(|of| of[weight])))
+    };
+    (0..weights).map(leak).collect()
 }
 
 /// The ends of an interval about a value: those drawn, moved out by a factor, and what is open beyond; where both were drawn

@@ -42,6 +42,8 @@ pub(super) struct ModelError {
 struct Part {
     z: DMatrix<f64>,
     share: DMatrix<f64>,
+    /// `Z` times this are the rows of the error of which its share was taken off.
+    left: DMatrix<f64>,
     /// Eigenvalues of `Z^T Z`, none below 0.
     squares: DVector<f64>,
 }
@@ -90,6 +92,17 @@ impl ModelError {
         }
     }
 
+    /// Products of a column of rows, of which the error's share was taken off, with each of the unit Gaussian weights that the error
+    /// is a sum over.
+    pub fn products(&self, rows: &[f64]) -> Vec<f64> {
+        let width = self.parts.len();
+        let of = |(place, Part { z, left, .. }): (usize, &Part)| {
+            let own = DVector::from_iterator(z.nrows(), rows.iter().skip(place).step_by(width).copied());
+            (left * z.tr_mul(&own)).data.as_vec().clone()
+        };
+        self.parts.iter().enumerate().flat_map(of).collect()
+    }
+
     /// Sum of squares that a smooth error of the stated size leaves in the rows in 19 of 20 draws at most: a chi-square of its degrees
     /// of freedom.
     pub fn most_left(&self) -> f64 {
@@ -116,8 +129,11 @@ impl Part {
             let root = (1.0 + l).sqrt();
             1.0 / (root * (1.0 + root))
         });
-        let share = &eigenvectors * DMatrix::from_diagonal(&shares) * eigenvectors.transpose();
-        Self { z, share, squares }
+        let of = |diagonal: DVector<f64>| {
+            &eigenvectors * DMatrix::from_diagonal(&diagonal) * eigenvectors.transpose()
+        };
+        let (share, left) = (of(shares), of(squares.map(|l| (1.0 + l).sqrt().recip())));
+        Self { z, share, left, squares }
     }
 }
 
@@ -214,11 +230,18 @@ mod tests {
         // of two components in turn, each has its own rows
         let values: Vec<f64> = (0..120).map(|i| f64::from(i * i % 7) - 2.0).collect();
         let mut rows = values.clone();
-        ModelError { parts: vec![Part::new(z.clone()), Part::new(z)] }.take_off(&mut rows);
+        let error = ModelError { parts: vec![Part::new(z.clone()), Part::new(z.clone())] };
+        error.take_off(&mut rows);
         for place in 0..2 {
             let of = |rows: &[f64]| DVector::from_fn(60, |i, _| rows[2 * i + place]);
             assert!((&root * of(&values) - of(&rows)).amax() < 1e-6);
         }
+        // a column of rows sees the error as far as the rows hold what is left of it
+        let left = &root * z;
+        let products = [0, 1].map(|place| left.tr_mul(&DVector::from_fn(60, |i, _| rows[2 * i + place])));
+        let expected =
+            DVector::from_iterator(2 * left.ncols(), products.iter().flat_map(|p| p.iter().copied()));
+        assert!((DVector::from_vec(error.products(&rows)) - expected).amax() < 1e-6);
     }
 
     #[test]

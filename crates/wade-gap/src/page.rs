@@ -323,6 +323,7 @@ fn sizes(report: &Report) -> String {
             component(name),
             number(size.rms),
             interval(size.interval, number),
+            number(size.expected_at_most),
             of(floor.map(|floor| floor.sample)),
             of(floor.map(|floor| floor.offset)),
             of(floor.map(|floor| floor.model)),
@@ -334,6 +335,7 @@ fn sizes(report: &Report) -> String {
         "component",
         "gap",
         "90 % interval",
+        "expected at most",
         "noise of a sample",
         "zero from trial to trial",
         "predicted std. dev. of the model",
@@ -341,7 +343,8 @@ fn sizes(report: &Report) -> String {
     ];
     format!(
         "<h2>Gap and noise, all trials</h2>{}<p class=\"small\">Gap: root mean square, with its interval by a bootstrap over \
-         trials; the others are standard deviations.</p>\n",
+         trials. Expected at most: noise and model error with nothing missing, in 19 of 20 cases. The others are standard \
+         deviations.</p>\n",
         table(&heads, NO_PAPER, rows)
     )
 }

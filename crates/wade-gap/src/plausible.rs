@@ -44,13 +44,21 @@ const ALL: &str = "every trial";
 /// What one component measured and what is expected of it.
 struct Channel<'a> {
     component: usize,
-    trials: Vec<(&'a str, Vec<Pair>)>,
-    /// Time of each sample, by trial [s].
-    times: Vec<&'a [f64]>,
+    trials: Vec<Recorded<'a>>,
     /// Root mean square of what is expected [N or N m].
     size: f64,
     /// Noise of a sample that three quarters of the trials stay below [N or N m].
     noise: f64,
+}
+
+/// A channel in one trial.
+struct Recorded<'a> {
+    trial: &'a str,
+    pairs: Vec<Pair>,
+    /// Time of each sample [s].
+    times: &'a [f64],
+    /// Mean square of the deviation that the model states [N2 or N2 m2].
+    doubt: f64,
 }
 
 /// Measured and expected [N or N m].
@@ -117,13 +125,17 @@ impl<'a> Channel<'a> {
             let samples = series.seen.iter().zip(&series.gap);
             samples.map(|(seen, gap)| [gap[component] + seen[component], seen[component]]).collect()
         };
-        let trials: Vec<_> = all.iter().map(|series| (series.name.as_str(), pairs(series))).collect();
-        let expected = trials.iter().flat_map(|(_, pairs)| pairs.iter().map(|[_, p]| p * p));
-        let count = trials.iter().map(|(_, pairs)| pairs.len()).sum::<usize>().max(1);
+        let recorded = |series: &'a Series| {
+            let squares = series.uncertainty.iter().map(|deviation| deviation[component].powi(2));
+            let doubt = squares.sum::<f64>() / series.t.len().max(1) as f64;
+            Recorded { trial: &series.name, pairs: pairs(series), times: &series.t, doubt }
+        };
+        let trials: Vec<Recorded> = all.iter().map(recorded).collect();
+        let expected = trials.iter().flat_map(|of| of.pairs.iter().map(|[_, p]| p * p));
+        let count = trials.iter().map(|of| of.pairs.len()).sum::<usize>().max(1);
         let size = (expected.sum::<f64>() / count as f64).sqrt();
         let noises: Vec<f64> = all.iter().map(|series| sample_noise(series, component)).collect();
-        let times = all.iter().map(|series| series.t.as_slice()).collect();
-        Self { component, trials, times, size, noise: usual(&noises) }
+        Self { component, trials, size, noise: usual(&noises) }
     }
 
     fn column(&self) -> &'static str {
@@ -142,16 +154,17 @@ impl<'a> Channel<'a> {
 
     /// All trials together, then each alone.
     fn check(&self) -> Result<(), GapError> {
-        let all: Vec<Pair> = self.trials.iter().flat_map(|(_, pairs)| pairs.iter().copied()).collect();
+        let all: Vec<Pair> = self.trials.iter().flat_map(|of| of.pairs.iter().copied()).collect();
+        let doubt = self.trials.iter().map(|of| of.doubt * of.pairs.len() as f64).sum::<f64>();
         self.check_unit(ALL, &all)?;
-        self.check_pairs(ALL, &all)?;
-        self.trials.iter().zip(&self.times).try_for_each(|((name, pairs), times)| {
+        self.check_pairs(ALL, &all, doubt / all.len().max(1) as f64)?;
+        self.trials.iter().try_for_each(|Recorded { trial, pairs, times, doubt }| {
             let [_, _, pp] = products(pairs);
-            let place = format!("{name}.csv");
+            let place = format!("{trial}.csv");
             if pairs.len() >= ENOUGH && self.is_clear((pp / pairs.len() as f64).sqrt()) {
                 self.check_unit(&place, pairs)?;
             }
-            self.check_pairs(&place, pairs)?;
+            self.check_pairs(&place, pairs, *doubt)?;
             self.check_live(place, pairs, times)
         })
     }
@@ -196,7 +209,7 @@ impl<'a> Channel<'a> {
         }
     }
 
-    fn check_pairs(&self, place: &str, pairs: &[Pair]) -> Result<(), GapError> {
+    fn check_pairs(&self, place: &str, pairs: &[Pair], doubt: f64) -> Result<(), GapError> {
         if pairs.len() < ENOUGH {
             return Ok(());
         }
@@ -206,8 +219,10 @@ impl<'a> Channel<'a> {
         if pairs.iter().all(|[measured, _]| self.is_same(first, *measured)) && self.is_clear(whole) {
             return Err(GapError::Dead { place, column, value: first, spread: whole, unit });
         }
-        if self.is_clear(whole) && is_mirrored(pairs) {
-            let [_, mp, pp] = products(pairs);
+        let [_, mp, pp] = products(pairs);
+        // a sign that is reversed is an error of twice what is expected
+        let is_beyond_doubt = 4.0 * pp > CLEARLY.powi(2) * doubt * pairs.len() as f64;
+        if self.is_clear(whole) && is_beyond_doubt && is_mirrored(pairs) {
             return Err(GapError::Reversed { place, column, ratio: mp / pp });
         }
         match self.stop(pairs) {
@@ -242,26 +257,22 @@ impl<'a> Channel<'a> {
 
     /// Refuses two channels that stand in for each other, in all trials or in one.
     fn check_apart(&self, other: &Self) -> Result<(), GapError> {
-        // within what noise makes of channels of which nothing is expected
-        let noise = self.noise.powi(2) + other.noise.powi(2);
         // how far the two are from what is expected of them, and from what is expected of each other
-        let sums = |(ours, theirs): (&[Pair], &[Pair])| {
-            ours.iter().zip(theirs).fold([0.0; 3], |[apart, swapped, least], ([a, of_a], [b, of_b])| {
+        let sums = |(ours, theirs): (&Recorded, &Recorded)| {
+            // within what noise and an error of the model make of channels of which nothing is expected
+            let least = self.noise.powi(2) + other.noise.powi(2) + ours.doubt + theirs.doubt;
+            let pairs = ours.pairs.iter().zip(&theirs.pairs);
+            pairs.fold([0.0; 3], |[apart, swapped, sum], ([a, of_a], [b, of_b])| {
                 let square = |x: f64, y: f64| x * x + y * y;
-                [apart + square(a - of_a, b - of_b), swapped + square(a - of_b, b - of_a), least + noise]
+                [apart + square(a - of_a, b - of_b), swapped + square(a - of_b, b - of_a), sum + least]
             })
         };
-        let of_trials: Vec<[f64; 3]> = self
-            .trials
-            .iter()
-            .zip(&other.trials)
-            .map(|((_, ours), (_, theirs))| sums((ours, theirs)))
-            .collect();
+        let of_trials: Vec<[f64; 3]> = self.trials.iter().zip(&other.trials).map(sums).collect();
         let all = of_trials.iter().fold([0.0; 3], |sum, of| std::array::from_fn(|i| sum[i] + of[i]));
         let is_swapped = |[apart, swapped, least]: [f64; 3]| apart > SWAPPED * swapped.max(least);
         let place = match of_trials.iter().position(|of| is_swapped(*of)) {
             _ if is_swapped(all) => ALL.to_owned(),
-            Some(trial) => format!("{}.csv", self.trials[trial].0),
+            Some(trial) => format!("{}.csv", self.trials[trial].trial),
             None => return Ok(()),
         };
         Err(GapError::Swapped { place, column: self.column(), other: other.column() })

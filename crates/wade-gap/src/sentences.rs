@@ -111,10 +111,11 @@ fn hidden(report: &Report) -> Option<String> {
     };
     most(&Floor::total, &is_hidden).map(|(name, floor, size)| {
         format!(
-            " and the predicted standard deviation. For {name} the noise is {:.3} and the predicted standard deviation {:.3}: either can cause the gap of {:.3}.",
+            " and the predicted standard deviation. For {name} the gap is {:.3}; noise of {:.3} and a model error of {:.3} as predicted can cause up to {:.3}.",
+            size.rms,
             floor.total(),
             floor.model,
-            size.rms,
+            size.expected_at_most,
         )
     })
 }

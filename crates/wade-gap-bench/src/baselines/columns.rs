@@ -104,11 +104,8 @@ const STRIDE: usize = 3;
 
 /// Normal equations of each fold in standard deviations of the noise, as the differences of neighboring gaps show it.
 pub(super) fn folds(trials: &Trials, simulator: &Simulator) -> Vec<Normal> {
-    let predictions: Vec<Vec<Wrench6>> = trials
-        .trials
-        .iter()
-        .map(|trial| (0..trial.len()).map(|i| predicted(trial, i, simulator)).collect())
-        .collect();
+    let predictions: Vec<Vec<Wrench6>> =
+        trials.trials.iter().map(|trial| predicted(trial, simulator)).collect();
     let noise = noise(trials, &predictions);
     let mut folds = vec![Normal::new(TERMS.len()); FOLDS];
     let ordered = ordered(trials);

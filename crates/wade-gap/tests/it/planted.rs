@@ -356,7 +356,11 @@ pub fn check(report: &Report) {
     let said = &report.summary;
     let (gap, named) = (&report.gap, report.verdict == Verdict::Named);
     if report.verdict == Verdict::NothingMissing {
-        assert!(gap.size.values().all(|size| !size.above_floor), "{said} {:?}", gap.size);
+        assert!(
+            gap.size.values().all(|size| size.interval[0] <= size.expected_at_most),
+            "{said} {:?}",
+            gap.size
+        );
     }
     if named {
         let names: Vec<&str> = report.effects.iter().map(|effect| effect.name).collect();
