@@ -27,6 +27,7 @@ pub mod sections;
 pub mod split;
 pub mod summary;
 mod table;
+mod thrift;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

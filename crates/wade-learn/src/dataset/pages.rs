@@ -1,8 +1,8 @@
-//! What the pages of a Parquet file claim, compared with the bytes that are there: the reader of Parquet makes room for
-//! the claim first and looks afterwards.
+//! What a Parquet file and its pages claim, compared with the bytes that are there: the reader of Parquet makes room for
+//! the claim, or sets out on it, first and looks afterwards.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::BufReader;
 
 use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageMetadata, PageReader};
@@ -10,6 +10,8 @@ use parquet::column::reader::{ColumnReader, get_column_reader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
+
+use super::thrift;
 
 /// Rows for each byte of a file, at most. Rows of a data set differ in case, image, section or surface, which a dictionary
 /// with run lengths, the densest of the encodings that are read, keeps in no less than a bit a row.
@@ -19,6 +21,8 @@ const ROWS_A_BYTE: u64 = 8;
 const BYTES_A_BYTE: u64 = 22;
 /// The length of the meta data and the four letters at the end of a file.
 const FOOTER: u64 = 8;
+/// Bytes of the header of a page, at most: with the smallest and the largest of its values, which are names here.
+const HEADER: u64 = 65_536;
 /// A field of 32 bits that follows the one before it, in Thrift's compact protocol.
 const NEXT_I32: u8 = 0x15;
 
@@ -28,6 +32,7 @@ pub(super) struct Pages(File);
 /// Opens a file and reads what stands at its end.
 pub(super) fn open(file: File) -> Result<SerializedFileReader<Pages>> {
     let bytes = file.len();
+    check_metadata(&file)?;
     let reader = SerializedFileReader::new(Pages(file))?;
     let most = bytes.saturating_mul(ROWS_A_BYTE);
     let rows = rows(reader.metadata());
@@ -35,6 +40,16 @@ pub(super) fn open(file: File) -> Result<SerializedFileReader<Pages>> {
         return Err(damaged(format!("{rows} rows in {bytes} bytes, which hold at most {most}")));
     }
     Ok(reader)
+}
+
+/// Looks at what stands at the end of a file, where it is of a length that can be; if it is not, the reader says so.
+fn check_metadata(file: &File) -> Result<()> {
+    let Some(end) = file.len().checked_sub(FOOTER) else { return Ok(()) };
+    let length = file.get_bytes(end, FOOTER as usize)?;
+    let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]);
+    let Some(start) = end.checked_sub(u64::from(length)) else { return Ok(()) };
+    let metadata = file.get_bytes(start, length as usize)?;
+    thrift::check(&metadata).map_err(|fault| damaged(format!("the description of the file: {fault}")))
 }
 
 /// A column of a group of rows.
@@ -66,12 +81,13 @@ impl ChunkReader for Pages {
 
     /// Where the header of a page is read: its first two fields are its kind and its size.
     fn get_read(&self, start: u64) -> Result<Self::T> {
-        let mut reader = self.0.get_read(start)?;
         let there = self.len().saturating_sub(start);
         if there == FOOTER {
-            return Ok(reader);
+            return self.0.get_read(start);
         }
-        let mut header = reader.fill_buf()?;
+        let header = self.0.get_bytes(start, there.min(HEADER) as usize)?;
+        thrift::check(&header).map_err(|fault| damaged(format!("the page at byte {start}: {fault}")))?;
+        let mut header = &header[..];
         let claim = next_number(&mut header).and_then(|_| next_number(&mut header));
         let claim = claim.ok_or_else(|| damaged(format!("no page begins at byte {start}")))?;
         let most = there.saturating_mul(BYTES_A_BYTE);
@@ -80,7 +96,7 @@ impl ChunkReader for Pages {
                 "the page at byte {start} says {claim} bytes, at most {most} can be made of the rest of the file"
             )));
         }
-        Ok(reader)
+        self.0.get_read(start)
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<bytes::Bytes> {
