@@ -51,6 +51,7 @@ fn table(name: &str) -> String {
         "driving" => cfd::driving(),
         "benchmark" => gap::benchmark(),
         "baselines" => gap::baselines(),
+        "bundles" => gap::bundles(),
         "motion" => gap::motion(),
         "ramps" => gap::ramps(),
         "floods" => accuracy::floods(),

@@ -97,6 +97,12 @@ pub fn baselines() -> String {
     out
 }
 
+/// The benchmark on the shipped bundles; measures of which there is no case are left out.
+pub fn bundles() -> String {
+    let of = |vehicle: &str| measures(&json(newest(&format!("gap-bench-{vehicle}.json"))));
+    format!("{}\n{}", of("warthog"), of("husky"))
+}
+
 /// Driven vehicles whose wrench is inferred from their motion: first what has a target, then each group of cases in a row.
 pub fn motion() -> String {
     let result = json(newest("gap-bench-motion.json"));
