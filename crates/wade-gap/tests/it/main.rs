@@ -8,4 +8,5 @@ mod driven;
 mod explanations;
 mod gap_recovery;
 mod moments;
+mod refusals;
 mod sampling;
