@@ -217,3 +217,27 @@ fn a_benchmark_without_end_is_refused() {
         assert!(!place.exists());
     }
 }
+
+#[test]
+fn the_benchmark_runs_on_a_bundle_and_on_none_that_is_not_there() {
+    let (out, vehicles) = (TempDir::new().expect("a folder"), crate::common::copy_of_vehicles());
+    let bench = |vehicle: &str, folder: &Path| {
+        let folder = folder.to_str().expect("a name");
+        let small = ["--size", "slice", "--cases", "1", "--families", "null", "--no-baselines"];
+        let on = ["gap", "bench", "--vehicle", vehicle, "--invariance", "0", "--out", folder];
+        wade_on(&vehicles, &[&on[..], &small].concat())
+    };
+    let folder = out.path().join("husky");
+    let output = bench("husky", &folder);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let results = std::fs::read(folder.join("results.json")).expect("written");
+    let results: Value = serde_json::from_slice(&results).expect("JSON");
+    assert_eq!(results["vehicle"], "husky");
+    let case = &results["tools"]["wade gap"]["cases"]["judged"][0];
+    assert_eq!((&case["error"], &case["named"]), (&Value::Null, &serde_json::json!([])), "{case}");
+    let folder = out.path().join("other");
+    let output = bench("no-such-vehicle", &folder);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && message.contains("no-such-vehicle"), "{message}");
+    assert!(!folder.exists());
+}
