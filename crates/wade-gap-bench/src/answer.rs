@@ -96,13 +96,6 @@ impl Size {
     }
 }
 
-/// A set of effects that may be what is missing.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-struct Explanation {
-    effects: BTreeSet<String>,
-    probability: f64,
-}
-
 /// What is expected of a component without anything missing.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 struct Floor {
@@ -131,8 +124,6 @@ pub struct Answer {
     pub effects: Vec<NamedEffect>,
     #[serde(default)]
     alternatives: Vec<Alternative>,
-    #[serde(default)]
-    explanations: Vec<Explanation>,
     #[serde(default)]
     not_testable: Vec<NotTestable>,
     /// Where the gap is.
@@ -171,12 +162,7 @@ impl Answer {
                 let grows = self.closure().is_some_and(|closure| closure < 0.0);
                 let left = held_out.iter().find(|entry| leaves(*entry).unwrap_or(false));
                 let left = left.map(|(name, _)| format!("what is named leaves most of the gap of {name}"));
-                let own = self.explanations.iter().find(|of| of.effects.iter().eq(self.names()));
-                let weak = own.filter(|own| own.probability <= 0.5).map(|own| {
-                    format!("what is named has a probability of {}, less than all else", own.probability)
-                });
-                let grows = grows.then(|| "the held-out gap grows with what is named".to_owned());
-                left.or(grows).or(weak)
+                left.or_else(|| grows.then(|| "the held-out gap grows with what is named".to_owned()))
             }
             Verdict::Ambiguous | Verdict::NoCandidateFits => None,
         }
@@ -257,15 +243,6 @@ mod tests {
         assert_eq!(why(&held(39.0, 0.6)), None, "a fifth of the squared gap");
         assert!(why(&held(45.0, 0.5)).unwrap().contains("most of the gap of fx"));
         assert!(why(&held(9.0, -0.1)).unwrap().contains("grows"));
-        let named = |probability: f64| {
-            serde_json::json!({
-                "verdict": "named",
-                "effects": [{"name": "current"}, {"name": "added_mass"}],
-                "explanations": [{"effects": ["added_mass", "current"], "probability": probability}]
-            })
-        };
-        assert_eq!(why(&named(0.51)), None);
-        assert!(why(&named(0.5)).unwrap().contains("a probability of 0.5"));
         let size = |expected: f64| {
             let fz = serde_json::json!({"interval": [4.0, 6.0], "expected_at_most": expected});
             serde_json::json!({"verdict": "nothing_missing", "gap": {"size": {"fz": fz}}})

@@ -57,10 +57,6 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
                 "; the closest candidate is {names}, but effects that the held-out trials disprove are more probable ({})",
                 probability(p)
             ),
-            Unfit::Improbable(p) => format!(
-                "; the closest candidate is {names}, with a probability of {}, and the next explanation is none of the library",
-                probability(p)
-            ),
             Unfit::Leaves => format!("; the closest candidate is {names}, but serial correlation remains"),
         };
     }

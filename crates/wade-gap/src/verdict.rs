@@ -82,8 +82,6 @@ pub(super) enum Unfit {
     Unlikely(f64),
     /// Other effects are more probable, with this probability, and the held-out trials disprove them.
     Outweighed(f64),
-    /// They have this probability, and that nothing is missing or that nothing of the library explains the gap comes next.
-    Improbable(f64),
 }
 
 impl Found {
@@ -177,10 +175,9 @@ impl Found {
         Some(set)
     }
 
-    /// Names nothing against the weight of the evidence: where all other explanations together are more probable than the members, those
-    /// that are more probable than the members stand beside them; of members that are the most probable, those that together with them
-    /// are more probable than not. Where the first of these is none of the library, or where the held-out trials disprove all of them,
-    /// nothing is named: then neither the members nor they are what is missing.
+    /// Names nothing against the weight of the evidence: where other effects than the members are more probable than not, the
+    /// explanations that are more probable than the members stand beside them. Where the first of these is none of the library, or where
+    /// the held-out trials disprove all of them, nothing is named: then neither the members nor they are what is missing.
     pub fn heed(&mut self, weighed: &[Weighed], holds: impl Fn(&[Member]) -> bool) {
         let probability = |name: &str| {
             let explanations = weighed.iter().map(|weighed| &weighed.explanation);
@@ -197,29 +194,18 @@ impl Found {
             return;
         }
         let Some(own) = self.own(weighed) else { return };
-        let least = own.explanation.probability;
-        if self.verdict != Verdict::Named || least > 0.5 {
+        if self.verdict != Verdict::Named || more_probable_than_not(weighed) == self.names {
             return;
         }
-        let before = weighed.iter().filter(|weighed| weighed.explanation.probability > least);
-        let mut beside: Vec<&Weighed> = before.collect();
-        if beside.is_empty() {
-            let mut sum = least;
-            let next = weighed.iter().filter(|weighed| weighed.explanation.effects != self.names);
-            let is_needed = |weighed: &&Weighed| {
-                let is_needed = sum <= 0.5;
-                sum += weighed.explanation.probability;
-                is_needed
-            };
-            beside = next.take_while(is_needed).collect();
-        }
-        let Some(first) = beside.first().map(|first| &first.explanation) else { return };
-        let of_library = beside.iter().filter(|weighed| weighed.explanation.is_of_library());
+        let least = own.explanation.probability;
+        let before: Vec<&Weighed> =
+            weighed.iter().filter(|weighed| weighed.explanation.probability > least).collect();
+        let Some(first) = before.first().map(|first| &first.explanation) else { return };
+        let of_library = before.iter().filter(|weighed| weighed.explanation.is_of_library());
         let alternatives: Vec<Vec<Member>> =
             of_library.map(|weighed| &weighed.set).filter(|set| holds(set)).cloned().collect();
         let unfit = match first.is_of_library() {
-            false if first.probability > least => Some(Unfit::Unlikely(first.probability)),
-            false => Some(Unfit::Improbable(least)),
+            false => Some(Unfit::Unlikely(first.probability)),
             true => alternatives.is_empty().then_some(Unfit::Outweighed(first.probability)),
         };
         if unfit.is_some() {
