@@ -57,6 +57,10 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
                 "; the closest candidate is {names}, but effects that the held-out trials disprove are more probable ({})",
                 probability(p)
             ),
+            Unfit::Doubtful(p) => format!(
+                "; the closest candidate is {names}, but that nothing is missing has a probability of {}",
+                probability(p)
+            ),
             Unfit::Leaves => format!("; the closest candidate is {names}, but serial correlation remains"),
         };
     }

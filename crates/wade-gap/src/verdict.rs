@@ -82,6 +82,8 @@ pub(super) enum Unfit {
     Unlikely(f64),
     /// Other effects are more probable, with this probability, and the held-out trials disprove them.
     Outweighed(f64),
+    /// That nothing is missing has this probability.
+    Doubtful(f64),
 }
 
 impl Found {
@@ -175,7 +177,7 @@ impl Found {
         Some(set)
     }
 
-    /// Names nothing against the weight of the evidence: where other effects than the members are more probable than not, the
+    /// Names nothing against the weight of the evidence, and nothing while it is not unlikely that nothing is missing: where other effects than the members are more probable than not, the
     /// explanations that are more probable than the members stand beside them. Where the first of these is none of the library, or where
     /// the held-out trials disprove all of them, nothing is named: then neither the members nor they are what is missing.
     pub fn heed(&mut self, weighed: &[Weighed], holds: impl Fn(&[Member]) -> bool) {
@@ -190,6 +192,12 @@ impl Found {
             self.verdict = Verdict::NoCandidateFits;
             self.alternatives.clear();
             self.unfit = is_outside.then_some(Unfit::Unlikely(outside));
+            self.left = self.of_gap.clone();
+            return;
+        }
+        if self.verdict == Verdict::Named && nothing >= UNLIKELY {
+            self.verdict = Verdict::NoCandidateFits;
+            self.unfit = Some(Unfit::Doubtful(nothing));
             self.left = self.of_gap.clone();
             return;
         }

@@ -99,7 +99,8 @@ pub fn baselines() -> String {
 
 /// The benchmark on the shipped bundles; measures of which there is no case are left out.
 pub fn bundles() -> String {
-    measures(&json(newest("gap-bench-warthog.json")))
+    let of = |vehicle: &str| measures(&json(newest(&format!("gap-bench-{vehicle}.json"))));
+    format!("{}\n{}", of("warthog"), of("husky"))
 }
 
 /// Driven vehicles whose wrench is inferred from their motion: first what has a target, then each group of cases in a row.
