@@ -1,5 +1,6 @@
 //! `wade gap bench`.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,7 +11,6 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use wade_core::condition::Condition;
 use wade_core::effects::Body;
-use wade_core::model::Model;
 use wade_core::physics::Physics;
 use wade_core::vehicle::{Vehicle, shipped};
 use wade_gap::{Asked, Config, GapError, Predicted};
@@ -212,7 +212,9 @@ impl Bench {
             bail!("{}: the benchmark hides effects of four wheels, and the vehicle has others", vehicle.name);
         }
         let hull = Hull::of_vehicle(vehicle);
-        let answers = |run: &[wade_gap_bench::Asked]| modeled(model, run);
+        // each run begins without a memory
+        let predict = RefCell::new(predictor(model, Physics::Full));
+        let answers = |run: &[wade_gap_bench::Asked]| modeled(&mut *predict.borrow_mut(), run);
         let workflow = |trials: &Trials| answer(trials, &body, &mut predictor(model, Physics::Full));
         let prediction = Prediction::Model(&answers);
         self.run_on(out, vehicle, Simulator { hull: &hull, prediction, vehicle: &vehicle.name }, &workflow)
@@ -353,8 +355,7 @@ impl Bench {
 }
 
 /// A bundle's answers to a run.
-fn modeled(model: &Model, run: &[wade_gap_bench::Asked]) -> Vec<Modeled> {
-    let mut predict = predictor(model, Physics::Full);
+fn modeled(predict: &mut dyn FnMut(&Asked<'_>) -> Predicted, run: &[wade_gap_bench::Asked]) -> Vec<Modeled> {
     let mut before = None;
     let mut answer = |asked: &wade_gap_bench::Asked| {
         let t = asked.state.t;

@@ -86,7 +86,7 @@ impl ModelError {
     pub fn take_off(&self, rows: &mut [f64]) {
         let width = self.parts.len();
         for (place, Part { z, share, .. }) in self.parts.iter().enumerate() {
-            let own = DVector::from_iterator(z.nrows(), rows.iter().skip(place).step_by(width).copied());
+            let own = self.own_rows(rows, place);
             let off = z * (share * z.tr_mul(&own));
             rows.iter_mut().skip(place).step_by(width).zip(&off).for_each(|(row, off)| *row -= off);
         }
@@ -95,12 +95,16 @@ impl ModelError {
     /// Products of a column of rows, of which the error's share was taken off, with each of the unit Gaussian weights that the error
     /// is a sum over.
     pub fn products(&self, rows: &[f64]) -> Vec<f64> {
-        let width = self.parts.len();
-        let of = |(place, Part { z, left, .. }): (usize, &Part)| {
-            let own = DVector::from_iterator(z.nrows(), rows.iter().skip(place).step_by(width).copied());
-            (left * z.tr_mul(&own)).data.as_vec().clone()
+        let of = |(place, Part { z, left, .. }): (usize, &Part)| -> Vec<f64> {
+            (left * z.tr_mul(&self.own_rows(rows, place))).data.into()
         };
         self.parts.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Of rows of all components in turn, those of one.
+    fn own_rows(&self, rows: &[f64], place: usize) -> DVector<f64> {
+        let own = rows.iter().skip(place).step_by(self.parts.len()).copied();
+        DVector::from_vec(own.collect())
     }
 
     /// Sum of squares that a smooth error of the stated size leaves in the rows in 19 of 20 draws at most: a chi-square of its degrees

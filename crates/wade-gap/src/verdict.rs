@@ -177,9 +177,10 @@ impl Found {
         Some(set)
     }
 
-    /// Names nothing against the weight of the evidence, and nothing while it is not unlikely that nothing is missing: where other effects than the members are more probable than not, the
+    /// Names nothing against the weight of the evidence: where other effects than the members are more probable than not, the
     /// explanations that are more probable than the members stand beside them. Where the first of these is none of the library, or where
-    /// the held-out trials disprove all of them, nothing is named: then neither the members nor they are what is missing.
+    /// the held-out trials disprove all of them, nothing is named: then neither the members nor they are what is missing. Nor is
+    /// anything named while it is not unlikely that nothing is missing.
     pub fn heed(&mut self, weighed: &[Weighed], holds: impl Fn(&[Member]) -> bool) {
         let probability = |name: &str| {
             let explanations = weighed.iter().map(|weighed| &weighed.explanation);
@@ -189,17 +190,10 @@ impl Found {
         let is_outside = self.verdict == Verdict::Ambiguous && outside > 0.5;
         let is_something = self.is_relevant && nothing < UNLIKELY;
         if is_outside || self.verdict == Verdict::NothingMissing && is_something {
-            self.verdict = Verdict::NoCandidateFits;
-            self.alternatives.clear();
-            self.unfit = is_outside.then_some(Unfit::Unlikely(outside));
-            self.left = self.of_gap.clone();
-            return;
+            return self.name_nothing(is_outside.then_some(Unfit::Unlikely(outside)));
         }
         if self.verdict == Verdict::Named && nothing >= UNLIKELY {
-            self.verdict = Verdict::NoCandidateFits;
-            self.unfit = Some(Unfit::Doubtful(nothing));
-            self.left = self.of_gap.clone();
-            return;
+            return self.name_nothing(Some(Unfit::Doubtful(nothing)));
         }
         let Some(own) = self.own(weighed) else { return };
         if self.verdict != Verdict::Named || more_probable_than_not(weighed) == self.names {
@@ -217,13 +211,19 @@ impl Found {
             true => alternatives.is_empty().then_some(Unfit::Outweighed(first.probability)),
         };
         if unfit.is_some() {
-            self.verdict = Verdict::NoCandidateFits;
-            self.unfit = unfit;
-            self.left = self.of_gap.clone();
+            self.name_nothing(unfit);
         } else {
             self.verdict = Verdict::Ambiguous;
             self.alternatives = alternatives;
         }
+    }
+
+    /// Leaves the gap as it is.
+    fn name_nothing(&mut self, unfit: Option<Unfit>) {
+        self.verdict = Verdict::NoCandidateFits;
+        self.alternatives.clear();
+        self.unfit = unfit;
+        self.left = self.of_gap.clone();
     }
 }
 
