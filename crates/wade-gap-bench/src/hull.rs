@@ -1,5 +1,7 @@
 //! The body under water as columns: a table of fullness over height, on a grid over length and width.
 
+use wade_core::condition::Condition;
+use wade_core::effects::{Body, Immersion};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::vehicle::Vehicle;
@@ -32,6 +34,8 @@ pub struct Hull {
     pub wheel: [f64; 2],
     /// Volume below a height, over length and width, at even heights from 0 to `height` [m].
     filled: Vec<f64>,
+    /// Area below these heights of the sides that look along x and y, both ways [m2].
+    facing: Vec<[f64; 2]>,
 }
 
 /// A transverse strip of the body.
@@ -53,6 +57,7 @@ impl Hull {
     /// A closed box of an axis ratio between a Husky and a Warthog, standing on its bottom.
     pub fn generated_box() -> Self {
         let (length, width, height) = (1.2, 0.8, 0.5);
+        let heights = || (0..=SLICES).map(|i| height * i as f64 / SLICES as f64);
         Self {
             length,
             width,
@@ -61,7 +66,8 @@ impl Hull {
             z0: -0.25,
             center_of_mass: Vec3::zeros(),
             wheel: [0.2, 0.12],
-            filled: (0..=SLICES).map(|i| height * i as f64 / SLICES as f64).collect(),
+            filled: heights().collect(),
+            facing: heights().map(|height| [2.0 * width * height, 2.0 * length * height]).collect(),
         }
     }
 
@@ -69,9 +75,20 @@ impl Hull {
     pub fn of_vehicle(vehicle: &Vehicle) -> Self {
         let (length, width) = (vehicle.dimensions.length, vehicle.dimensions.width);
         let height = vehicle.dimensions.height;
-        let volume = |i: usize| {
-            let plane = WaterPlane::level(vehicle.z0, height * i as f64 / SLICES as f64);
+        let heights = || (0..=SLICES).map(|i| height * i as f64 / SLICES as f64);
+        let volume = |depth: f64| {
+            let plane = WaterPlane::level(vehicle.z0, depth);
             hydrostatics(&vehicle.hull.mesh, &plane, 1.0, &Vec3::zeros()).displaced_volume / (length * width)
+        };
+        let body = Body::of_vehicle(vehicle);
+        let mut immersion = Immersion::default();
+        let facing = |depth: f64| {
+            body.immerse(&Condition::level(Vec3::zeros(), depth), &mut immersion);
+            let panels = || body.panels.iter().zip(&immersion.panels);
+            let along = |axis: usize| -> f64 {
+                panels().map(|(p, wet)| (p.facing_plus[axis] + p.facing_minus[axis]) * wet.fraction).sum()
+            };
+            [along(0), along(1)]
         };
         Self {
             length,
@@ -81,15 +98,26 @@ impl Hull {
             z0: vehicle.z0,
             center_of_mass: vehicle.center_of_mass,
             wheel: wheel_of(vehicle),
-            filled: (0..=SLICES).map(volume).collect(),
+            filled: heights().map(volume).collect(),
+            facing: heights().map(facing).collect(),
         }
     }
 
     /// Volume below a height over the area of the bounding box [m].
     pub(super) fn filled(&self, depth: f64) -> f64 {
+        self.between(depth, |slice| self.filled[slice])
+    }
+
+    /// Wet area of the sides that look along x or y, both ways, level [m2].
+    pub(super) fn facing(&self, depth: f64, axis: usize) -> f64 {
+        self.between(depth, |slice| self.facing[slice][axis])
+    }
+
+    /// A number of the slices at a height between them.
+    fn between(&self, depth: f64, at: impl Fn(usize) -> f64) -> f64 {
         let place = (depth / self.height).clamp(0.0, 1.0) * SLICES as f64;
         let below = (place as usize).min(SLICES - 1);
-        self.filled[below] + (self.filled[below + 1] - self.filled[below]) * (place - below as f64)
+        at(below) + (at(below + 1) - at(below)) * (place - below as f64)
     }
 
     /// Displaced volume, level [m3].

@@ -12,7 +12,7 @@ use super::effects_file::remarks;
 use super::experiment::{next_step, separating};
 use super::explanations::{Weighed, stated, suspected};
 use super::fit::{Fit, Parameter, fit};
-use super::holdout::{Closure, closures, explained_of_rows, worse};
+use super::holdout::{Closure, Explained, closures, explained_of_rows, worse};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
@@ -61,8 +61,8 @@ impl HeldOut {
         let floors = floors_of(all, held, judge.floors, &setting.components);
         let closures = closures(&named, all, held, setting, &floors, config);
         let small = closures.get("all").and_then(|closure| {
-            let share = explained_of_rows(&named, all, held, judge).unwrap_or(closure.explained());
-            closure.disproof(share, config.coverage, judge.has_fault(members))
+            let explained = explained_of_rows(&named, all, held, judge).unwrap_or(closure.explained());
+            closure.disproof(explained, config.coverage, judge.has_fault(members))
         });
         let disproof = small.or_else(|| disproved(&closures, judge.floors));
         Self { fitted, named, closures, disproof }
@@ -191,7 +191,7 @@ fn disproved(held_out: &BTreeMap<&'static str, Closure>, floors: &[Floor; 6]) ->
     /// Share of the squared gap that a law may leave: formulas of one effect differ by as much.
     const OFF: f64 = 0.2;
     let all = held_out.get("all")?;
-    let share = all.explained();
+    let Explained { share, .. } = all.explained();
     let leaves = |(name, floor): (&&str, &Floor)| {
         held_out.get(name).is_some_and(|of| {
             let floor = of.noise_floor.hypot(floor.model);

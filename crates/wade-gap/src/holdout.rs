@@ -11,7 +11,6 @@ use super::judge::Judge;
 use super::locate::{Limits, OPEN, Region, inside};
 use super::model_error::ModelError;
 use super::noise::Floor;
-use super::rates::mean_square;
 use super::series::Series;
 use super::statistics::quantile;
 use super::{Config, Named};
@@ -44,21 +43,34 @@ pub struct Closure {
     pub interval: Option<[f64; 2]>,
 }
 
+/// What of a gap is explained where nobody looked while it was named.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Explained {
+    /// Share of the squared gap above noise and the model's own error; of all components together, in floors.
+    pub share: f64,
+    /// Upper end of the interval of the closure; none where it has none.
+    pub closes_at_most: Option<f64>,
+}
+
 impl Closure {
-    /// Share of the squared gap above noise and the model's own error that is explained; of all components together, in floors.
-    pub(super) fn explained(&self) -> f64 {
-        above_noise(self.before.powi(2), self.after.powi(2))
+    /// As a model that states no error is judged.
+    pub(super) fn explained(&self) -> Explained {
+        Explained {
+            share: above_noise(self.before.powi(2), self.after.powi(2)),
+            closes_at_most: self.interval.map(|[_, high]| high),
+        }
     }
 
     /// The share that is explained where what was named does not hold on trials that nobody looked at: less than `least` is explained
     /// and what is left of all components is loud; or it names a fault of a sensor, which is exact, and closes too little even at the
     /// upper end of the interval.
-    pub(super) fn disproof(&self, share: f64, least: f64, is_fault: bool) -> Option<f64> {
+    pub(super) fn disproof(&self, explained: Explained, least: f64, is_fault: bool) -> Option<f64> {
         /// In noise and the model's own error, as all components together are.
         const LOUD: f64 = 2.0;
         /// Closure that a fault must reach.
         const EXACT: f64 = 0.7;
-        let inexact = is_fault && self.interval.is_some_and(|[_, high]| high < EXACT);
+        let Explained { share, closes_at_most } = explained;
+        let inexact = is_fault && closes_at_most.is_some_and(|most| most < EXACT);
         (inexact || self.after > LOUD && share < least).then_some(share)
     }
 }
@@ -160,30 +172,49 @@ pub(super) fn closures(
     closures
 }
 
-/// Share of the squared gap that is explained as naming saw it, where the model states how far it may be off: in rows without the
-/// share that its error has in them. What was named is held to nothing that its naming did not look at.
+/// What is explained as naming saw it, where the model states how far it may be off: in rows without the share that its error has in
+/// them. What was named is held to nothing that its naming did not look at.
 pub(super) fn explained_of_rows(
     named: &[Named],
     all: &[Series],
     held: &[usize],
     judge: &Judge,
-) -> Option<f64> {
-    let (noise, setting) = (&judge.design.noise, judge.setting);
+) -> Option<Explained> {
+    let (noise, setting, config) = (&judge.design.noise, judge.setting, judge.config);
     if !noise.model {
         return None;
     }
     let components = &setting.components;
-    let rows = Rows::new(all, held, components, judge.config.block_s);
+    let rows = Rows::new(all, held, components, config.block_s);
     let error = ModelError::new(all, held, components, noise);
-    let of = |value: &dyn Fn(usize) -> Column| {
-        mean_square(&to_rows(all, &rows, held, components, (noise, &error), value))
+    let squares = |value: &dyn Fn(usize) -> Column| -> Vec<f64> {
+        let of_all = to_rows(all, &rows, held, components, (noise, &error), value);
+        rows.of_trial.iter().map(|of| of_all[of.clone()].iter().map(|row| row * row).sum()).collect()
     };
-    let after = |trial: usize| {
+    let left = |trial: usize| {
         let added = explained(named, &all[trial], trial, setting);
         let less = |(gap, added): (&[f64; 6], &[f64; 6])| std::array::from_fn(|c| gap[c] - added[c]);
         all[trial].gap.iter().zip(&added).map(less).collect()
     };
-    Some(above_noise(of(&|trial| all[trial].gap.clone()), of(&after)))
+    let (before, after) = (squares(&|trial| all[trial].gap.clone()), squares(&left));
+    let means = |trials: &[usize]| {
+        let count = trials.iter().map(|&place| rows.of_trial[place].len() as f64).sum::<f64>().max(1.0);
+        [&before, &after].map(|squares| trials.iter().map(|&place| squares[place]).sum::<f64>() / count)
+    };
+    let everything: Vec<usize> = (0..held.len()).collect();
+    let [whole, whole_left] = means(&everything);
+    let mut random = Random::new(config.seed ^ 0xc105);
+    let mut closures: Vec<f64> = (0..config.bootstrap)
+        .filter_map(|_| {
+            let pick = || (random.unit() * held.len() as f64) as usize;
+            let draw: Vec<usize> = std::iter::repeat_with(pick).take(held.len()).collect();
+            let [before, after] = means(&draw).map(f64::sqrt);
+            (before > ABOVE).then(|| (before - after) / (before - 1.0))
+        })
+        .collect();
+    let is_told = held.len() >= ENOUGH && closures.len() * 2 > config.bootstrap;
+    let closes_at_most = is_told.then(|| quantile(&mut closures, 0.95));
+    Some(Explained { share: above_noise(whole, whole_left), closes_at_most })
 }
 
 /// Share that is explained of what stands above the noise, of mean squares in units of it.

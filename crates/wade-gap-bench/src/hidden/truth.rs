@@ -24,16 +24,7 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
     let one = |names, unit, value| vec![Parameter { names, unit, value }];
     match hidden.effect {
         Effect::AddedMass => added_mass(size, setting, tracks),
-        Effect::LinearDamping => {
-            let damping = setting.simulator.hull.width * mean_depth(tracks) * size;
-            let per_area = Parameter { names: &["b", "coefficient"], unit: "N s/m3", value: size };
-            let along =
-                Parameter { names: &["b_x", "surge", "coefficient_x"], unit: "N s/m", value: damping };
-            // over the density, the speed of waves as long as the body, and both sides that look along the motion
-            let waves = (GRAVITY * setting.simulator.hull.length).sqrt();
-            let number = Parameter { names: &["surge"], unit: "1", value: size / (2.0 * DENSITY * waves) };
-            vec![per_area, along, number]
-        }
+        Effect::LinearDamping => linear_damping(size, setting, mean_depth(tracks)),
         Effect::DragCoefficientError => {
             let share =
                 Parameter { names: &["relative_error", "share", "factor", "error"], unit: "1", value: size };
@@ -42,7 +33,11 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
         }
         Effect::Rotation => {
             let factor = Parameter { names: &["coefficient", "factor", "scale"], unit: "1", value: size };
-            vec![factor, Parameter { names: &["drag_coefficient"], unit: "1", value: size * DRAG[1] }]
+            // of strips as high as the mean of the body over its width, on the sides that look along y
+            let (hull, depth) = (setting.simulator.hull, mean_depth(tracks));
+            let of_sides = 2.0 * hull.volume(depth) / hull.width / hull.facing(depth, 1);
+            let drag = size * DRAG[1] * of_sides;
+            vec![factor, Parameter { names: &["drag_coefficient"], unit: "1", value: drag }]
         }
         Effect::Current => {
             let along = |names, value| Parameter { names, unit: "m/s", value };
@@ -67,10 +62,13 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
                 unit: "m2",
                 value: size * hull.length * hull.width,
             };
+            // of the volume that the hull displaces
+            let depth = mean_depth(tracks);
+            let displaced = size * hull.length * hull.width * depth / hull.volume(depth);
             let share = Parameter {
                 names: &["share", "permeability", "fraction", "flooded_share"],
                 unit: "1",
-                value: size,
+                value: displaced,
             };
             vec![area, share]
         }
@@ -119,6 +117,20 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
         | Effect::MudSuction
         | Effect::Seiche => Vec::new(),
     }
+}
+
+/// Of the whole body along x, and over the density, the speed of waves as long as the body, and the sides that look along an axis.
+fn linear_damping(size: f64, setting: &Setting, depth: f64) -> Vec<Parameter> {
+    let hull = setting.simulator.hull;
+    let per_area = Parameter { names: &["b", "coefficient"], unit: "N s/m3", value: size };
+    let whole = size * depth * hull.width;
+    let along = Parameter { names: &["b_x", "surge", "coefficient_x"], unit: "N s/m", value: whole };
+    let waves = (GRAVITY * hull.length).sqrt();
+    let number =
+        |axis: usize, across: f64| size * depth * across / (DENSITY * waves * hull.facing(depth, axis));
+    let surge = Parameter { names: &["surge"], unit: "1", value: number(0, hull.width) };
+    let sway = Parameter { names: &["sway"], unit: "1", value: number(1, hull.length) };
+    vec![per_area, along, surge, sway]
 }
 
 /// The kernel at the draft for which it is stated, and over the weight of the water displaced there and the length.
