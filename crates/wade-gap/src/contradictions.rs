@@ -21,6 +21,10 @@ const TURNS: [(f64, &str); 3] = [
     (360.0 / std::f64::consts::TAU, "degrees a second"),
     (1.0 / std::f64::consts::TAU, "revolutions a second"),
 ];
+/// Share by which the rolling radius of a rim speed in m/s, which is 1 m, may miss it.
+const RIM: f64 = 0.05;
+/// Times that a rolling radius is too large where the velocity is in km/h.
+const KILOMETERS_AN_HOUR: f64 = 3.6;
 /// Factor between a stated noise and that of the samples from which they contradict each other: an estimate from a few trials
 /// is good to a third.
 const CONTRADICTS: f64 = 3.0;
@@ -40,8 +44,15 @@ pub(super) fn check(
     }
     if let Some(radius) = rolling_radius {
         let is_near = |factor: f64| (radius * factor / body.wheel_radius - 1.0).abs() < SLIP;
-        if let Some((_, unit)) = TURNS.into_iter().find(|(factor, _)| is_near(*factor)) {
-            return Err(GapError::WheelUnit { radius, wheel: body.wheel_radius, unit });
+        let turns = TURNS.into_iter().find(|(factor, _)| is_near(*factor));
+        let turns = turns.map(|(_, unit)| format!("their speeds are in {unit}: write rad/s"));
+        let is_rim = (radius - 1.0).abs() < RIM && !is_near(1.0);
+        let rim =
+            is_rim.then(|| "their speeds are those of the rims in m/s: divide by the radius".to_owned());
+        let fast = is_near(1.0 / KILOMETERS_AN_HOUR);
+        let fast = fast.then(|| "the velocities are in km/h: divide by 3.6".to_owned());
+        if let Some(suspected) = turns.or(rim).or(fast) {
+            return Err(GapError::WheelUnit { radius, wheel: body.wheel_radius, suspected });
         }
     }
     for group in groups(all, manifest) {

@@ -133,6 +133,42 @@ pub enum GapError {
         /// The other.
         other: &'static str,
     },
+    /// One channel under two names.
+    #[error("columns {column} and {other} hold the same values in every row: one of them was written twice")]
+    Copied {
+        /// The column.
+        column: &'static str,
+        /// The other.
+        other: &'static str,
+    },
+    /// A load that holds the weight of the vehicle.
+    #[error(
+        "column {column} is {off:.0} N off what is expected in every trial, as where it holds the weight of the vehicle ({mass} kg, {weight:.0} N): loads are those of the water on the vehicle; take the weight off, m g along the world's up in body axes"
+    )]
+    Weight {
+        /// The column.
+        column: &'static str,
+        /// Measured less expected, mean [N].
+        off: f64,
+        /// Of the vehicle [kg].
+        mass: f64,
+        /// Of the vehicle [N].
+        weight: f64,
+    },
+    /// Known forces, or a mass, in another unit.
+    #[error(
+        "inverse_dynamics, {column}: the motion less the known forces is what is expected of the water if {what} of trials.toml is {factor:.3} times as large: {suspected}"
+    )]
+    Driven {
+        /// The component.
+        column: &'static str,
+        /// What is in another unit.
+        what: &'static str,
+        /// What it must be multiplied with.
+        factor: f64,
+        /// A question.
+        suspected: &'static str,
+    },
     /// A load in another unit.
     #[error(
         "column {column} of {place} is {ratio:.2e} of what is expected: is it in {other}? It must be in {unit}"
@@ -225,17 +261,17 @@ pub enum GapError {
         /// Width of the hull [m].
         hull: f64,
     },
-    /// Wheel speeds in another unit.
+    /// Wheel speeds, or velocities, in another unit.
     #[error(
-        "columns wheel_fl to wheel_rr: the wheels roll with a radius of {radius:.4} m, and have one of {wheel:.3} m, as where their speeds are in {unit}: write rad/s"
+        "columns wheel_fl to wheel_rr: the wheels roll with a radius of {radius:.4} m, and have one of {wheel:.3} m, as where {suspected}"
     )]
     WheelUnit {
         /// Speed over wheel speed [m].
         radius: f64,
         /// Of the vehicle's wheels [m].
         wheel: f64,
-        /// The likely unit.
-        unit: &'static str,
+        /// What is likely, and what to do.
+        suspected: String,
     },
     /// A repeat that is another motion.
     #[error(

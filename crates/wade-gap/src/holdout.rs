@@ -330,8 +330,8 @@ mod tests {
         assert_eq!(of(2.1, 1.9), None, "what is left is hardly larger than the noise");
         let fault = |high: f64| {
             let interval = Some([0.4, high]);
-            Closure { before: 1.2, after: 1.1, noise_floor: 1.0, closure: Some(0.5), interval }
-                .disproof(0.5, 0.6, true)
+            let closure = Closure { before: 1.2, after: 1.1, noise_floor: 1.0, closure: Some(0.5), interval };
+            closure.disproof(closure.explained(), 0.6, true)
         };
         assert!(fault(0.64).is_some() && fault(0.82).is_none(), "a zero that is off explains all of it");
     }

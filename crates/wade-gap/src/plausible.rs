@@ -5,8 +5,10 @@ use std::ops::Range;
 use super::GapError;
 use super::noise::sample_noise;
 use super::series::Series;
+use super::smoothing::bins;
 use super::statistics::quantile;
 use wade_core::effects::Immersion;
+use wade_core::frame::GRAVITY;
 use wade_learn::trials::WRENCH;
 
 /// Fewest samples in which a channel that never changes is told from one that happens not to.
@@ -23,8 +25,27 @@ const OFF: f64 = 1.6;
 /// which are looked at together. A pound foot is too near a newton meter to be known from it.
 const POUND_N: f64 = 4.448_222;
 const KILOGRAM_N: f64 = 9.806_65;
+const INCH: f64 = 0.0254;
 const NEARLY: f64 = 1.35;
 const SAME_UNIT: f64 = 0.95;
+/// Kilograms of a pound.
+const POUND_KG: f64 = 0.453_592_37;
+/// Known forces and masses as many times what is written, and what they seem to be.
+const FORCES: [(f64, &str); 4] = [
+    (THOUSAND, "are they in kN? They must be in N"),
+    (POUND_N, "are they in lbf? They must be in N"),
+    (KILOGRAM_N, "are they in kgf? They must be in N"),
+    (-1.0, "is their sign reversed? A force that drives forward is positive"),
+];
+const MASSES: [(f64, &str); 3] = [
+    (POUND_KG, "is it in lb? It must be in kg"),
+    (1.0 / THOUSAND, "is it in g? It must be in kg"),
+    (THOUSAND, "is it in t? It must be in kg"),
+];
+/// Length of the means over which a motion is held against the known forces [s]: noise of a recorded place hardly reaches into them.
+const SLOW: f64 = 1.0;
+/// Share by which what a channel is off may differ from the weight of the vehicle.
+const OF_WEIGHT: f64 = 0.05;
 /// Correlation with the prediction from which a factor between the two is one, and from which it says that a sign is reversed:
 /// a current that is not known turns the drag of some trials about, but does not mirror it.
 const SAME: f64 = 0.7;
@@ -65,8 +86,8 @@ struct Recorded<'a> {
 type Pair = [f64; 2];
 
 /// Refuses trials without water, trials of the same samples, and measured channels that never change where they should or stop to,
-/// stop short of it, stand in for each other, have their sign reversed or are in another unit.
-pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Result<(), GapError> {
+/// stop short of it, stand in for each other, have their sign reversed, hold the weight of the vehicle, or are in another unit.
+pub(super) fn check(all: &[Series], components: &[usize], inferred: bool, mass: f64) -> Result<(), GapError> {
     let is_wet = |immersion: &Immersion| {
         immersion.volume > 0.0 || immersion.panels.iter().any(|panel| panel.fraction > 0.0)
     };
@@ -84,9 +105,10 @@ pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Res
     }
     // what is inferred is no channel, and in the unit of the mass
     if inferred {
-        return Ok(());
+        return components.iter().filter(|c| **c < 3).try_for_each(|&axis| check_driven(all, axis));
     }
     let channels: Vec<Channel> = components.iter().map(|&component| Channel::new(all, component)).collect();
+    channels.iter().filter(|channel| channel.component == 2).try_for_each(|fz| fz.check_weight(mass))?;
     for channel in &channels {
         channel.check()?;
     }
@@ -95,6 +117,38 @@ pub(super) fn check(all: &[Series], components: &[usize], inferred: bool) -> Res
         rest.into_iter().try_for_each(|b| a.check_apart(b))?;
     }
     Ok(())
+}
+
+/// Refuses known forces and masses in another unit: what moves the vehicle, less the known forces, is what is expected of the water.
+fn check_driven(all: &[Series], axis: usize) -> Result<(), GapError> {
+    let of = |value: &dyn Fn(&Series, usize) -> f64| -> Vec<f64> {
+        all.iter().flat_map(|series| bins(series, SLOW, |sample| value(series, sample))).collect()
+    };
+    let expected = of(&|series, i| series.seen[i][axis]);
+    let known = of(&|series, i| series.other[i][axis]);
+    let moving = of(&|series, i| series.gap[i][axis] + series.seen[i][axis] + series.other[i][axis]);
+    let whole: f64 = expected.iter().map(|expected| expected * expected).sum();
+    // squares that are left of what is expected, which may be off as a prediction is
+    let left = |of_mass: f64, of_known: f64| -> f64 {
+        let given = moving.iter().zip(&known).map(|(m, k)| of_mass * m - of_known * k);
+        let pairs: Vec<Pair> = given.zip(&expected).map(|(given, expected)| [given, *expected]).collect();
+        let [gg, ge, _] = products(&pairs);
+        let scale = (ge / gg.max(f64::MIN_POSITIVE)).clamp(1.0 / OFF, OFF);
+        whole - 2.0 * scale * ge + scale * scale * gg
+    };
+    let as_written = left(1.0, 1.0);
+    let forces =
+        FORCES.map(|(factor, suspected)| (left(1.0, factor), "measured.other_forces", factor, suspected));
+    let masses = MASSES.map(|(factor, suspected)| (left(factor, 1.0), "mass", factor, suspected));
+    let nearest = forces.into_iter().chain(masses).min_by(|a, b| a.0.total_cmp(&b.0));
+    // what is expected must be in what is given, but for what two numbers that say the same may differ by
+    let is_found = |left: f64| left < (1.0 - SAME * SAME) * whole && as_written > SWAPPED * left;
+    match nearest.filter(|(left, ..)| is_found(*left)) {
+        Some((_, what, factor, suspected)) => {
+            Err(GapError::Driven { column: WRENCH[axis], what, factor, suspected })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Few trials with far more noise than the others, which may hide what these show.
@@ -169,6 +223,23 @@ impl<'a> Channel<'a> {
         })
     }
 
+    /// Refuses a vertical force that is off what is expected by the weight of the vehicle.
+    fn check_weight(&self, mass: f64) -> Result<(), GapError> {
+        let weight = mass * GRAVITY;
+        let off = |of: &Recorded| {
+            of.pairs.iter().map(|[measured, expected]| measured - expected).sum::<f64>()
+                / of.pairs.len().max(1) as f64
+        };
+        let offs: Vec<f64> = self.trials.iter().map(off).collect();
+        let is_weight = |off: &f64| (off.abs() / weight - 1.0).abs() < OF_WEIGHT;
+        let is_one_sign = offs.iter().all(|off| off.signum() == offs[0].signum());
+        if weight > 0.0 && is_one_sign && offs.iter().all(is_weight) {
+            let off = offs.iter().sum::<f64>() / offs.len() as f64;
+            return Err(GapError::Weight { column: self.column(), off, mass, weight });
+        }
+        Ok(())
+    }
+
     /// True of one recorded value: a gap is a difference, and adding the prediction to it again leaves an error of rounding.
     fn is_same(&self, a: f64, b: f64) -> bool {
         (a - b).abs() <= 1e-9 * self.size.max(a.abs())
@@ -198,7 +269,7 @@ impl<'a> Channel<'a> {
         let is_nearly = |factor: f64| (1.0 / NEARLY..NEARLY).contains(&(ratio / factor));
         let weights: &[(f64, &'static str)] = match self.component {
             0..3 => &[(1.0 / POUND_N, "lbf"), (1.0 / KILOGRAM_N, "kgf")],
-            _ => &[(1.0 / KILOGRAM_N, "kgf m")],
+            _ => &[(1.0 / KILOGRAM_N, "kgf m"), (100.0, "N cm"), (1.0 / POUND_N / INCH, "lbf in")],
         };
         let weights = weights.iter().copied().find(|(factor, _)| is_nearly(*factor));
         let is_sure = mp > 0.0 && correlation > SAME_UNIT && place == ALL;
@@ -255,8 +326,13 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// Refuses two channels that stand in for each other, in all trials or in one.
+    /// Refuses two channels that are one, or that stand in for each other, in all trials or in one.
     fn check_apart(&self, other: &Self) -> Result<(), GapError> {
+        let both = || self.trials.iter().zip(&other.trials).flat_map(|(a, b)| a.pairs.iter().zip(&b.pairs));
+        let changes = both().any(|([a, _], _)| !self.is_same(*a, 0.0));
+        if changes && both().all(|([a, _], [b, _])| self.is_same(*a, *b)) {
+            return Err(GapError::Copied { column: self.column(), other: other.column() });
+        }
         // how far the two are from what is expected of them, and from what is expected of each other
         let sums = |(ours, theirs): (&Recorded, &Recorded)| {
             // within what noise and an error of the model make of channels of which nothing is expected

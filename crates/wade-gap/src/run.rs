@@ -59,7 +59,8 @@ pub fn run(
         return Err(GapError::Vehicle { trials, asked });
     }
     let (mut all, components) = series(trials, body, predict, config)?;
-    plausible::check(&all, &components, is_inferred(&trials.manifest))?;
+    let mass = trials.manifest.mass.unwrap_or(body.mass);
+    plausible::check(&all, &components, is_inferred(&trials.manifest), mass)?;
     contradictions::check(&all, &trials.manifest, body, rolling_radius(trials))?;
     let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
     check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
@@ -68,7 +69,7 @@ pub fn run(
         body,
         base_drag: BaseDrag::new(&all, body),
         in_channel: all.iter().any(|series| series.channel_width.is_some()),
-        mass: trials.manifest.mass.unwrap_or(body.mass),
+        mass,
         inertia: trials.manifest.inertia_matrix(),
         components,
         inferred: is_inferred(&trials.manifest),

@@ -49,9 +49,41 @@ fn a_channel_that_cannot_be_what_it_is_called_is_refused_with_its_trial() {
         let is_named = |e: &GapError| matches!(e, GapError::Unit { place, column: "fx", other: "kN", .. } if place == of);
         assert!(result.as_ref().is_err_and(is_named), "{result:?}");
     }
-    // a zero that is off by the weight turns fz about, but not its changes
+    // a zero that is off by the weight turns fz about, but not its changes; one that is as far off is another zero
     let [_, everywhere] = refused(&|measured| all(&mut measured[2], &|x| x - planted::MASS * 9.81));
+    let is_weight = |e: &GapError| matches!(e, GapError::Weight { column: "fz", off, .. } if *off < 0.0);
+    assert!(everywhere.as_ref().is_err_and(is_weight), "{everywhere:?}");
+    let [_, everywhere] = refused(&|measured| all(&mut measured[2], &|x| x - 0.8 * planted::MASS * 9.81));
     assert!(everywhere.is_ok(), "{everywhere:?}");
+    let [_, everywhere] = refused(&|measured| measured[1] = measured[0].clone());
+    assert_eq!(everywhere.err(), Some(GapError::Copied { column: "fx", other: "fy" }));
+}
+
+#[test]
+fn known_forces_and_a_mass_in_another_unit_are_named_beside_the_motion() {
+    let good = with_dry_twins(1.0, 1.0, 0.0);
+    let body = wade_gap::body_of(&good).expect("a body");
+    let run = |force: f64, mass: f64| {
+        let mut trials = good.clone();
+        trials.manifest.mass = Some(mass * planted::MASS);
+        let forces = trials.trials.iter_mut().flat_map(|trial| trial.other_forces.values_mut());
+        forces.flatten().for_each(|value| *value *= force);
+        wade_gap::run(&trials, &body, &mut |_| Predicted::default(), &Config::default())
+    };
+    assert!(run(1.0, 1.0).is_ok());
+    // faults that the library has
+    assert!(run(0.7, 1.0).is_ok() && run(1.0, 1.3).is_ok());
+    for (force, mass, what, said) in [
+        (1e-3, 1.0, "measured.other_forces", "in kN?"),
+        (1.0 / 4.448, 1.0, "measured.other_forces", "in lbf?"),
+        (-1.0, 1.0, "measured.other_forces", "reversed?"),
+        (1.0, 2.2046, "mass", "in lb?"),
+        (1.0, 1e3, "mass", "in g?"),
+    ] {
+        let error = run(force, mass).expect_err(said);
+        let is_named = matches!(&error, GapError::Driven { what: w, .. } if *w == what);
+        assert!(is_named && error.to_string().contains(said), "{error}");
+    }
 }
 
 #[test]
@@ -127,8 +159,12 @@ fn what_is_stated_is_held_against_the_trials() {
         [(9.549, "revolutions a minute"), (57.3, "degrees a second"), (0.15915, "revolutions a second")]
     {
         let error = turning(factor).expect_err(said);
-        assert!(matches!(error, GapError::WheelUnit { unit, .. } if unit == said), "{error}");
+        assert!(matches!(&error, GapError::WheelUnit { .. }) && error.to_string().contains(said), "{error}");
     }
+    let rims = turning(radius).expect_err("m/s of the rims");
+    assert!(rims.to_string().contains("rims"), "{rims}");
+    let fast = turning(1.0 / 3.6).expect_err("km/h");
+    assert!(fast.to_string().contains("km/h"), "{fast}");
     let said = |stated: f64| {
         let report = refused(&|trials| {
             trials.manifest.sensor_noise.insert("fx".into(), stated);

@@ -236,9 +236,49 @@ pub enum Fault {
         /// The angular velocity.
         rate_column: &'static str,
     },
+    /// A clock that counts something else than seconds.
+    #[error(
+        "row {row}, column t: it seems to be in {unit}, since {column} changes {ratio:.2e} times as fast over it as {rate_column} says: convert it to seconds"
+    )]
+    TimeUnit {
+        /// The first row.
+        row: u64,
+        /// The angle.
+        column: &'static str,
+        /// The angular velocity.
+        rate_column: &'static str,
+        /// The change of the angle over what its rate turns.
+        ratio: f64,
+        /// What it seems to be in.
+        unit: &'static str,
+    },
+    /// A depth or a level that does not change as the vertical velocity says.
+    #[error(
+        "row {row}, column {column}: it changes {ratio:.3} times as much as vx, vy, vz, roll and pitch say that the vehicle goes down: {suspected} Lengths are in m, velocities in m/s"
+    )]
+    Vertical {
+        /// The first row.
+        row: u64,
+        /// The column.
+        column: &'static str,
+        /// Its change over that of the height.
+        ratio: f64,
+        /// A question.
+        suspected: &'static str,
+    },
+    /// A depth or a level that rises with the vehicle.
+    #[error(
+        "row {row}, column {column}: it falls where vx, vy, vz, roll and pitch say that the vehicle goes down: {column} counts the water upwards, and vz points up; the sign of one of them is reversed"
+    )]
+    Rising {
+        /// The first row.
+        row: u64,
+        /// The column.
+        column: &'static str,
+    },
     /// A clock that contradicts velocity and acceleration.
     #[error(
-        "row {row}, column t: {column} is {ratio:.3e} times the change of the velocity over t: t must be in seconds, velocities in m/s and accelerations in m/s2"
+        "row {row}, column t: {column} is {ratio:.3e} times the change of the velocity over t: t must be in seconds, velocities in m/s and accelerations in m/s2, with one sign"
     )]
     Clock {
         /// The first row.

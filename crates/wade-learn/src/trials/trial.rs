@@ -7,7 +7,7 @@ use super::acceleration::{acceleration, derivative};
 use super::glitch::{Glitch, glitches};
 use super::manifest::{Manifest, Measured};
 use super::table::Table;
-use super::units::{check_accelerometer, check_angles, check_limits};
+use super::units::{check_accelerometer, check_angles, check_limits, check_vertical};
 use super::{Fault, Remark, TrialError, stem};
 use crate::signal::{median_step, pieces};
 use wade_core::at::At;
@@ -152,6 +152,7 @@ impl Trial {
         table.check_time(2)?;
         // what contradicts another column is told more precisely than what lies beyond a limit
         check_angles(&table)?;
+        check_vertical(&table)?;
         check_limits(&table)?;
         check_bed(&table)?;
         check_upright(&table)?;

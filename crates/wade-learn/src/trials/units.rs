@@ -1,11 +1,14 @@
 //! Units that cannot be: values beyond any limit, and columns that contradict each other.
+//!
+//! An angle turns at its rate, and the water rises along a hull as fast as the hull goes down: still water and a clock in seconds
+//! leave no other factor than 1 between them.
 
 use super::manifest::component_of;
 use super::table::Table;
 use super::trial::{DEPTH, WATER_LEVEL, WRENCH};
 use super::{Fault, TrialError};
 use wade_core::at::At;
-use wade_core::frame::{GRAVITY, Vec3};
+use wade_core::frame::{GRAVITY, Vec3, up_from_roll_pitch};
 
 /// Least and largest plausible value of a column, and its unit.
 const LIMITS: [(&[&str], f64, f64, &str); 8] = [
@@ -43,6 +46,25 @@ const SAME_MOTION: f64 = 0.95;
 /// Share by which a factor of 57.3 or 1 / 9.81 may be missed by noise and filters.
 const FACTOR_TOLERANCE: f64 = 0.3;
 
+/// Share of what the rate turns, over a clock that counts frames, below which an angle changes: nothing is recorded at less than
+/// 5 Hz.
+const FRAMES: f64 = 0.2;
+/// Share by which a factor of [`VERTICAL`] may be missed: two of them are a tenth apart.
+const VERTICAL_TOLERANCE: f64 = 0.12;
+/// Times that the water rises along the hull what the hull goes down, in other units.
+const VERTICAL: [(f64, &str); 10] = [
+    (1000.0, "is it in millimeters?"),
+    (100.0, "is it in centimeters?"),
+    (1.0 / 0.0254, "is it in inches?"),
+    (1.0 / 0.3048, "is it in feet?"),
+    (1.0 / 1.943_844, "are the velocities in knots?"),
+    (1.0 / 2.236_936, "are the velocities in miles an hour?"),
+    (0.3048, "are the velocities in feet a second?"),
+    (1.0 / 3.6, "are the velocities in km/h?"),
+    (0.01, "are the velocities in cm/s?"),
+    (0.001, "are the velocities in mm/s, or t in milliseconds?"),
+];
+
 /// Refuses values beyond the limits of their column.
 pub(super) fn check_limits(table: &Table) -> Result<(), TrialError> {
     let start = table.column("t").first().copied().unwrap_or_default();
@@ -78,7 +100,8 @@ fn check_column(
     }
 }
 
-/// Refuses angles in degrees and angular velocities in degrees a second, which show in each other.
+/// Refuses angles in degrees, angular velocities in degrees a second and a clock that does not count seconds, which show in
+/// each other.
 pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
     let t = table.column("t");
     for (angle, rate) in ANGLES.into_iter().filter(|(angle, _)| table.has(angle)) {
@@ -91,7 +114,12 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
         }
         let Some(ratio) = factor(&turned, &unwrapped) else { continue };
         let degrees = 180.0 / std::f64::consts::PI;
-        let fault = if near(ratio, degrees) {
+        let fault = if is_count(t) && ratio < FRAMES {
+            Fault::TimeUnit { row: table.rows[0], column: angle, rate_column: rate, ratio, unit: "frames" }
+        } else if near(ratio, 1e-3) {
+            let unit = "milliseconds";
+            Fault::TimeUnit { row: table.rows[0], column: angle, rate_column: rate, ratio, unit }
+        } else if near(ratio, degrees) {
             let (row, value) = largest(table, angle);
             Fault::Degrees { row, column: angle, value, rate_column: rate, ratio }
         } else if near(ratio, 1.0 / degrees) {
@@ -108,6 +136,43 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
     Ok(())
 }
 
+/// Refuses depths, levels and velocities whose unit or sign shows in each other: still water rises along a hull as fast as the
+/// hull goes down.
+pub(super) fn check_vertical(table: &Table) -> Result<(), TrialError> {
+    let column = if table.has(WATER_LEVEL) { WATER_LEVEL } else { DEPTH };
+    let of = |name: &str, row: usize| table.column(name).get(row).copied().unwrap_or_default();
+    let count = table.column("t").len();
+    let ups: Vec<Vec3> =
+        (0..count).map(|row| up_from_roll_pitch(of("roll", row), of("pitch", row)).into_inner()).collect();
+    let falling = |row: usize| -Vec3::from(["vx", "vy", "vz"].map(|name| of(name, row))).dot(&ups[row]);
+    let sunk = integral(table.column("t"), &(0..count).map(falling).collect::<Vec<_>>());
+    // a depth is counted along the body's z
+    let upright = |row: usize| if column == DEPTH { ups[row].z } else { 1.0 };
+    let level: Vec<f64> = (0..count).map(|row| of(column, row) * upright(row)).collect();
+    let ([xx, xy, yy], _) = products(&sunk, &level);
+    let Some(ratio) = factor(&sunk, &level.iter().map(|l| l * xy.signum()).collect::<Vec<_>>()) else {
+        return Ok(());
+    };
+    let row = table.rows[0];
+    let fault = if xy.abs() < SAME_MOTION * (xx * yy).sqrt() {
+        return Ok(());
+    } else if xy < 0.0 && near(ratio, 1.0) {
+        Fault::Rising { row, column }
+    } else {
+        let distance = |factor: f64| (ratio / factor).ln().abs();
+        let nearest = VERTICAL.into_iter().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+        let found = nearest.filter(|(factor, _)| xy > 0.0 && distance(*factor) < VERTICAL_TOLERANCE);
+        let Some((_, suspected)) = found else { return Ok(()) };
+        Fault::Vertical { row, column, ratio, suspected }
+    };
+    Err(At::path(&table.path)(fault))
+}
+
+/// True for a clock that counts.
+fn is_count(t: &[f64]) -> bool {
+    t.len() > 1 && t.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+}
+
 /// Refuses accelerations in g and accelerations with gravity in them, against the derivative of the velocity [m/s2].
 pub(super) fn check_accelerometer(table: &Table, from_velocity: &[Vec3]) -> Result<(), TrialError> {
     let names = ["ax", "ay", "az"];
@@ -121,8 +186,8 @@ pub(super) fn check_accelerometer(table: &Table, from_velocity: &[Vec3]) -> Resu
     }
     for (derived, column) in derived.iter().zip(names) {
         let ([xx, xy, yy], spread) = products(derived, table.column(column));
-        let ratio = (yy / xx).sqrt();
-        let is_same = xy > SAME_MOTION * (xx * yy).sqrt() && spread > EXCITED[1];
+        let ratio = (yy / xx).sqrt().copysign(xy);
+        let is_same = xy.abs() > SAME_MOTION * (xx * yy).sqrt() && spread > EXCITED[1];
         if is_same && !(1.0 / CLOCK..CLOCK).contains(&ratio) {
             return fault(Fault::Clock { row: table.rows[0], column, ratio });
         }

@@ -210,7 +210,8 @@ fn an_accelerometer_in_g_or_with_gravity_is_named() {
     let with_gravity = message(1.0, 9.81);
     assert!(with_gravity.contains("column az") && with_gravity.contains("gravity"), "{with_gravity}");
     // clocks that run at 50 times and at twice the speed beside an acceleration in m/s2
-    for scale in [50.0, 2.0] {
+    // and one of the two against the other
+    for scale in [50.0, 2.0, -1.0] {
         let clock = message(scale, 0.0);
         assert!(clock.contains("column t") && clock.contains("ax is"), "{clock}");
     }
@@ -239,6 +240,57 @@ fn angles_in_degrees_are_told_from_the_angular_velocity() {
         if turned > std::f64::consts::TAU { turned - std::f64::consts::TAU } else { turned }
     };
     trial(&[("yaw", &heading), ("wz", &|_| 0.5)]);
+}
+
+#[test]
+fn a_clock_that_does_not_count_seconds_is_told_from_the_angular_velocity() {
+    let told = |of_second: f64, unit: &str| {
+        let text = table(&[("yaw", &|t| 0.5 * (2.0 * t).sin()), ("wz", &|t| (2.0 * t).cos())], 200);
+        let mut lines = text.lines().map(str::to_owned);
+        let header = lines.next().expect("a header");
+        let rows = lines.enumerate().map(|(row, line)| {
+            let rest = line.split_once(',').expect("columns").1;
+            format!("{},{rest}", (row as f64 * 0.01 * of_second).round())
+        });
+        let text = std::iter::once(header).chain(rows).collect::<Vec<_>>().join("\n");
+        let error = read(MANIFEST, &[("run.csv", &text)]).expect_err("refused");
+        assert!(matches!(error.fault, Fault::TimeUnit { unit: u, .. } if u == unit), "{error}");
+    };
+    told(1000.0, "milliseconds");
+    told(100.0, "frames");
+}
+
+#[test]
+fn a_depth_and_a_velocity_in_other_units_show_in_each_other() {
+    // bobs, pitched, while it drives ahead: what is forward goes up as well
+    let pitch: f64 = -0.2;
+    let ahead = |t: f64| 0.4 + 0.3 * t.sin();
+    let up = |t: f64| 0.4 * (3.0 * t).cos();
+    let rises = |t: f64| up(t) * pitch.cos() - pitch.sin() * ahead(t);
+    let risen = |t: f64| {
+        let steps = (t / 1e-3).round() as usize;
+        (0..steps).map(|i| 1e-3 * rises(1e-3 * (i as f64 + 0.5))).sum::<f64>()
+    };
+    let of = |depths: f64, velocities: f64| {
+        let (vx, vz) = (move |t: f64| velocities * ahead(t), move |t: f64| velocities * up(t));
+        let depth = move |t: f64| depths * (0.5 - risen(t)) / pitch.cos();
+        let columns: [(&str, &dyn Fn(f64) -> f64); 4] =
+            [("vx", &vx), ("vz", &vz), ("pitch", &|_| pitch), ("depth", &depth)];
+        read(MANIFEST, &[("run.csv", &table(&columns, 200))])
+    };
+    assert!(of(1.0, 1.0).is_ok(), "{:?}", of(1.0, 1.0).err());
+    for (depths, velocities, said) in [
+        (3.2808, 1.0, "in feet?"),
+        (39.37, 1.0, "in inches?"),
+        (1.0, 3.6, "in km/h?"),
+        (1.0, 1.9438, "in knots?"),
+        (1.0, 3.2808, "in feet a second?"),
+    ] {
+        let message = of(depths, velocities).expect_err(said).to_string();
+        assert!(message.contains("column depth") && message.contains(said), "{message}");
+    }
+    let turned = of(1.0, -1.0).expect_err("it rises as it sinks");
+    assert!(matches!(turned.fault, Fault::Rising { column: "depth", .. }), "{turned}");
 }
 
 #[test]
