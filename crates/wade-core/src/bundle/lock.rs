@@ -64,7 +64,8 @@ pub fn exclusively<T>(
         directories.iter().try_for_each(|directory| exclusive(directory).map(|lock| locks.push(lock)));
     let done = locked.and_then(|()| work());
     if done.is_err() {
-        locks.into_iter().for_each(Lock::abandon);
+        // the first one made the folder of the others
+        locks.into_iter().rev().for_each(Lock::abandon);
     }
     done
 }
@@ -79,10 +80,15 @@ fn exclusive(directory: &Path) -> Result<Lock, BundleError> {
             return Err(Fault::Locked { by: by.trim().to_owned() });
         }
         if lock.is_in_place()? {
-            // for whoever waits in vain
-            lock.file.set_len(0)?;
-            writeln!(lock.file, "process {}", std::process::id())?;
-            return Ok(lock);
+            // for whoever waits in vain; a full disk holds not even this
+            let signed = lock.file.set_len(0);
+            return match signed.and_then(|()| writeln!(lock.file, "process {}", std::process::id())) {
+                Ok(()) => Ok(lock),
+                Err(error) => {
+                    lock.abandon();
+                    Err(error.into())
+                }
+            };
         }
     };
     lock().map_err(At::path(&path))

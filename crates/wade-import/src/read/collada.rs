@@ -45,6 +45,12 @@ pub fn load(path: &Path) -> Result<Vec<Part>, ReadError> {
         if seen > MOST_LINKS || depth > MOST_DEPTH {
             return Err(node.fault(format!("is one of more than {MOST_LINKS} nodes, or a node of itself")));
         }
+        if let Some(skin) = node.child("instance_controller") {
+            return Err(skin.fault(
+                "is a skin over bones, which is not read: apply it to the mesh and export the file again"
+                    .to_owned(),
+            ));
+        }
         let frame = above * transform(node)?;
         for instance in node.children("instance_geometry") {
             let mesh = scene.geometry(instance)?;

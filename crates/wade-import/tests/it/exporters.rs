@@ -221,6 +221,15 @@ fn a_packed_glb_is_read_and_a_compressed_one_is_refused_with_the_way_out() {
 }
 
 #[test]
+fn a_skin_over_bones_is_refused_rather_than_left_out() {
+    let text = "<COLLADA><asset><up_axis>Z_UP</up_axis></asset><library_visual_scenes><visual_scene><node>\
+                <instance_controller url=\"#skin\"/></node></visual_scene></library_visual_scenes></COLLADA>";
+    let folder = Folder::new();
+    let said = import(&[folder.write("hull.dae", text)], sixty()).unwrap_err().to_string();
+    assert!(said.contains("hull.dae, line 1") && said.contains("export the file again"), "{said}");
+}
+
+#[test]
 fn a_gap_of_a_tenth_of_a_millimeter_stays_and_rounding_does_not() {
     for (gap, volume) in [(1e-4, 2.0 * VOLUME), (0.0, 2.0 * VOLUME), (1e-8, 2.0 * VOLUME)] {
         let mut mesh = block(HALF);
