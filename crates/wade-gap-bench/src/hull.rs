@@ -1,9 +1,8 @@
 //! The body under water as columns: a table of fullness over height, on a grid over length and width.
 
-use wade_core::condition::Condition;
-use wade_core::effects::{Body, Immersion};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::geometry::hydrostatics::hydrostatics;
+use wade_core::geometry::immersion::wet_triangles;
 use wade_core::vehicle::Vehicle;
 
 use super::{State, Wrench6};
@@ -76,19 +75,18 @@ impl Hull {
         let (length, width) = (vehicle.dimensions.length, vehicle.dimensions.width);
         let height = vehicle.dimensions.height;
         let heights = || (0..=SLICES).map(|i| height * i as f64 / SLICES as f64);
+        let mesh = &vehicle.hull.mesh;
         let volume = |depth: f64| {
             let plane = WaterPlane::level(vehicle.z0, depth);
-            hydrostatics(&vehicle.hull.mesh, &plane, 1.0, &Vec3::zeros()).displaced_volume / (length * width)
+            hydrostatics(mesh, &plane, 1.0, &Vec3::zeros()).displaced_volume / (length * width)
         };
-        let body = Body::of_vehicle(vehicle);
-        let mut immersion = Immersion::default();
         let facing = |depth: f64| {
-            body.immerse(&Condition::level(Vec3::zeros(), depth), &mut immersion);
-            let panels = || body.panels.iter().zip(&immersion.panels);
-            let along = |axis: usize| -> f64 {
-                panels().map(|(p, wet)| (p.facing_plus[axis] + p.facing_minus[axis]) * wet.fraction).sum()
-            };
-            [along(0), along(1)]
+            let plane = WaterPlane::level(vehicle.z0, depth);
+            let wet = (0..mesh.faces.len()).flat_map(|face| wet_triangles(mesh, face, &plane).to_vec());
+            wet.fold([0.0; 2], |[x, y], triangle| {
+                let area = triangle.area_vector();
+                [x + area.x.abs(), y + area.y.abs()]
+            })
         };
         Self {
             length,

@@ -212,8 +212,8 @@ pub(super) fn explained_of_rows(
             (before > ABOVE).then(|| (before - after) / (before - 1.0))
         })
         .collect();
-    let is_told = held.len() >= ENOUGH && closures.len() * 2 > config.bootstrap;
-    let closes_at_most = is_told.then(|| quantile(&mut closures, 0.95));
+    let is_enough = held.len() >= ENOUGH && closures.len() * 2 > config.bootstrap;
+    let closes_at_most = is_enough.then(|| quantile(&mut closures, 0.95));
     Some(Explained { share: above_noise(whole, whole_left), closes_at_most })
 }
 

@@ -42,7 +42,7 @@ const MASSES: [(f64, &str); 3] = [
     (1.0 / THOUSAND, "is it in g? It must be in kg"),
     (THOUSAND, "is it in t? It must be in kg"),
 ];
-/// Length of the means over which a motion is held against the known forces [s]: noise of a recorded place hardly reaches into them.
+/// Length of the means over which a motion is compared with the known forces [s]: noise of a recorded place hardly reaches into them.
 const SLOW: f64 = 1.0;
 /// Share by which what a channel is off may differ from the weight of the vehicle.
 const OF_WEIGHT: f64 = 0.05;
