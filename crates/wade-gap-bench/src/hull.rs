@@ -216,4 +216,20 @@ mod tests {
             assert!((ours / exact - 1.0).abs() < 0.02, "{depth}: {ours} {exact}");
         }
     }
+
+    #[test]
+    fn sides_are_what_looks_along_an_axis() {
+        let hull = Hull::generated_box();
+        assert!((hull.facing(0.2, 0) - 2.0 * 0.8 * 0.2).abs() < 1e-12);
+        assert!((hull.facing(0.2, 1) - 2.0 * 1.2 * 0.2).abs() < 1e-12);
+        // two segments of a disc on each of four wheels, below the hull
+        let vehicle = shipped::warthog().unwrap().vehicle().unwrap();
+        let hull = Hull::of_vehicle(&vehicle);
+        let (radius, depth) = (hull.wheel[0], 0.1);
+        let above: f64 = radius - depth;
+        let segment =
+            radius.powi(2) * (above / radius).acos() - above * (radius.powi(2) - above.powi(2)).sqrt();
+        let sides = hull.facing(depth, 1);
+        assert!((sides / (8.0 * segment) - 1.0).abs() < 0.05, "{sides} {}", 8.0 * segment);
+    }
 }

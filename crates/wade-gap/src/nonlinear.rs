@@ -9,16 +9,17 @@ use super::series::Series;
 use wade_core::effects::current::Current;
 use wade_core::effects::drive::DriveDelay;
 use wade_core::effects::sensor::SensorDelay;
+use wade_core::effects::water_level_offset::WaterLevelOffset;
 use wade_core::effects::{Effect, Kind, Shape};
 use wade_core::frame::GRAVITY;
 
 /// Last and smallest factor of the search.
 const SHORTEST_STEP: f64 = 1.015;
 
-/// Sets the shapes that are estimates of the effect's own coefficients: a current.
+/// Sets the shapes that are estimates of the effect's own coefficients: a current, an error of the water level.
 pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
     for candidate in 0..design.candidates.len() {
-        if design.candidates[candidate].effect == Effect::Current {
+        if matches!(design.candidates[candidate].effect, Effect::Current | Effect::WaterLevelOffset) {
             let member = Member { candidate, columns: design.candidates[candidate].columns.clone() };
             iterate(design, all, setting, &member, &[]);
         }
@@ -54,6 +55,7 @@ fn iterate(design: &mut Design, all: &[Series], setting: &Setting, member: &Memb
 fn estimate(shape: &Shape) -> Option<[f64; 2]> {
     match *shape {
         Shape::Current(Current { east_mps, north_mps, .. }) => Some([east_mps, north_mps]),
+        Shape::WaterLevelOffset(WaterLevelOffset { estimate_m }) => Some([estimate_m, 0.0]),
         Shape::SensorDelay(SensorDelay { delay_s }) | Shape::DriveDelay(DriveDelay { delay_s, .. }) => {
             Some([delay_s, 0.0])
         }
@@ -65,6 +67,7 @@ fn estimate(shape: &Shape) -> Option<[f64; 2]> {
 fn with_estimate(shape: Shape, [first, second]: [f64; 2]) -> Shape {
     match shape {
         Shape::Current(law) => Shape::Current(Current { east_mps: first, north_mps: second, ..law }),
+        Shape::WaterLevelOffset(_) => Shape::WaterLevelOffset(WaterLevelOffset { estimate_m: first }),
         Shape::SensorDelay(_) => Shape::SensorDelay(SensorDelay { delay_s: first }),
         Shape::DriveDelay(law) => Shape::DriveDelay(DriveDelay { delay_s: first, ..law }),
         other => other,

@@ -168,7 +168,9 @@ impl Found {
         let first = weighed.first().map(|first| &first.explanation);
         let is_likely = self.is_relevant
             && first.is_some_and(|first| first.effects == likely && first.probability >= LIKELY);
-        let stands_beside = self.alternatives.iter().any(|set| judge.sorted_names(set) == likely);
+        // of several that stand beside each other the first is the one that is far more probable than the others
+        let stands_beside =
+            !is_likely && self.alternatives.iter().any(|set| judge.sorted_names(set) == likely);
         let is_another =
             (is_named && likely != self.names || is_likely) && !likely.is_empty() && !stands_beside;
         let set = weighed.iter().find(|weighed| is_another && weighed.explanation.effects == likely)?;

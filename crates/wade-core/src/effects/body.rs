@@ -177,6 +177,14 @@ impl Body {
         }
     }
 
+    /// What it displaces below a plane, without the wet parts of panels. Allocates nothing.
+    pub fn displace(&self, plane: &WaterPlane, out: &mut Immersion) {
+        match &self.hull {
+            Hull::Mesh { table, .. } => table.immerse(plane, out),
+            Hull::Block { block, height } => immerse_box(block, *height, self.z0, plane, out),
+        }
+    }
+
     /// The same where a model has found the wet part of each surface already.
     pub fn immerse_as(&self, condition: &Condition, surfaces: &[SurfaceForce], out: &mut Immersion) {
         let Hull::Mesh { table, .. } = &self.hull else { return self.immerse(condition, out) };

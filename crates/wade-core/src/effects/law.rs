@@ -97,6 +97,7 @@ mod tests {
             (Effect::DragCoefficientError, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
             (Effect::Rotation, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]),
             (Effect::Current, &[[-0.3, 0.2, 0.0], [-0.3, 0.2, 1.0]]),
+            (Effect::WaterLevelOffset, &[[-0.02, 0.0, 0.0]]),
             (Effect::HullFlooding, &[[0.01, 0.0, 0.0]]),
             (Effect::WaterEntrySlamming, &[[0.2, 0.0, 0.0]]),
             (Effect::WaveMemory, &[[0.8, 0.0, 0.0], [0.8, 2.0, 1.0]]),

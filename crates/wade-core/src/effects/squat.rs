@@ -94,7 +94,7 @@ impl Law for Squat {
         let load = state.density * GRAVITY * depression * immersion.waterplane_area;
         if matches!(self, Self::Held { .. }) {
             let mut lower = |_, part, per_meter: Wrench| emit(0, part, per_meter * -depression);
-            WaterLevelOffset.basis(memory, input, &mut lower);
+            WaterLevelOffset::default().basis(memory, input, &mut lower);
         } else {
             let down = state.up.into_inner() * -load;
             emit(0, Part::Hull, input.at(down, &immersion.waterplane_center));

@@ -1,24 +1,32 @@
 //! The water level is higher than stated.
 //!
-//! `W = dF/dd` per meter: `rho g A_wp` upwards at the center of the waterplane (Archimedes), and the model's drag in
-//! proportion to the wet part of each panel, whose area is taken as even over its height. Exact to first order in the
-//! offset; meant for offsets below a fifth of the depth.
+//! Per meter the buoyancy of the layer up to the estimate `o` of the offset, `rho g (V(h + o) - V(h)) / o` upwards at its center
+//! (Archimedes), which is exact at `o`; without an estimate its limit, `rho g A_wp`. And the model's drag in proportion to the
+//! wet part of each panel, whose area is taken as even over its height; this part is of first order, meant for offsets below a
+//! fifth of the depth. Fitting sets the estimate to the offset again and again.
 
+use super::immersion::Immersion;
 use super::input::{DragSpeed, Input, Memory, Part};
-use super::law::Law;
+use super::law::{Law, Numbers, ShapeFault, finite, unused};
 use super::spec::{Coefficient, EffectSpec, Quantity};
 use crate::frame::GRAVITY;
 use crate::wrench::Wrench;
 
-/// An error of the stated water level; its law has one form.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct WaterLevelOffset;
+/// Least estimate whose layer is more than rounding [m].
+const THIN: f64 = 1e-4;
+
+/// An error of the stated water level with the estimate at which its buoyancy is exact.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct WaterLevelOffset {
+    /// Estimate of the offset [m].
+    pub estimate_m: f64,
+}
 
 impl Law for WaterLevelOffset {
     const SPEC: EffectSpec = EffectSpec {
         name: "water_level_offset",
         summary: "the water level is higher than stated",
-        equation: "W = offset dF/dd: rho g A_wp upwards, and the model's drag in proportion to the depth",
+        equation: "W = rho g (V(h + offset) - V(h)) upwards, and the model's drag in proportion to the depth",
         corrects: "pressure of still water: its level",
         total: "either",
         coefficients: &[Coefficient::new("offset", "m", -0.2, 0.2).up_to(0.05)],
@@ -28,10 +36,32 @@ impl Law for WaterLevelOffset {
         ..EffectSpec::COMMON
     };
 
+    fn from_numbers(numbers: &Numbers) -> Result<Self, ShapeFault> {
+        unused(numbers, 1)?;
+        Ok(Self { estimate_m: finite(numbers, 0)? })
+    }
+
+    fn to_numbers(&self) -> Numbers {
+        [self.estimate_m, 0.0, 0.0]
+    }
+
     fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
         let (state, immersion) = (input.condition, input.immersion);
-        let stiffness = state.density * GRAVITY * immersion.waterplane_area * state.up.z;
-        emit(0, Part::Hull, input.at(state.up.into_inner() * stiffness, &immersion.waterplane_center));
+        let upwards = state.up.into_inner() * (state.density * GRAVITY);
+        let layer = if self.estimate_m.abs() < THIN {
+            input.at(upwards * (immersion.waterplane_area * state.up.z), &immersion.waterplane_center)
+        } else {
+            // a depth is counted along the body's z
+            let mut plane = state.water_plane(input.body.z0);
+            plane.offset += self.estimate_m * state.up.z;
+            let mut raised = Immersion::default();
+            input.body.displace(&plane, &mut raised);
+            let buoyancy =
+                |of: &Immersion, share: f64| input.at(upwards * (of.volume * share), &of.center_of_buoyancy);
+            let per_meter = self.estimate_m.recip();
+            buoyancy(&raised, per_meter) + buoyancy(immersion, -per_meter)
+        };
+        emit(0, Part::Hull, layer);
         let velocity = state.velocity;
         let drag = input.own_drag(DragSpeed::Whole);
         for (index, panel) in input.body.panels.iter().enumerate() {

@@ -342,6 +342,15 @@ fn a_water_level_offset_lifts_by_the_waterplane() {
     let expected = lift(0.205) - lift(0.195);
     let found = load(&evaluate(&served, &state, &told()), Effect::WaterLevelOffset).wrench.force.z;
     assert!((found / expected - 1.0).abs() < 0.15, "{found} {expected}");
+    // from the wheels up to the hull the waterplane grows to several times its area: at its estimate the layer is the whole one
+    for offset in [0.05, -0.05] {
+        let mut level = effect(Effect::WaterLevelOffset, offset);
+        level.shape = Shape::from_numbers(Effect::WaterLevelOffset, [offset, 0.0, 0.0]).unwrap();
+        let served = served_with("warthog", effects_file("warthog", vec![level]));
+        let found = load(&evaluate(&served, &state, &told()), Effect::WaterLevelOffset).wrench.force.z;
+        let expected = lift(0.2 + offset) - lift(0.2);
+        assert!((found / expected - 1.0).abs() < 0.03, "{offset}: {found} {expected}");
+    }
 }
 
 #[test]
