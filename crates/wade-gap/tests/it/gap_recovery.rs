@@ -582,13 +582,20 @@ fn a_component_that_an_effect_makes_worse_is_told_though_all_together_gain() {
 fn two_and_three_effects_are_told_apart() {
     for set in [
         &["added_mass", "sensor_delay"][..],
-        &["linear_damping", "sensor_bias"],
+        &["linear_damping", "sensor_drift"],
         &["added_mass", "rotation", "squat"],
     ] {
         let report = run(&with(set, 3.0, 12).0);
         assert_eq!(report.verdict, Verdict::Named, "{set:?}: {}", report.summary);
         assert_eq!(names(&report), set, "in the order of the library");
     }
+    // water that is 4 mm higher lifts a box that stands in it up to its bottom as well: it may be a zero of fz that is off
+    let report = run(&with(&["linear_damping", "sensor_bias"], 3.0, 12).0);
+    assert_eq!(
+        (report.verdict, names(&report).as_slice()),
+        (Verdict::Ambiguous, &["linear_damping", "sensor_bias"][..])
+    );
+    assert_eq!(report.alternatives, [["linear_damping", "water_level_offset"]], "{}", report.summary);
 }
 
 #[test]
