@@ -107,17 +107,20 @@ pub(super) fn check_angles(table: &Table) -> Result<(), TrialError> {
     for (angle, rate) in ANGLES.into_iter().filter(|(angle, _)| table.has(angle)) {
         let turned = integral(t, table.column(rate));
         let unwrapped = unwrapped(table.column(angle));
-        let opposite: Vec<f64> = unwrapped.iter().map(|angle| -angle).collect();
-        if factor(&turned, &opposite).is_some_and(|ratio| near(ratio, 1.0)) {
+        let Some(ratio) = factor(&turned, &unwrapped, SAME) else { continue };
+        if near(-ratio, 1.0) {
             let fault = Fault::Opposed { row: table.rows[0], column: angle, rate_column: rate };
             return Err(At::path(&table.path)(fault));
         }
-        let Some(ratio) = factor(&turned, &unwrapped) else { continue };
+        if ratio < 0.0 {
+            continue;
+        }
         let degrees = 180.0 / std::f64::consts::PI;
-        let fault = if is_count(t) && ratio < FRAMES {
-            Fault::TimeUnit { row: table.rows[0], column: angle, rate_column: rate, ratio, unit: "frames" }
-        } else if near(ratio, 1e-3) {
-            let unit = "milliseconds";
+        let clock = match is_count(t) && ratio < FRAMES {
+            true => Some("frames"),
+            false => near(ratio, 1e-3).then_some("milliseconds"),
+        };
+        let fault = if let Some(unit) = clock {
             Fault::TimeUnit { row: table.rows[0], column: angle, rate_column: rate, ratio, unit }
         } else if near(ratio, degrees) {
             let (row, value) = largest(table, angle);
@@ -149,23 +152,18 @@ pub(super) fn check_vertical(table: &Table) -> Result<(), TrialError> {
     // a depth is counted along the body's z
     let upright = |row: usize| if column == DEPTH { ups[row].z } else { 1.0 };
     let level: Vec<f64> = (0..count).map(|row| of(column, row) * upright(row)).collect();
-    let ([xx, xy, yy], _) = products(&sunk, &level);
-    let Some(ratio) = factor(&sunk, &level.iter().map(|l| l * xy.signum()).collect::<Vec<_>>()) else {
-        return Ok(());
-    };
+    let Some(ratio) = factor(&sunk, &level, SAME_MOTION) else { return Ok(()) };
     let row = table.rows[0];
-    let fault = if xy.abs() < SAME_MOTION * (xx * yy).sqrt() {
-        return Ok(());
-    } else if xy < 0.0 && near(ratio, 1.0) {
-        Fault::Rising { row, column }
-    } else {
-        let distance = |factor: f64| (ratio / factor).ln().abs();
-        let nearest = VERTICAL.into_iter().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
-        let found = nearest.filter(|(factor, _)| xy > 0.0 && distance(*factor) < VERTICAL_TOLERANCE);
-        let Some((_, suspected)) = found else { return Ok(()) };
-        Fault::Vertical { row, column, ratio, suspected }
-    };
-    Err(At::path(&table.path)(fault))
+    if near(-ratio, 1.0) {
+        return Err(At::path(&table.path)(Fault::Rising { row, column }));
+    }
+    // of a negative ratio it is no number
+    let distance = |factor: f64| (ratio / factor).ln().abs();
+    let nearest = VERTICAL.into_iter().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+    match nearest.filter(|(factor, _)| distance(*factor) < VERTICAL_TOLERANCE) {
+        Some((_, suspected)) => Err(At::path(&table.path)(Fault::Vertical { row, column, ratio, suspected })),
+        None => Ok(()),
+    }
 }
 
 /// True for a clock that counts.
@@ -179,7 +177,7 @@ pub(super) fn check_accelerometer(table: &Table, from_velocity: &[Vec3]) -> Resu
     let fault = |fault| Err(At::path(&table.path)(fault));
     let derived = [0, 1, 2].map(|axis| from_velocity.iter().map(|a| a[axis]).collect::<Vec<f64>>());
     for (derived, column) in derived.iter().zip(names) {
-        if let Some(ratio) = factor(derived, table.column(column)).filter(|r| near(*r, 1.0 / GRAVITY)) {
+        if let Some(ratio) = factor(derived, table.column(column), SAME).filter(|r| near(*r, 1.0 / GRAVITY)) {
             let (row, value) = largest(table, column);
             return fault(Fault::AccelerometerInG { row, column, value, ratio });
         }
@@ -217,13 +215,13 @@ fn largest(table: &Table, column: &str) -> (u64, f64) {
     rows.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or_default()
 }
 
-/// The factor between two columns that say the same, from the ratio of their spreads: noise bends it by less than the
-/// factors of 10 and 57 that are looked for. `None` where they do not say the same, or hardly move.
-fn factor(x: &[f64], y: &[f64]) -> Option<f64> {
+/// The factor between two columns of at least a correlation, negative where one goes against the other, from the ratio of their
+/// spreads: noise bends it by less than the factors that are looked for. `None` where they do not say the same, or hardly move.
+fn factor(x: &[f64], y: &[f64], same: f64) -> Option<f64> {
     let ([xx, xy, yy], _) = products(x, y);
     let spread = |squares: f64| (squares / x.len().max(1) as f64).sqrt();
     let excited = spread(xx.min(yy)) > EXCITED[0] && spread(xx.max(yy)) > EXCITED[1];
-    (excited && xy > SAME * (xx * yy).sqrt()).then(|| (yy / xx).sqrt())
+    (excited && xy.abs() > same * (xx * yy).sqrt()).then(|| (yy / xx).sqrt().copysign(xy))
 }
 
 /// Sums of squares and products about the means, and the spread of the second.
