@@ -162,19 +162,18 @@ impl Body {
         out.depth = condition.depth.max(0.0);
         out.panels.clear();
         match &self.hull {
-            Hull::Mesh { table, samples } => {
+            Hull::Mesh { samples, .. } => {
                 out.panels.extend(samples.surfaces.iter().zip(&self.panels).map(|(surface, panel)| {
                     let wet = surface.submergence(&plane);
                     let point = if wet.fraction > 0.0 { wet.wet_centroid } else { panel.centroid };
                     WetPanel { fraction: wet.fraction, point }
                 }));
-                table.immerse(&plane, out);
             }
-            Hull::Block { block, height } => {
+            Hull::Block { height, .. } => {
                 out.panels.extend(self.panels.iter().map(|panel| wet_part(&plane, panel, self.z0, *height)));
-                immerse_box(block, *height, self.z0, &plane, out);
             }
         }
+        self.displace(&plane, out);
     }
 
     /// What it displaces below a plane, without the wet parts of panels. Allocates nothing.
