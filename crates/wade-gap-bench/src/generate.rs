@@ -10,9 +10,9 @@ use super::track::{CHANNEL, DENSITY};
 use super::{NoiseKind, Prediction, Region, Schedule, Simulator, State, Track, Wrench6};
 use wade_core::frame::Vec3;
 use wade_learn::random::Random;
-use wade_learn::signal::{SavitzkyGolay, UniformGrid, interpolate, pieces};
+use wade_learn::signal::pieces;
 use wade_learn::trials::{
-    Body, Gap, Manifest, Measured, Method, StillWater, Trial, Trials, WRENCH, component_of,
+    Body, Gap, Manifest, Measured, Method, StillWater, Trial, Trials, WRENCH, component_of, derivative,
 };
 
 /// How much better or worse than the stated load cell that of a case may be.
@@ -326,7 +326,7 @@ impl Scene<'_> {
         let rows: Vec<u64> = (2..).take(kept.len()).collect();
         let starts = pieces(&t).into_iter().skip(1).map(|piece| piece.start);
         let gaps = starts.map(|start| Gap { row: rows[start], seconds: t[start] - t[start - 1] }).collect();
-        let rate = derivative(&t, &velocity, track.step);
+        let rate = derivative(&t, &velocity);
         let turning = angular_velocity.iter().zip(&velocity);
         let acceleration = rate.iter().zip(turning).map(|(rate, (omega, v))| rate + omega.cross(v)).collect();
         let simulated: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| {
@@ -340,7 +340,7 @@ impl Scene<'_> {
             gaps,
             acceleration,
             acceleration_is_measured: false,
-            angular_acceleration: derivative(&t, &angular_velocity, track.step),
+            angular_acceleration: derivative(&t, &angular_velocity),
             velocity,
             current: vec![Vec3::zeros(); kept.len()],
             angular_velocity,
@@ -381,31 +381,6 @@ fn depth_rate(track: &Track) -> Vec<f64> {
         (states[last].depth - states[first].depth) / ((last - first).max(1) as f64 * track.step)
     };
     (0..states.len()).map(rate).collect()
-}
-
-/// Time derivative as reading the file gives it: a piece between holes on even instants, filtered, and back.
-fn derivative(t: &[f64], values: &[Vec3], step: f64) -> Vec<Vec3> {
-    let of_piece = |piece: std::ops::Range<usize>| {
-        let (t, values) = (&t[piece.clone()], &values[piece]);
-        let axes = [0, 1, 2].map(|axis| {
-            let samples: Vec<f64> = values.iter().map(|value| value[axis]).collect();
-            let grid = UniformGrid {
-                start: t[0],
-                step,
-                count: ((t[t.len() - 1] - t[0]) / step).round() as usize + 1,
-            };
-            let instants = grid.times();
-            let even = interpolate(t, &samples, &instants);
-            let odd = (even.len() - 1) / 2 * 2 + 1;
-            let slope = (even[even.len() - 1] - even[0]) / step;
-            let filtered = SavitzkyGolay::new(9.min(odd), 2.min(odd - 1))
-                .and_then(|filter| filter.derivative(&even, 1, step))
-                .unwrap_or_else(|_| vec![slope; even.len()]);
-            interpolate(&instants, &filtered, t)
-        });
-        (0..t.len()).map(|i| Vec3::new(axes[0][i], axes[1][i], axes[2][i])).collect::<Vec<_>>()
-    };
-    pieces(t).into_iter().flat_map(of_piece).collect()
 }
 
 /// Gap of a sample, measured less predicted, 0 where a component is not measured.
