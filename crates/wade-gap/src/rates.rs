@@ -13,6 +13,10 @@ const COHERENT: f64 = 0.35;
 /// with the sample's own at slower rates.
 const REACH_S: f64 = 0.155;
 const REACH: usize = 11;
+/// Samples to either side of the filter by which a trial without accelerations is differentiated.
+const HALF_FILTER: usize = 4;
+/// Variance of its slope at an end over that in the middle: `1 + 64 * 60 / 308` of nine samples and a parabola.
+const END_NOISE: f64 = 13.5;
 /// Shares of white noise in the accelerations above which they are smoothed over so many seconds.
 const SMOOTHING: [(f64, f64); 2] = [(0.01, 0.25), (0.15, 0.45)];
 
@@ -123,13 +127,23 @@ fn turning(condition: &Condition) -> Vec3 {
     condition.angular_velocity.cross(&condition.ground_velocity)
 }
 
-/// Smooths rates that are noisy by local parabolas, which keep peaks.
-pub(super) fn smooth_rates(t: &[f64], pieces: &[Range<usize>], conditions: &mut [Condition]) {
+/// Smooths rates that are noisy by local parabolas, which keep peaks. Of rates that a filter `derived` the ends do not count and are
+/// what comes next to them: there its window is on one side.
+pub(super) fn smooth_rates(t: &[f64], pieces: &[Range<usize>], conditions: &mut [Condition], derived: bool) {
     for rate in 0..6 {
         let mut values: Vec<f64> = conditions.iter().map(|c| rates(c)[rate]).collect();
         let share = white_variance(&values) / mean_square(&values).max(f64::MIN_POSITIVE);
-        if let Some((_, length)) = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least) {
-            pieces.iter().for_each(|piece| smooth(t, &mut values, piece.clone(), length));
+        let length = SMOOTHING.into_iter().rev().find(|(least, _)| share > *least).map(|(_, length)| length);
+        let is_noisy_at_ends = derived && END_NOISE * share > SMOOTHING[0].0;
+        if length.is_some() || is_noisy_at_ends {
+            for piece in pieces {
+                let end = if is_noisy_at_ends { HALF_FILTER.min((piece.len() - 1) / 2) } else { 0 };
+                let inner = piece.start + end..piece.end - end;
+                length.into_iter().for_each(|length| smooth(t, &mut values, inner.clone(), length));
+                let [first, last] = [values[inner.start], values[inner.end - 1]];
+                values[piece.start..inner.start].fill(first);
+                values[inner.end..piece.end].fill(last);
+            }
             conditions.iter_mut().zip(values).for_each(|(condition, value)| set_rate(condition, rate, value));
         }
     }
@@ -156,13 +170,18 @@ pub(super) fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Smooths a piece by local parabolas over so many seconds.
+/// Smooths a piece by local parabolas over so many seconds, and by a line where the window would reach beyond an end: there a
+/// parabola has twice the noise that it has in the middle.
 pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: Range<usize>, length: f64) {
-    let odd = (piece.len() - 1) / 2 * 2 + 1;
-    let window = window(length, mean_step(&t[piece.clone()])).min(odd);
-    let smoothed = SavitzkyGolay::new(window, 2).and_then(|f| f.smooth(&values[piece.clone()]));
-    if let Ok(smoothed) = smoothed {
-        values[piece].copy_from_slice(&smoothed);
+    let values = &mut values[piece.clone()];
+    let count = values.len();
+    let window = window(length, mean_step(&t[piece])).min((count - 1) / 2 * 2 + 1);
+    let half = window / 2;
+    let by = |order| SavitzkyGolay::new(window, order).and_then(|filter| filter.smooth(values));
+    if let (Ok(smoothed), Ok(line)) = (by(2), by(1)) {
+        values.copy_from_slice(&smoothed);
+        values[..half].copy_from_slice(&line[..half]);
+        values[count - half..].copy_from_slice(&line[count - half..]);
     }
 }
 
@@ -200,6 +219,30 @@ fn rate_window(depth: &[f64], step: f64) -> usize {
 mod tests {
     use super::*;
     use wade_learn::signal::pieces;
+
+    #[test]
+    fn the_ends_of_a_derivative_are_as_quiet_as_its_middle_and_keep_a_steady_rate() {
+        let mut random = wade_learn::random::Random::new(4);
+        let step = 0.027;
+        let t: Vec<f64> = (0..60).map(|i| f64::from(i) * step).collect();
+        let pieces = pieces(&t);
+        let (mut ends, mut middle, mut mean) = (0.0, 0.0, 0.0);
+        for _ in 0..200 {
+            // a velocity with noise, which speeds up by 0.1 m/s2
+            let velocity: Vec<f64> = t.iter().map(|t| 0.1 * t + 0.01 * (random.unit() - 0.5)).collect();
+            let rate = SavitzkyGolay::new(9, 2).and_then(|f| f.derivative(&velocity, 1, step));
+            let of =
+                |x: &f64| Condition { acceleration: Vec3::x() * *x, ..Condition::level(Vec3::zeros(), 0.2) };
+            let mut conditions: Vec<Condition> = rate.expect("long enough").iter().map(of).collect();
+            smooth_rates(&t, &pieces, &mut conditions, true);
+            let rates: Vec<f64> = conditions.iter().map(|condition| condition.acceleration.x).collect();
+            ends += (rates[0] - 0.1).powi(2) + (rates[59] - 0.1).powi(2);
+            middle += (rates[29] - 0.1).powi(2) + (rates[30] - 0.1).powi(2);
+            mean += (rates[0] + rates[59]) / 400.0;
+        }
+        assert!(ends < 4.0 * middle, "{}", (ends / middle).sqrt());
+        assert!((mean - 0.1).abs() < 0.01, "{mean}");
+    }
 
     #[test]
     fn noise_that_a_filter_made_smooth_is_told_from_a_maneuver() {

@@ -215,7 +215,7 @@ fn of_trial(
     }
     let recorded_rates = conditions.iter().map(rates).collect();
     if !exact {
-        smooth_rates(&trial.t, &pieces, &mut conditions);
+        smooth_rates(&trial.t, &pieces, &mut conditions, !trial.acceleration_is_measured);
     }
     // the four columns say nothing of a vehicle with other wheels
     let has_four = body.has_four_wheels();
