@@ -54,15 +54,10 @@ impl Color {
         Some(Self { parts: [parts[0].max(known), parts[1], parts[2]], above_s })
     }
 
-    /// The same with more white noise.
-    pub fn with(mut self, variance: f64) -> Self {
-        self.parts[0] += variance;
-        self
-    }
-
-    /// Makes the noise in a run of bins, each over `unit`, white and of unit variance.
-    pub fn whiten(&self, values: &mut [f64], unit: f64) {
-        let [s0, s1, s2] = self.parts.map(|s| s / (unit * unit));
+    /// Makes the noise in a run of bins white and of unit variance; `more` is the standard deviation of white noise that each bin
+    /// has besides, if it has any.
+    pub fn whiten(&self, values: &mut [f64], more: &[f64]) {
+        let [s0, s1, s2] = self.parts;
         let covariance = [s0 + 2.0 * s1 + 6.0 * s2, -s1 - 4.0 * s2, s2];
         // rows of the factor: two before the diagonal, and it
         let mut before = [[0.0; 3]; 2];
@@ -71,7 +66,8 @@ impl Color {
             let [far, near] = before;
             let a = if i >= 2 { covariance[2] / far[2] } else { 0.0 };
             let b = if i >= 1 { (covariance[1] - a * near[1]) / near[2] } else { 0.0 };
-            let c = (covariance[0] - a * a - b * b).max(1e-12 * covariance[0]).sqrt();
+            let own = covariance[0] + more.get(i).map_or(0.0, |more| more * more);
+            let c = (own - a * a - b * b).max(1e-12 * own).sqrt();
             *value = (*value - a * whitened[0] - b * whitened[1]) / c;
             whitened = [whitened[1], *value];
             before = [near, [a, b, c]];
@@ -213,9 +209,13 @@ mod tests {
         let parts = [0.3, 5.0, 8.0];
         let color = Color { parts, above_s: None };
         let mut runs = noise(parts, 60, 150);
+        // every other bin has white noise of its own
+        let more: Vec<f64> = (0..150).map(|bin| f64::from(bin % 2) * 4.0).collect();
+        let mut random = Random::new(8);
         runs.iter_mut().for_each(|run| {
-            run.iter_mut().for_each(|value| *value /= 3.0);
-            color.whiten(run, 3.0);
+            let of_bin = |more: &f64| more * 12.0_f64.sqrt() * (random.unit() - 0.5);
+            run.iter_mut().zip(more.iter().map(of_bin)).for_each(|(value, own)| *value += own);
+            color.whiten(run, &more);
         });
         let power = |lag: usize| {
             let pairs = runs.iter().flat_map(|run| run.iter().zip(&run[lag..]));

@@ -362,9 +362,10 @@ fn excess(all: &[Series], design: &Design, setting: &Setting, trial: usize) -> V
     let mut sum = vec![0.0; series.bins.len()];
     for &component in &setting.components {
         let values = series.binned(|sample| series.gap[sample][component]);
-        let bin = design.noise.bin[component];
-        let expected = 1.0 + (design.noise.offset[trial][component] / bin).powi(2);
-        sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += (value / bin).powi(2) - expected);
+        let zero = design.noise.offset[trial][component];
+        for (bin, (sum, value)) in sum.iter_mut().zip(values).enumerate() {
+            *sum += (value * value - zero * zero) / design.noise.of_bin(trial, component, bin).powi(2) - 1.0;
+        }
     }
     sum
 }

@@ -1,8 +1,9 @@
 //! The regression: rows are the compared components of every bin, columns the coefficients of the candidates.
 //!
-//! Rows are standardised by the noise of their component. The zero of a trial may differ from run to run: each trial's mean is
-//! taken off in the share that such scatter has in it (the transform of the random-effects model; Baltagi, Econometric Analysis of
-//! Panel Data, section 2.3). So is what the model may be off by ([`super::model_error`]), and the rows are about independent.
+//! Rows are standardised by the noise of their component and by what of the model's error at their state is no smooth function of
+//! it. The zero of a trial may differ from run to run: each trial's mean is taken off in the share that such scatter has in it (the
+//! transform of the random-effects model; Baltagi, Econometric Analysis of Panel Data, section 2.3). So is the smooth part of what
+//! the model may be off by ([`super::model_error`]), and the rows are about independent.
 
 use std::ops::Range;
 
@@ -29,8 +30,11 @@ pub(super) struct Candidate {
 /// Noise of the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RowNoise {
-    /// Standard deviation of a bin, by component.
+    /// Standard deviation of a bin's noise, by component.
     pub bin: [f64; 6],
+    /// Standard deviation of what the model may be off by in each bin and no smooth function of the state is, by trial and
+    /// component; nothing of a model that states no deviation.
+    pub rough: Vec<[Vec<f64>; 6]>,
     /// Standard deviation of the zero, by trial and component.
     pub offset: Vec<[f64; 6]>,
     /// True where the model states how far it may be off.
@@ -52,19 +56,49 @@ impl RowNoise {
         self.color.iter().any(Option::is_some)
     }
 
-    /// Makes the standardised values of a trial's bins independent.
-    pub fn whiten(&self, values: &mut [f64], series: &Series, component: usize) {
-        let Some(color) = &self.color[component] else { return };
-        series.runs.iter().for_each(|run| color.whiten(&mut values[run.clone()], self.bin[component]));
+    /// Standard deviation of a bin of a trial.
+    pub fn of_bin(&self, trial: usize, component: usize, bin: usize) -> f64 {
+        self.bin[component].hypot(self.rough(trial, component).get(bin).copied().unwrap_or_default())
     }
 
-    /// Takes off the mean of a trial's standardised values in the share that its zero has in it.
-    pub fn center(&self, values: &mut [f64], trial: usize, component: usize) {
-        let zero = self.offset[trial][component] / self.bin[component];
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let share = 1.0 - (1.0 + count * zero * zero).sqrt().recip();
-        values.iter_mut().for_each(|value| *value -= share * mean);
+    /// Squares of a trial's zero over the standard deviations of its bins, summed.
+    pub fn of_zero(&self, trial: usize, component: usize, bins: usize) -> f64 {
+        let zero = self.offset[trial][component];
+        (0..bins).map(|bin| (zero / self.of_bin(trial, component, bin)).powi(2)).sum()
+    }
+
+    fn rough(&self, trial: usize, component: usize) -> &[f64] {
+        self.rough.get(trial).map_or(&[], |rough| &rough[component])
+    }
+
+    /// The bins of a trial over their standard deviation, made independent, with their mean taken off in the share that the trial's
+    /// zero has in it.
+    pub fn standardize(&self, values: &mut [f64], series: &Series, trial: usize, component: usize) {
+        self.whiten(values, series, trial, component);
+        let zero = self.offset[trial][component];
+        if zero == 0.0 {
+            return;
+        }
+        let mut zeros = vec![zero; values.len()];
+        self.whiten(&mut zeros, series, trial, component);
+        // the inverse root of I + z z^T
+        let square: f64 = zeros.iter().map(|z| z * z).sum();
+        let along: f64 = zeros.iter().zip(values.iter()).map(|(z, value)| z * value).sum::<f64>() / square;
+        let share = 1.0 - (1.0 + square).sqrt().recip();
+        values.iter_mut().zip(&zeros).for_each(|(value, z)| *value -= share * along * z);
+    }
+
+    fn whiten(&self, values: &mut [f64], series: &Series, trial: usize, component: usize) {
+        let rough = self.rough(trial, component);
+        match &self.color[component] {
+            Some(color) => series.runs.iter().for_each(|run| {
+                color.whiten(&mut values[run.clone()], rough.get(run.clone()).unwrap_or(&[]));
+            }),
+            None => {
+                let of_bin = |(bin, value): (usize, &mut f64)| *value /= self.of_bin(trial, component, bin);
+                values.iter_mut().enumerate().for_each(of_bin);
+            }
+        }
     }
 }
 
@@ -167,9 +201,7 @@ fn rows_of_trial(
         .iter()
         .map(|&component| {
             let mut values = noise.smoothing.bins(series, component, |sample| column[sample][component]);
-            values.iter_mut().for_each(|value| *value /= noise.bin[component]);
-            noise.whiten(&mut values, series, component);
-            noise.center(&mut values, trial, component);
+            noise.standardize(&mut values, series, trial, component);
             values
         })
         .collect();

@@ -187,9 +187,14 @@ fn white_error(design: &Design, column: usize) -> f64 {
     design.x.column(column).norm_squared().max(1e-12).sqrt().recip()
 }
 
+/// Noise of a bin, root mean square over all, of the component in the middle [N or N m].
 fn mean_bin(design: &Design, setting: &Setting) -> f64 {
-    let mut sizes: Vec<f64> = setting.components.iter().map(|&c| design.noise.bin[c]).collect();
-    median(&mut sizes)
+    let of = |component: usize| {
+        let own = design.rows.rows.iter().filter(|row| row.component == component);
+        let squares = own.map(|row| design.noise.of_bin(row.trial, component, row.bin).powi(2));
+        (squares.sum::<f64>() / (design.rows.rows.len() / design.rows.width).max(1) as f64).sqrt()
+    };
+    median(&mut setting.components.iter().map(|&component| of(component)).collect::<Vec<_>>())
 }
 
 /// Length of the running means after which a column is looked at trial by trial [s].
@@ -206,19 +211,29 @@ struct Signal {
 
 impl Signal {
     /// Adds the bins of a trial.
-    fn add(&mut self, column: &Column, series: &Series, setting: &Setting, design: &Design) {
+    fn add(
+        &mut self,
+        column: &Column,
+        (trial, series): (usize, &Series),
+        setting: &Setting,
+        design: &Design,
+    ) {
         let mut energy = 0.0;
         for &component in &setting.components {
             let value = |sample: usize| column[sample][component];
             let (values, smooth) = (series.binned(value), bins(series, EVEN, value));
-            let weight = design.noise.bin[component].powi(-2);
+            let over_noise = |values: Vec<f64>| -> Vec<f64> {
+                let of = |(bin, value): (usize, f64)| value / design.noise.of_bin(trial, component, bin);
+                values.into_iter().enumerate().map(of).collect()
+            };
+            let (values, smooth) = (over_noise(values), over_noise(smooth));
             for run in series.runs.iter().filter(|run| run.len() >= 6) {
                 let values = &values[run.clone()];
                 if !setting.computed {
-                    self.noise += weight * white_variance(values) * values.len() as f64;
+                    self.noise += white_variance(values) * values.len() as f64;
                 }
-                self.total += weight * values.iter().map(|v| v * v).sum::<f64>();
-                energy += weight * mean_square(&smooth[run.clone()]);
+                self.total += values.iter().map(|v| v * v).sum::<f64>();
+                energy += mean_square(&smooth[run.clone()]);
             }
         }
         self.by_trial.push(energy);
@@ -237,7 +252,8 @@ fn signals(shape: &Shape, all: &[Series], setting: &Setting, design: &Design) ->
     let mut signals = vec![Signal::default(); shape.effect().coefficients().len()];
     for (rank, series) in all.iter().enumerate() {
         let columns = columns(shape, series, rank, setting);
-        signals.iter_mut().zip(&columns).for_each(|(sum, column)| sum.add(column, series, setting, design));
+        let own = (rank, series);
+        signals.iter_mut().zip(&columns).for_each(|(sum, column)| sum.add(column, own, setting, design));
     }
     signals
 }

@@ -317,7 +317,8 @@ impl<'a> Judge<'a> {
                 fitted.beta[first + i] * design.x[(row, *column)]
             };
             let value: f64 = member.columns.iter().enumerate().map(of).sum();
-            squares[place.component] += (value * design.noise.bin[place.component]).powi(2);
+            let of_bin = design.noise.of_bin(place.trial, place.component, place.bin);
+            squares[place.component] += (value * of_bin).powi(2);
             count[place.component] += 1.0;
         }
         let size = |c: usize| (squares[c] / f64::max(count[c], 1.0)).sqrt();

@@ -3,8 +3,8 @@
 //! A model that states a standard deviation says how far its answer for a state may be off; the error is the same whenever the
 //! state is the same, and alike where states are alike. So it is a Gaussian process over the state (Kennedy, O'Hagan, J. Roy. Stat.
 //! Soc. B 63, 2001) with the stated deviation `d`: `cov(e(s), e(s')) = (1 - r) d(s) d(s') exp(-|s - s'|^2 / 2)`, each number of a
-//! state measured in lengths, and a part `r` of the variance is rough. The smooth part's share in the rows is taken off in the share that it has in them, by a few states that stand for all
-//! (Nystrom's method; Rasmussen, Williams, Gaussian Processes for Machine Learning, 2006, section 8.1).
+//! state measured in lengths, and a part `r` of the variance is rough. The smooth part is taken off the rows in the share that it has in
+//! them, by as many states as it takes to know it to a third of the noise.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -25,10 +25,10 @@ const OF_RANGE: f64 = 0.5;
 pub(super) const ROUGH: f64 = 1.0 / 3.0;
 /// Least lengths [m/s, m, rad, rad/s]: what varies by less is noise of the motion.
 const LEAST: State = [0.15, 0.15, 0.15, 0.025, 0.05, 0.05, 0.15, 0.15, 0.15];
-/// States that stand for all.
-const MOST_STATES: usize = 48;
-/// Squared distance of two states that say the same.
-const SAME: f64 = 1e-4;
+/// Most states by which the error is known. The drives and ramps of a folder need 20 to 200.
+const MOST_STATES: usize = 300;
+/// Squared noises of a bin that may be left out.
+const LEFT_OUT: f64 = 0.1;
 
 /// The error of a model in the rows of some trials.
 #[derive(Debug, Clone, Default)]
@@ -46,6 +46,8 @@ struct Part {
     left: DMatrix<f64>,
     /// Eigenvalues of `Z^T Z`, none below 0.
     squares: DVector<f64>,
+    /// Half the squared coefficient of variation of the mean square of the error over all rows.
+    spread: f64,
 }
 
 impl ModelError {
@@ -59,25 +61,25 @@ impl ModelError {
         let in_lengths = |state: State| std::array::from_fn(|i| state[i] / lengths[i]);
         let states: Vec<Vec<State>> =
             states.into_iter().map(|of| of.into_iter().map(in_lengths).collect()).collect();
-        let process = Process::new(&states.concat());
-        let weights: Vec<DMatrix<f64>> = states.iter().map(|states| process.weights(states)).collect();
-        let rows = states.iter().map(Vec::len).sum();
+        let process = Process::new(&states.concat(), &most_off(all, trials, components, noise));
         let part = |&component: &usize| {
-            let mut z = DMatrix::zeros(rows, process.states.len());
+            let mut z = process.weights.clone();
+            let mut stated = z.clone();
             let mut first = 0;
-            for (&trial, weights) in trials.iter().zip(&weights) {
+            for &trial in trials {
                 let series = &all[trial];
-                let smooth = (1.0 - ROUGH).sqrt() / noise.bin[component];
+                let weights = process.weights.rows(first, series.bins.len());
+                let smooth = (1.0 - ROUGH).sqrt();
                 let size = series.binned(|i| smooth * series.uncertainty[i][component]);
                 let mut of_trial = DMatrix::from_diagonal(&DVector::from_vec(size)) * weights;
+                stated.rows_mut(first, weights.nrows()).copy_from(&of_trial);
                 for mut column in of_trial.column_iter_mut() {
-                    noise.whiten(column.as_mut_slice(), series, component);
-                    noise.center(column.as_mut_slice(), trial, component);
+                    noise.standardize(column.as_mut_slice(), series, trial, component);
                 }
                 z.rows_mut(first, weights.nrows()).copy_from(&of_trial);
                 first += weights.nrows();
             }
-            Part::new(z)
+            Part::new(z, &stated)
         };
         Self { parts: components.iter().map(part).collect() }
     }
@@ -118,15 +120,18 @@ impl ModelError {
     /// function has few degrees of freedom (Satterthwaite, Biometrics Bulletin 2, 1946), which it has a chi-square of (Wilson,
     /// Hilferty, PNAS 17, 1931).
     pub fn at_most(&self, place: usize) -> f64 {
-        let Some(Part { squares, .. }) = self.parts.get(place) else { return 1.0 };
-        let spread = 2.0 / 9.0 * squares.norm_squared() / squares.sum().powi(2).max(f64::MIN_POSITIVE);
+        let Some(Part { spread, .. }) = self.parts.get(place) else { return 1.0 };
+        let spread = 2.0 / 9.0 * spread;
         (1.0 - spread + Z90 * spread.sqrt()).powf(1.5)
     }
 }
 
 impl Part {
-    fn new(z: DMatrix<f64>) -> Self {
+    /// With the error over the noise of each row, and as it is.
+    fn new(z: DMatrix<f64>, stated: &DMatrix<f64>) -> Self {
         let SymmetricEigen { eigenvectors, eigenvalues } = z.tr_mul(&z).symmetric_eigen();
+        let covariance = stated.tr_mul(stated);
+        let spread = covariance.norm_squared() / covariance.trace().powi(2).max(f64::MIN_POSITIVE);
         // (1 - 1 / sqrt(1 + l)) / l, which is 1/2 where l vanishes
         let squares = eigenvalues.map(|l| l.max(0.0));
         let shares = squares.map(|l| {
@@ -137,7 +142,7 @@ impl Part {
             &eigenvectors * DMatrix::from_diagonal(&diagonal) * eigenvectors.transpose()
         };
         let (share, left) = (of(shares), of(squares.map(|l| (1.0 + l).sqrt().recip())));
-        Self { z, share, left, squares }
+        Self { z, share, left, squares, spread }
     }
 }
 
@@ -167,39 +172,51 @@ fn lengths(states: Vec<State>) -> State {
     })
 }
 
+/// By how many noises each bin of some trials may be off, squared, in the component in which it is most.
+fn most_off(all: &[Series], trials: &[usize], components: &[usize], noise: &RowNoise) -> Vec<f64> {
+    let of_trial = |&trial: &usize| {
+        let mut most = vec![0.0; all[trial].bins.len()];
+        for &component in components {
+            let stated = all[trial].binned(|sample| all[trial].uncertainty[sample][component]);
+            for (bin, (most, stated)) in most.iter_mut().zip(stated).enumerate() {
+                *most = f64::max(*most, (stated / noise.of_bin(trial, component, bin)).powi(2));
+            }
+        }
+        most
+    };
+    trials.iter().flat_map(of_trial).collect()
+}
+
 /// A Gaussian process of unit variance as a sum over independent unit Gaussian weights.
 struct Process {
-    states: Vec<State>,
-    /// Inverse root of the covariance of the states.
-    root: DMatrix<f64>,
+    /// What each weight adds at each state.
+    weights: DMatrix<f64>,
 }
 
 impl Process {
-    /// By some of the states, each as far from those before it as can be.
-    fn new(all: &[State]) -> Self {
-        let mut states: Vec<State> = Vec::new();
-        let mut distances = vec![f64::INFINITY; all.len()];
-        let mut next = 0;
-        while states.len() < MOST_STATES && distances.get(next).is_some_and(|distance| *distance > SAME) {
-            let state = all[next];
-            states.push(state);
-            for (distance, other) in distances.iter_mut().zip(all) {
-                *distance = distance.min(squared_distance(&state, other));
+    /// One state after the other is known, that at which the most is left of what may be off, until that is little everywhere: the
+    /// incomplete Cholesky factor with the largest pivots (Fine, Scheinberg, J. Mach. Learn. Res. 2, 2001).
+    fn new(states: &[State], off: &[f64]) -> Self {
+        let mut left = vec![1.0; states.len()];
+        let mut columns: Vec<DVector<f64>> = Vec::new();
+        while columns.len() < MOST_STATES {
+            let size = |&state: &usize| left[state] * off[state];
+            let Some(pivot) = (0..states.len()).max_by(|a, b| size(a).total_cmp(&size(b))) else { break };
+            if size(&pivot) < LEFT_OUT && !columns.is_empty() {
+                break;
             }
-            next = (0..all.len()).max_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
+            let of_pivot = states.iter().map(|state| covariance(state, &states[pivot]));
+            let mut column = DVector::from_iterator(states.len(), of_pivot);
+            for before in &columns {
+                column.axpy(-before[pivot], before, 1.0);
+            }
+            column /= left[pivot].sqrt();
+            left.iter_mut().zip(&column).for_each(|(left, c)| *left = (*left - c * c).max(0.0));
+            columns.push(column);
         }
-        let of = |i: usize, j: usize| covariance(&states[i], &states[j]);
-        let SymmetricEigen { eigenvectors, eigenvalues } =
-            DMatrix::from_fn(states.len(), states.len(), of).symmetric_eigen();
-        let roots = eigenvalues.map(|l| if l > 1e-9 { l.sqrt().recip() } else { 0.0 });
-        let root = &eigenvectors * DMatrix::from_diagonal(&roots) * eigenvectors.transpose();
-        Self { states, root }
-    }
-
-    /// What each weight adds at each state.
-    fn weights(&self, at: &[State]) -> DMatrix<f64> {
-        let near = |i: usize, j: usize| covariance(&at[i], &self.states[j]);
-        DMatrix::from_fn(at.len(), self.states.len(), near) * &self.root
+        Self {
+            weights: DMatrix::from_fn(states.len(), columns.len(), |state, weight| columns[weight][state]),
+        }
     }
 }
 
@@ -223,7 +240,9 @@ mod tests {
     #[test]
     fn a_few_states_stand_for_all_and_rows_lose_the_inverse_root_of_the_covariance() {
         let states = line(60);
-        let z = Process::new(&states).weights(&states) * 1.7;
+        let process = Process::new(&states, &[1e9; 60]);
+        assert!(process.weights.ncols() < 30, "{}", process.weights.ncols());
+        let z = process.weights * 1.7;
         let covariance = DMatrix::from_fn(60, 60, |i, j| 1.7 * 1.7 * covariance(&states[i], &states[j]));
         assert!((&z * z.transpose() - &covariance).amax() < 1e-6);
         let SymmetricEigen { eigenvectors, eigenvalues } =
@@ -234,7 +253,7 @@ mod tests {
         // of two components in turn, each has its own rows
         let values: Vec<f64> = (0..120).map(|i| f64::from(i * i % 7) - 2.0).collect();
         let mut rows = values.clone();
-        let error = ModelError { parts: vec![Part::new(z.clone()), Part::new(z.clone())] };
+        let error = ModelError { parts: vec![Part::new(z.clone(), &z), Part::new(z.clone(), &z)] };
         error.take_off(&mut rows);
         for place in 0..2 {
             let of = |rows: &[f64]| DVector::from_fn(60, |i, _| rows[2 * i + place]);
@@ -250,11 +269,12 @@ mod tests {
 
     #[test]
     fn an_error_that_is_alike_everywhere_may_be_far_larger_than_stated() {
+        let of = |z: DMatrix<f64>| ModelError { parts: vec![Part::new(z.clone(), &z)] };
         // |N(0, 1)| is below 1.96 in 19 of 20 draws
-        let alike = ModelError { parts: vec![Part::new(DMatrix::from_element(50, 1, 0.3))] };
+        let alike = of(DMatrix::from_element(50, 1, 0.3));
         assert!((alike.at_most(0) - 1.96).abs() < 0.03, "{}", alike.at_most(0));
         // root of the chi-square of 50 degrees at 0.95, over 50
-        let independent = ModelError { parts: vec![Part::new(DMatrix::identity(50, 50))] };
+        let independent = of(DMatrix::identity(50, 50));
         assert!((independent.at_most(0) - (67.505_f64 / 50.0).sqrt()).abs() < 0.002);
         assert_eq!(ModelError::default().at_most(0), 1.0);
     }

@@ -103,16 +103,11 @@ fn noise_kept(all: &[Series], trials: &[usize]) -> f64 {
     (kept.sum::<f64>() / trials.len().max(1) as f64).sqrt()
 }
 
-/// Root mean square of what the model states of itself over the samples of some trials [N or N m]: those in states that it
-/// learnt, where there are any, or one trial far outside would hide what all others show.
+/// Root mean square of what the model states of itself over the samples of some trials [N or N m].
 fn model_error(trials: &[&Series]) -> [f64; 6] {
-    let of = |with_outside: bool| {
-        let samples = trials.iter().flat_map(|series| series.uncertainty.iter().zip(&series.outside));
-        samples.filter(move |(_, outside)| with_outside || !**outside).map(|(uncertainty, _)| uncertainty)
-    };
-    let with_outside = of(false).next().is_none();
-    let count = of(with_outside).count().max(1) as f64;
-    std::array::from_fn(|c| (of(with_outside).map(|u| u[c].powi(2)).sum::<f64>() / count).sqrt())
+    let of = || trials.iter().flat_map(|series| &series.uncertainty);
+    let count = of().count().max(1) as f64;
+    std::array::from_fn(|c| (of().map(|u| u[c].powi(2)).sum::<f64>() / count).sqrt())
 }
 
 pub(super) fn high_frequency<'a>(all: impl Iterator<Item = &'a Series>, component: usize) -> f64 {
@@ -230,8 +225,9 @@ pub(super) fn row_noise(
     colors: [Option<Color>; 6],
 ) -> RowNoise {
     let model = components.iter().any(|&c| floors[c].model > 0.0);
-    let mut noise =
-        RowNoise { bin: [1.0; 6], offset: vec![[0.0; 6]; all.len()], model, smoothing, color: [None; 6] };
+    let rough = if model { all.iter().map(|series| rough(series, components)).collect() } else { Vec::new() };
+    let offset = vec![[0.0; 6]; all.len()];
+    let mut noise = RowNoise { bin: [1.0; 6], rough, offset, model, smoothing, color: [None; 6] };
     for &component in components {
         let mut variances = Vec::new();
         for &trial in trials {
@@ -246,14 +242,19 @@ pub(super) fn row_noise(
         let bin = median(&mut variances).sqrt().max(white);
         // a component without any noise at all weighs as if its gap were noise of a thousandth
         let size = rms(all, trials, component);
-        let bin = bin.max(1e-3 * size).max(1e-12);
-        noise.bin[component] = bin.hypot(floors[component].rough());
-        noise.color[component] = colors[component].map(|color| color.with(floors[component].rough().powi(2)));
+        noise.bin[component] = bin.max(1e-3 * size).max(1e-12);
+        noise.color[component] = colors[component];
         for (offset, series) in noise.offset.iter_mut().zip(all) {
             offset[component] = manifest.trial_offset_of(&series.name, WRENCH[component]);
         }
     }
     noise
+}
+
+/// What of the model's error is no smooth function of the state, in the bins of a trial [N or N m].
+fn rough(series: &Series, components: &[usize]) -> [Vec<f64>; 6] {
+    let of = |component| series.binned(|sample| ROUGH.sqrt() * series.uncertainty[sample][component]);
+    std::array::from_fn(|component| if components.contains(&component) { of(component) } else { Vec::new() })
 }
 
 fn rms(all: &[Series], trials: &[usize], component: usize) -> f64 {

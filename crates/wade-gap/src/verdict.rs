@@ -230,17 +230,19 @@ impl Found {
 }
 
 /// True where much of what lasts of the gap is still there after the named effects, beyond what the zeros of the trials leave: a
-/// zero of a stated deviation is one square in the rows of a trial, as each of their noises is, and it lasts.
+/// zero of a stated deviation is one square in the rows of a trial, as each of their noises is, and it lasts. What is no larger than
+/// the rough part of what the model says of itself is none.
 fn leaves_much(design: &Design, residual: &DVector<f64>) -> bool {
     let (before, after) = (lasting(design, &design.y), lasting(design, residual));
     // what the rows keep of a zero of z noises, of n rows: n z^2 / (1 + n z^2)
     let kept = |(&trial, rows): (&usize, &std::ops::Range<usize>)| -> f64 {
-        let count = (rows.len() / design.rows.width) as f64;
-        let squares = design.noise.offset[trial].iter().zip(design.noise.bin).map(|(zero, bin)| zero / bin);
-        squares.map(|z| count * z * z / (1.0 + count * z * z)).sum()
+        let count = rows.len() / design.rows.width;
+        let squares = (0..6).map(|component| design.noise.of_zero(trial, component, count));
+        squares.map(|square| square / (1.0 + square)).sum()
     };
     let of_zeros: f64 = design.trials.iter().zip(&design.rows.of_trial).map(kept).sum();
     f64::min(before.most.deviate, after.most.deviate) > LASTS
+        && after.most.rms > design.noise.stated()
         && after.energy - of_zeros > MUCH * before.energy
 }
 
@@ -252,7 +254,10 @@ fn size_and_least(judge: &Judge, structure: &Structure) -> [f64; 2] {
     let relative = setting
         .components
         .iter()
-        .map(|&c| judge.floors[c].sample.hypot(judge.floors[c].rough()) / design.noise.bin[c])
+        .map(|&c| {
+            let rough = judge.floors[c].rough();
+            judge.floors[c].sample.hypot(rough) / design.noise.bin[c].hypot(rough)
+        })
         .fold(f64::INFINITY, f64::min);
     [((structure.gain - design.error.most_left()).max(0.0) / rows).sqrt(), judge.config.relevance * relative]
 }
