@@ -313,7 +313,6 @@ fn of_ramps(vehicle: &str, physics: &str, seed: u64) -> Value {
         .expect("the program runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    assert_eq!(report["verdict"], "named", "{}", report["summary"]);
     assert_eq!(report["gap"]["worse_regions"], Value::Array(Vec::new()), "{}", report["summary"]);
     report
 }
@@ -339,6 +338,10 @@ fn left(report: &Value, component: &str) -> f64 {
 #[test]
 fn the_water_that_the_husky_moves_and_its_waves_are_named_from_computed_ramps() {
     let report = of_ramps("husky", "quasi_steady", 1);
+    // the step at the ends of a ramp is within what the bundle says of itself where it learnt nothing, so that waves that forget
+    // quickly can stand for it; they cannot be left out
+    assert_eq!(report["verdict"], "ambiguous", "{}", report["summary"]);
+    assert_eq!(report["alternatives"], serde_json::json!([["wave_memory"]]), "{}", report["summary"]);
     within(&report["effects"][0], "added_mass", &[("surge", [0.1, 0.35])]);
     let memory = [("surge", [0.15, 0.6]), ("sway", [0.8, 2.0]), ("time_constant", [0.3, 0.9])];
     within(&report["effects"][1], "wave_memory", &memory);
@@ -349,6 +352,7 @@ fn the_water_that_the_husky_moves_and_its_waves_are_named_from_computed_ramps() 
 #[test]
 fn what_outlasts_the_ramps_of_the_warthog_is_named_and_brings_the_model_nearer() {
     let report = of_ramps("warthog", "quasi_steady", 5);
+    assert_eq!(report["verdict"], "named", "{}", report["summary"]);
     let memory = [("surge", [0.2, 0.6]), ("sway", [0.8, 2.0]), ("time_constant", [0.3, 0.9])];
     within(&report["effects"][0], "wave_memory", &memory);
     assert_eq!(report["effects"].as_array().map(Vec::len), Some(1));

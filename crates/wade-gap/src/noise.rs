@@ -5,6 +5,7 @@
 
 use super::color::Color;
 use super::design::RowNoise;
+use super::measurement::is_computed;
 use super::model_error::ROUGH;
 use super::rates::mean_step;
 use super::series::Series;
@@ -225,7 +226,14 @@ pub(super) fn row_noise(
     colors: [Option<Color>; 6],
 ) -> RowNoise {
     let model = components.iter().any(|&c| floors[c].model > 0.0);
-    let rough = if model { all.iter().map(|series| rough(series, components)).collect() } else { Vec::new() };
+    // a computed wrench has no noise, and a model that says that it is exact at rest would be believed there alone
+    let least = floors.map(|floor| if is_computed(manifest) { floor.model } else { 0.0 });
+    let rough_of = |series: &Series| {
+        let stated = |sample: usize, c: usize| f64::max(series.uncertainty[sample][c], least[c]);
+        let of = |component| series.binned(|sample| ROUGH.sqrt() * stated(sample, component));
+        std::array::from_fn(|c| if components.contains(&c) { of(c) } else { Vec::new() })
+    };
+    let rough = if model { all.iter().map(rough_of).collect() } else { Vec::new() };
     let offset = vec![[0.0; 6]; all.len()];
     let mut noise = RowNoise { bin: [1.0; 6], rough, offset, model, smoothing, color: [None; 6] };
     for &component in components {
@@ -249,12 +257,6 @@ pub(super) fn row_noise(
         }
     }
     noise
-}
-
-/// What of the model's error is no smooth function of the state, in the bins of a trial [N or N m].
-fn rough(series: &Series, components: &[usize]) -> [Vec<f64>; 6] {
-    let of = |component| series.binned(|sample| ROUGH.sqrt() * series.uncertainty[sample][component]);
-    std::array::from_fn(|component| if components.contains(&component) { of(component) } else { Vec::new() })
 }
 
 fn rms(all: &[Series], trials: &[usize], component: usize) -> f64 {

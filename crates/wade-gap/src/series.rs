@@ -215,7 +215,9 @@ fn of_trial(
     }
     let recorded_rates = conditions.iter().map(rates).collect();
     if !exact {
-        smooth_rates(&trial.t, &pieces, &mut conditions, !trial.acceleration_is_measured);
+        // a wrench that was inferred has the noise of the acceleration, its ends with it
+        let derived = !trial.acceleration_is_measured && motion.is_none();
+        smooth_rates(&trial.t, &pieces, &mut conditions, derived);
     }
     // the four columns say nothing of a vehicle with other wheels
     let has_four = body.has_four_wheels();
