@@ -139,7 +139,8 @@ pub(super) fn smooth_rates(t: &[f64], pieces: &[Range<usize>], conditions: &mut 
             for piece in pieces {
                 let end = if is_noisy_at_ends { HALF_FILTER.min((piece.len() - 1) / 2) } else { 0 };
                 let inner = piece.start + end..piece.end - end;
-                length.into_iter().for_each(|length| smooth(t, &mut values, inner.clone(), length));
+                let at_ends = if derived { 1 } else { 2 };
+                length.into_iter().for_each(|length| smooth(t, &mut values, inner.clone(), length, at_ends));
                 let [first, last] = [values[inner.start], values[inner.end - 1]];
                 values[piece.start..inner.start].fill(first);
                 values[inner.end..piece.end].fill(last);
@@ -170,18 +171,18 @@ pub(super) fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Smooths a piece by local parabolas over so many seconds, and by a line where the window would reach beyond an end: there a
-/// parabola has twice the noise that it has in the middle.
-pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: Range<usize>, length: f64) {
+/// Smooths a piece by local parabolas over so many seconds; where the window would reach beyond an end, by a polynomial of this order
+/// over the last full window. There a parabola has twice the noise that it has in the middle, and a line as much as there.
+pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: Range<usize>, length: f64, at_ends: usize) {
     let values = &mut values[piece.clone()];
     let count = values.len();
     let window = window(length, mean_step(&t[piece])).min((count - 1) / 2 * 2 + 1);
     let half = window / 2;
     let by = |order| SavitzkyGolay::new(window, order).and_then(|filter| filter.smooth(values));
-    if let (Ok(smoothed), Ok(line)) = (by(2), by(1)) {
+    if let (Ok(smoothed), Ok(ends)) = (by(2), by(at_ends)) {
         values.copy_from_slice(&smoothed);
-        values[..half].copy_from_slice(&line[..half]);
-        values[count - half..].copy_from_slice(&line[count - half..]);
+        values[..half].copy_from_slice(&ends[..half]);
+        values[count - half..].copy_from_slice(&ends[count - half..]);
     }
 }
 
