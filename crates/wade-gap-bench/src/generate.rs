@@ -12,7 +12,8 @@ use wade_core::frame::Vec3;
 use wade_learn::random::Random;
 use wade_learn::signal::pieces;
 use wade_learn::trials::{
-    Body, Gap, Manifest, Measured, Method, StillWater, Trial, Trials, WRENCH, component_of, derivative,
+    Body, Gap, Manifest, Measured, Method, StillWater, Trial, Trials, WRENCH, acceleration, component_of,
+    derivative,
 };
 
 /// How much better or worse than the stated load cell that of a case may be.
@@ -326,9 +327,6 @@ impl Scene<'_> {
         let rows: Vec<u64> = (2..).take(kept.len()).collect();
         let starts = pieces(&t).into_iter().skip(1).map(|piece| piece.start);
         let gaps = starts.map(|start| Gap { row: rows[start], seconds: t[start] - t[start - 1] }).collect();
-        let rate = derivative(&t, &velocity);
-        let turning = angular_velocity.iter().zip(&velocity);
-        let acceleration = rate.iter().zip(turning).map(|(rate, (omega, v))| rate + omega.cross(v)).collect();
         let simulated: [Option<Vec<f64>>; 6] = std::array::from_fn(|c| {
             let analytic = matches!(self.setting.simulator.prediction, Prediction::Analytic);
             analytic.then(|| kept.iter().map(|&i| predicted[i][c]).collect())
@@ -338,7 +336,7 @@ impl Scene<'_> {
         Trial {
             name: track.name.clone(),
             gaps,
-            acceleration,
+            acceleration: acceleration(&t, &velocity, &angular_velocity),
             acceleration_is_measured: false,
             angular_acceleration: derivative(&t, &angular_velocity),
             velocity,

@@ -117,7 +117,7 @@ impl Form {
         }
         let mut values = recorded.clone();
         if let Some(window) = window {
-            series.pieces().for_each(|piece| smooth(&series.t, &mut values, piece, window, 2));
+            series.pieces().for_each(|piece| smooth(&series.t, &mut values, piece, window));
         }
         let (bins, own) = (bins(series, length, |i| recorded[i]), bins(series, length, |i| values[i]));
         let products: Vec<f64> = bins.iter().zip(&own).map(|(a, b)| a * b).collect();

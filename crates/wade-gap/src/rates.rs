@@ -139,8 +139,8 @@ pub(super) fn smooth_rates(t: &[f64], pieces: &[Range<usize>], conditions: &mut 
             for piece in pieces {
                 let end = if is_noisy_at_ends { HALF_FILTER.min((piece.len() - 1) / 2) } else { 0 };
                 let inner = piece.start + end..piece.end - end;
-                let at_ends = if derived { 1 } else { 2 };
-                length.into_iter().for_each(|length| smooth(t, &mut values, inner.clone(), length, at_ends));
+                let by = if derived { smooth_with_quiet_ends } else { smooth };
+                length.into_iter().for_each(|length| by(t, &mut values, inner.clone(), length));
                 let [first, last] = [values[inner.start], values[inner.end - 1]];
                 values[piece.start..inner.start].fill(first);
                 values[inner.end..piece.end].fill(last);
@@ -171,19 +171,37 @@ pub(super) fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Smooths a piece by local parabolas over so many seconds; where the window would reach beyond an end, by a polynomial of this order
-/// over the last full window. There a parabola has twice the noise that it has in the middle, and a line as much as there.
-pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: Range<usize>, length: f64, at_ends: usize) {
-    let values = &mut values[piece.clone()];
-    let count = values.len();
-    let window = window(length, mean_step(&t[piece])).min((count - 1) / 2 * 2 + 1);
-    let half = window / 2;
-    let by = |order| SavitzkyGolay::new(window, order).and_then(|filter| filter.smooth(values));
-    if let (Ok(smoothed), Ok(ends)) = (by(2), by(at_ends)) {
-        values.copy_from_slice(&smoothed);
-        values[..half].copy_from_slice(&ends[..half]);
-        values[count - half..].copy_from_slice(&ends[count - half..]);
+/// Smooths a piece by local parabolas over so many seconds.
+pub(super) fn smooth(t: &[f64], values: &mut [f64], piece: Range<usize>, length: f64) {
+    if let Some((_, smoothed)) = smoothed(t, values, piece.clone(), length, 2) {
+        values[piece].copy_from_slice(&smoothed);
     }
+}
+
+/// The same with a line where the window would reach beyond an end: there a parabola has twice the noise that it has in the middle,
+/// and a line as much as there.
+fn smooth_with_quiet_ends(t: &[f64], values: &mut [f64], piece: Range<usize>, length: f64) {
+    let line = smoothed(t, values, piece.clone(), length, 1);
+    smooth(t, values, piece.clone(), length);
+    if let Some((half, line)) = line {
+        let (values, last) = (&mut values[piece], line.len() - half);
+        values[..half].copy_from_slice(&line[..half]);
+        values[last..].copy_from_slice(&line[last..]);
+    }
+}
+
+/// Half the window, and a piece smoothed by polynomials; none where it is too short.
+fn smoothed(
+    t: &[f64],
+    values: &[f64],
+    piece: Range<usize>,
+    length: f64,
+    order: usize,
+) -> Option<(usize, Vec<f64>)> {
+    let odd = (piece.len() - 1) / 2 * 2 + 1;
+    let window = window(length, mean_step(&t[piece.clone()])).min(odd);
+    let filter = SavitzkyGolay::new(window, order).ok()?;
+    Some((window / 2, filter.smooth(&values[piece]).ok()?))
 }
 
 /// Rate of the depth [m/s], smoothed over at most a third of a second: noise must not look like entry, nor smoothing take
