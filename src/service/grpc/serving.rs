@@ -21,12 +21,12 @@ use crate::service::stopped;
 
 /// How often a connection's deadlines are looked at.
 const LOOK: Duration = Duration::from_secs(1);
-/// Longest time for a peer that is asked to go.
-const GOODBYE: Duration = Duration::from_secs(2);
-/// What may be sent ahead of the server's reading [bytes]: by one stream, by all streams of a connection. What is sent ahead
-/// lies in memory.
+/// Longest time for a peer that is asked to go, and for one to close its end after the server has closed its own.
+pub const GOODBYE: Duration = Duration::from_secs(2);
+/// What one stream may send ahead of the server's reading [bytes]. What is sent ahead lies in memory.
 const STREAM_WINDOW: u32 = 128 << 10;
-const CONNECTION_WINDOW: u32 = 256 << 10;
+/// The same of all streams of a connection [bytes].
+pub const CONNECTION_WINDOW: u32 = 256 << 10;
 /// Most bytes of answers that one stream has in the library's buffer.
 const SEND_BUFFER: usize = 64 << 10;
 /// Longest headers of a request [bytes].
