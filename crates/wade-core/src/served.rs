@@ -1,15 +1,20 @@
 //! A vehicle as it is served: its model and the effects that were added to it.
 
+use std::cell::RefCell;
+
 use crate::condition::Condition;
-use crate::effects::{ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, EffectsSession};
+use crate::effects::{
+    ActiveEffects, Answer, Circumstances, EffectLoads, EffectsFile, EffectsSession, Elsewhere,
+};
 use crate::forces::Forces;
 use crate::model::{COLUMNS, Form, Jacobian, JacobianWorkspace, Model, Workspace, stepped};
 use crate::physics::{Memory, Motion, Physics};
 use crate::wrench::Wrench;
 
 /// Step of the differences of effects in the unit of each column: in double precision their rounding is below 1e-9 of a load, and
-/// their curvature below 1e-8.
+/// their curvature below 1e-8. A network that they ask in other states is of single precision: a wider step keeps both below 1e-3.
 const STEP: f64 = 1e-5;
+const STEP_OF_NETWORK: f64 = 1e-3;
 
 /// What a served vehicle answers. Reused from query to query.
 #[derive(Debug, Clone, Default)]
@@ -20,8 +25,8 @@ pub struct Loads {
     pub effects: EffectLoads,
     /// Derivatives of the net wrench where they were asked for; none of a vehicle that has none ([`ServedVehicle::has_jacobian`]).
     pub jacobian: Option<Jacobian>,
-    /// The model at the edge of the box of the effects.
-    edge: Forces,
+    /// The model in other states.
+    elsewhere: Forces,
     /// Buffers of the model.
     workspace: Workspace,
     /// Buffers of its derivatives.
@@ -106,7 +111,7 @@ impl ServedVehicle {
         session: Option<&mut Session>,
         loads: &mut Loads,
     ) {
-        let Loads { forces, effects: added, jacobian, edge, workspace, slopes, stepped: steps } = loads;
+        let Loads { forces, effects: added, jacobian, elsewhere, workspace, slopes, stepped: steps } = loads;
         let condition = &condition.resolved(self.model.vehicle().z0);
         let stirred = Some(&circumstances.sea).filter(|sea| !sea.is_calm());
         let stirred = stirred.and_then(|sea| self.model.in_sea(condition, sea));
@@ -114,7 +119,7 @@ impl ServedVehicle {
             Some((state, waters)) => (&state.resolved(self.model.vehicle().z0), Some(waters)),
             None => (condition, None),
         };
-        let (memory, session) = match session {
+        let (mut memory, session) = match session {
             Some(session) => {
                 let (memory, effects) = session.split();
                 (Some(memory), Some(effects))
@@ -132,9 +137,10 @@ impl ServedVehicle {
         *jacobian = None;
         if circumstances.jacobian && waters.is_none() && self.has_jacobian() {
             let room = (&mut *workspace, slopes);
+            let memory = memory.as_deref_mut();
             *jacobian = self.model.evaluate_with_jacobian(condition, (&motion, memory), room, forces);
         } else {
-            self.model.evaluate_moving(condition, (&motion, memory), workspace, forces);
+            self.model.evaluate_moving(condition, (&motion, memory.as_deref_mut()), workspace, forces);
         }
         if let (Some(waters), Some(base)) = (&waters, &mut forces.base) {
             base.water_level = waters.level();
@@ -145,34 +151,50 @@ impl ServedVehicle {
                 let known =
                     self.model.weights().is_some_and(|weights| matches!(weights.form, Form::Paper(_)));
                 let Forces { surfaces, wrench, .. } = &*forces;
-                let mut at_edge = |condition: &Condition| {
-                    let state = effects.edge(condition)?;
+                let without_waves = memory.map(|memory| memory.without_waves());
+                let at_rest = self.model.wheel_speeds(None);
+                let room = RefCell::new((workspace, elsewhere));
+                let ask = |there: &Elsewhere| {
                     // in calm water, as the effects were seen
-                    let motion = Motion { waters: None, ..motion };
-                    self.model.evaluate_moving(&state, (&motion, None), workspace, edge);
-                    Some(edge.wrench)
+                    let motion = Motion { waters: None, time_step: 0.0, ..motion };
+                    let motion = match there.wheels_at_rest {
+                        true => Motion { wheel_speeds: &at_rest, ..motion },
+                        false => motion,
+                    };
+                    let (workspace, forces) = &mut *room.borrow_mut();
+                    let mut memory = without_waves.filter(|_| there.with_waves);
+                    self.model.evaluate_moving(
+                        &there.condition,
+                        (&motion, memory.as_mut()),
+                        workspace,
+                        forces,
+                    );
+                    forces.wrench
                 };
                 let answer = Answer {
                     condition,
                     surfaces,
                     wrench: *wrench,
                     wet_parts_known: known,
-                    at_edge: at_edge(condition),
+                    is_calm: waters.is_none(),
+                    elsewhere: &ask,
                 };
                 if let Some(jacobian) = jacobian {
                     steps.clear();
                     let before = session.as_deref().copied();
+                    let asks_network = self.model.weights().is_some() && effects.ask_elsewhere();
+                    let step = if asks_network { STEP_OF_NETWORK } else { STEP };
                     for column in 0..COLUMNS {
                         let slope = jacobian.column(column).into_owned();
-                        let [ahead, behind] = [STEP, -STEP].map(|step| {
+                        let [ahead, behind] = [step, -step].map(|step| {
                             let condition = &stepped(condition, self.model.vehicle().z0, column, step);
                             let wrench = *wrench + Wrench::from_column(&slope) * step;
-                            let answer = Answer { condition, wrench, at_edge: at_edge(condition), ..answer };
+                            let answer = Answer { condition, wrench, ..answer };
                             let mut session = before;
                             effects.evaluate_again(circumstances, &answer, session.as_mut(), steps);
                             steps.sum().column()
                         });
-                        jacobian.set_column(column, &(slope + (ahead - behind) * (0.5 / STEP)));
+                        jacobian.set_column(column, &(slope + (ahead - behind) * (0.5 / step)));
                     }
                 }
                 effects.evaluate(circumstances, &answer, session, added);

@@ -85,7 +85,10 @@ impl Simulator<'_> {
     pub fn drag_share(&self, state: &State) -> Wrench6 {
         match self.prediction {
             Prediction::Analytic => self.drag(state, &state.velocity),
-            Prediction::Model(_) => self.predict(state) - self.predict_moving(state, &Vec3::zeros()),
+            Prediction::Model(_) => {
+                let at_rest = State { velocity: Vec3::zeros(), wheels: [0.0; 4], ..*state };
+                self.predict(state) - self.predict(&at_rest)
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::base_drag::BaseDrag;
+use super::elsewhere::Changes;
 use super::measurement::{of_each_axis, rolling_direction};
 use super::rates::{mean_square, mean_step};
 use super::series::Series;
@@ -40,7 +41,7 @@ const HELD_AT: [f64; 4] = [0.4, 0.55, 0.7, 1.0];
 const ALL_CHANNELS: usize = 6;
 
 /// What columns depend on besides the trial.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(super) struct Setting<'a> {
     pub body: &'a Body,
     pub base_drag: BaseDrag,
@@ -58,6 +59,8 @@ pub(super) struct Setting<'a> {
     /// True where each stamp of the folder is of one clock.
     pub one_clock: bool,
     pub first_stamp: f64,
+    /// What the model makes of other states ([`super::elsewhere::Questions::changes`]); none where another simulator predicts.
+    pub elsewhere: Option<&'a dyn Fn(&Shape, &Series) -> Option<Changes>>,
 }
 
 impl Setting<'_> {
@@ -119,9 +122,9 @@ pub(super) fn shapes(effect: Effect, all: &[Series], setting: &Setting) -> Vec<S
         Effect::Current => [DragSpeed::Whole, DragSpeed::PerAxis]
             .map(|speed| Shape::Current(Current { speed, ..Current::default() }))
             .into(),
-        Effect::DragCoefficientError => [DragLaw::Quadratic, DragLaw::CrossFlow, DragLaw::Proportional]
-            .map(|law| Shape::DragCoefficientError(DragCoefficientError { law }))
-            .into(),
+        Effect::DragCoefficientError => {
+            DragLaw::ALL.map(|law| Shape::DragCoefficientError(DragCoefficientError { law })).into()
+        }
         Effect::AddedMass => {
             [HeaveMass::Displaced, HeaveMass::Plate].map(|heave| Shape::AddedMass(AddedMass { heave })).into()
         }
@@ -216,8 +219,10 @@ fn physics(shape: &Shape, series: &Series, setting: &Setting, columns: &mut [Col
     debug_assert!(columns.len() <= MAX_COEFFICIENTS);
     let base_drag = setting.base_drag.of(shape);
     let has_memory = shape.effect().spec().has_memory;
+    let elsewhere = setting.elsewhere.and_then(|changes| changes(shape, series));
     for (sample, &t) in series.t.iter().enumerate() {
         let mut input = series.input(sample, setting.body, base_drag);
+        input.elsewhere = elsewhere.as_ref().map(|changes| changes[sample]);
         if matches!(shape, Shape::AddedMass(_)) {
             input.condition = &series.calibrated[sample];
         }

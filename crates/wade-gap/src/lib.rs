@@ -26,6 +26,7 @@ mod contradictions;
 mod design;
 mod detect;
 mod effects_file;
+mod elsewhere;
 mod error;
 mod experiment;
 mod explanations;

@@ -7,6 +7,7 @@ use super::color::Color;
 use super::compose::{compose, is_disproved};
 use super::contradictions;
 use super::design::{Design, Rows};
+use super::elsewhere::Questions;
 use super::explanations::weigh;
 use super::general::General;
 use super::judge::{Judge, Member};
@@ -65,7 +66,11 @@ pub fn run(
     let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
     check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
     let floors = floors(&all, &naming, &trials.manifest, &components);
+    let simulated = trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some));
+    let questions = Questions::new(body, predict);
+    let changes = |shape: &Shape, series: &Series| questions.changes(shape, series);
     let setting = Setting {
+        elsewhere: if simulated { None } else { Some(&changes) },
         body,
         base_drag: BaseDrag::new(&all, body),
         in_channel: all.iter().any(|series| series.channel_width.is_some()),

@@ -9,6 +9,7 @@ use super::{Asked, Config, GapError, Predicted};
 use wade_core::condition::{Condition, LEAST_UPRIGHT};
 use wade_core::effects::{Body, Immersion, Input};
 use wade_core::frame::{GRAVITY, Vec3};
+use wade_core::vehicle::PerWheel;
 use wade_core::wrench::Wrench;
 use wade_learn::trials::{SimIs, Trial, Trials, WRENCH};
 
@@ -68,18 +69,24 @@ pub(super) struct Series {
 impl Series {
     /// The state of a sample as an effect sees it.
     pub fn input<'a>(&'a self, sample: usize, body: &'a Body, base_drag: Vec3) -> Input<'a> {
-        let p = &self.predicted[sample];
         Input {
             body,
             condition: &self.conditions[sample],
             immersion: &self.immersions[sample],
-            predicted: Wrench { force: Vec3::new(p[0], p[1], p[2]), moment: Vec3::new(p[3], p[4], p[5]) },
+            predicted: self.predicted_wrench(sample),
+            elsewhere: None,
             base_drag,
             yaw: self.yaw[sample],
             wetting_rate: self.wetting_rate[sample],
             channel_width: self.channel_width,
             wheel_speeds: self.wheels[sample].into(),
         }
+    }
+
+    /// The model's wrench of a sample.
+    pub fn predicted_wrench(&self, sample: usize) -> Wrench {
+        let [fx, fy, fz, mx, my, mz] = self.predicted[sample];
+        Wrench { force: Vec3::new(fx, fy, fz), moment: Vec3::new(mx, my, mz) }
     }
 
     /// Samples of each stretch without a hole.
@@ -232,10 +239,9 @@ fn of_trial(
             std::array::from_fn(|c| trial.simulated[c].as_ref().map_or(0.0, |column| column[sample]))
         } else {
             let begins = pieces.iter().any(|piece| piece.start == sample);
-            let [fl, fr, rl, rr] = wheels[sample];
             let answer = predict(&Asked {
                 condition: &conditions[sample],
-                wheel_speeds: fl.zip(fr).zip(rl.zip(rr)).map(|((fl, fr), (rl, rr))| [fl, fr, rl, rr].into()),
+                wheel_speeds: all_wheels(wheels[sample]),
                 time_step: if begins { 0.0 } else { trial.t[sample] - trial.t[sample - 1] },
             });
             uncertainty[sample] = answer.uncertainty;
@@ -289,6 +295,11 @@ fn of_trial(
         averaged,
     };
     Ok((series, present))
+}
+
+/// Wheel speeds where all were recorded.
+pub(super) fn all_wheels([fl, fr, rl, rr]: [Option<f64>; 4]) -> Option<PerWheel<f64>> {
+    fl.zip(fr).zip(rl.zip(rr)).map(|((fl, fr), (rl, rr))| [fl, fr, rl, rr].into())
 }
 
 /// `a + g up` of each sample. Along an axis that is hardly accelerated there is noise alone, which would pull an error of the

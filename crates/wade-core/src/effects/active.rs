@@ -8,7 +8,7 @@ use nalgebra::Matrix6;
 use super::body::Body;
 use super::file::EffectsFile;
 use super::immersion::Immersion;
-use super::input::{BaseDrag, Input, Memory, Part};
+use super::input::{BaseDrag, Elsewhere, Input, Memory, Part};
 use super::library::{Effect, MAX_COEFFICIENTS, MEMORIES, PHYSICS, Shape};
 use super::spec::Quantity;
 use super::validity::OutsideBox;
@@ -166,7 +166,7 @@ struct Entry {
 }
 
 /// What the model says of a state.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Answer<'a> {
     /// The state.
     pub condition: &'a Condition,
@@ -176,8 +176,11 @@ pub struct Answer<'a> {
     pub wrench: Wrench,
     /// True where wetted fractions and points are those of the hull's samples.
     pub wet_parts_known: bool,
-    /// Its wrench at the edge of the box, where [`ActiveEffects::edge`] asks for it.
-    pub at_edge: Option<Wrench>,
+    /// The wrench is that of calm water.
+    pub is_calm: bool,
+    /// The model's wrench in another state, in calm water and alone, or as one of a run in which no waves are left: that at the
+    /// edge of the box in which effects are held, or that of [`Shape::elsewhere`].
+    pub elsewhere: &'a dyn Fn(&Elsewhere) -> Wrench,
 }
 
 /// The effects of a vehicle, ready to be evaluated.
@@ -209,13 +212,9 @@ impl ActiveEffects {
         &self.file
     }
 
-    /// The state in which effects that act on the model's own drag are held, where it is another than that asked for: the model
-    /// must be asked there as well, or its drag would be that of one state and the effect's that of another.
-    pub fn edge(&self, condition: &Condition) -> Option<Condition> {
-        if !self.entries.iter().any(|entry| entry.acts_on_own_drag) {
-            return None;
-        }
-        Some(self.file.validity.clamped(condition)).filter(|state| state != condition)
+    /// True where the model is asked in other states as well.
+    pub fn ask_elsewhere(&self) -> bool {
+        self.entries.iter().any(|entry| entry.acts_on_own_drag)
     }
 
     /// The loads in a state for which the model gave an answer. Allocates nothing.
@@ -241,7 +240,7 @@ impl ActiveEffects {
         mut session: Option<&mut EffectsSession>,
         out: &mut EffectLoads,
     ) {
-        let Answer { condition, surfaces, wrench, wet_parts_known, at_edge } = *answer;
+        let Answer { condition, surfaces, wrench, wet_parts_known, is_calm, elsewhere } = *answer;
         out.empty();
         out.outside = self.file.validity.outside(condition);
         out.surface_forces.resize(surfaces.len(), Vec3::zeros());
@@ -261,6 +260,9 @@ impl ActiveEffects {
             rate = rate.or(session.depth_rate);
         }
         let without_rate = still(&state);
+        // with the drag of one state and an effect of another nothing would fit
+        let here = || elsewhere(&Elsewhere { condition: state, wheels_at_rest: false, with_waves: false });
+        let at_edge = (self.ask_elsewhere() && state != *condition).then(here);
         let current_stated = condition.velocity != condition.ground_velocity;
         let EffectLoads { loads, surface_forces, immersion, added_mass, .. } = out;
         // set for each effect below
@@ -269,6 +271,7 @@ impl ActiveEffects {
             condition: &state,
             immersion,
             predicted: wrench,
+            elsewhere: None,
             base_drag: BaseDrag::zeros(),
             yaw: circumstances.heading.unwrap_or(0.0),
             wetting_rate: rate.unwrap_or(0.0),
@@ -292,6 +295,11 @@ impl ActiveEffects {
                 _ => None,
             };
             let left_out = entry.inputs.iter().find_map(missing);
+            let there = if left_out.is_none() { entry.shape.elsewhere(&input) } else { None };
+            input.elsewhere = there.map(|there| {
+                let here = if there.with_waves && is_calm { input.predicted } else { here() };
+                elsewhere(&there) + here * -1.0
+            });
             let memory = match (session.as_deref_mut(), entry.memory) {
                 (Some(session), Some(place)) => {
                     let memory = &mut session.memories[place];

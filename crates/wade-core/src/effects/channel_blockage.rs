@@ -6,10 +6,12 @@
 //! the model's own drag `D`, whatever law it follows, and the surface that falls where the flow is fast,
 //! `channel_flow`. `k` is about 1.
 
+use super::body::Panel;
 use super::channel_flow::{self, MOST};
-use super::input::{Input, Memory, Part};
+use super::input::{Elsewhere, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, amount, unused};
 use super::spec::{Coefficient, EffectSpec, Parameter, Quantity};
+use crate::condition::Condition;
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
@@ -26,6 +28,21 @@ pub enum ChannelBlockage {
     },
 }
 
+impl ChannelBlockage {
+    /// How much more dynamic pressure the flow beside the hull has, as a share; none without walls or water.
+    fn excess(&self, input: &Input) -> Option<f64> {
+        if let Self::FallingSurface { faded_at } = *self {
+            return channel_flow::excess(input, faded_at);
+        }
+        let (width, immersion) = (channel_flow::width(input)?, input.immersion);
+        let wet = input.body.panels.iter().zip(&immersion.panels);
+        let windward = |panel: &Panel| panel.windward(&input.condition.velocity).x;
+        let front: f64 = wet.map(|(panel, wet)| windward(panel) * wet.fraction).sum();
+        let blockage = (front / (width * immersion.depth)).min(MOST);
+        Some((1.0 - blockage).powi(-2) - 1.0)
+    }
+}
+
 impl Law for ChannelBlockage {
     const SPEC: EffectSpec = EffectSpec {
         name: "channel_blockage",
@@ -36,6 +53,7 @@ impl Law for ChannelBlockage {
         coefficients: &[Coefficient::published("strength", 0.0, 5.0, [0.5, 1.5])],
         parameters: &[Parameter { name: "faded_at", unit: "1" }],
         inputs: &[Quantity::Velocity, Quantity::ChannelWidth],
+        acts_on_own_drag: true,
         experiment: "repeat steady runs in a channel of another width, or in open water (channel_widths in trials.toml)",
         ..EffectSpec::COMMON
     };
@@ -55,18 +73,23 @@ impl Law for ChannelBlockage {
         }
     }
 
+    fn elsewhere(&self, input: &Input) -> Option<Elsewhere> {
+        let faster = (1.0 + self.excess(input)?).sqrt();
+        let condition = Condition { velocity: input.condition.velocity * faster, ..*input.condition };
+        Some(Elsewhere { condition, wheels_at_rest: false, with_waves: false })
+    }
+
     fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-        let (velocity, immersion) = (input.condition.velocity, input.immersion);
-        if let Self::FallingSurface { faded_at } = *self {
-            let more = channel_flow::excess(input, faded_at).unwrap_or(0.0);
-            emit(0, Part::Hull, input.at(input.predicted_drag() * more, &immersion.center_of_buoyancy));
-            return;
+        let Some(more) = self.excess(input) else { return };
+        if let Some(Wrench { force, moment }) = input.elsewhere {
+            // the change of the drag alone: how the hull is drawn down is squat
+            return emit(0, Part::Hull, Wrench { force: Vec3::new(force.x, force.y, 0.0), moment });
         }
-        let Some(width) = channel_flow::width(input) else { return };
-        let wet = input.body.panels.iter().zip(&immersion.panels);
-        let front: f64 = wet.map(|(panel, wet)| panel.windward(&velocity).x * wet.fraction).sum();
-        let blockage = (front / (width * immersion.depth)).min(MOST);
-        let more = (1.0 - blockage).powi(-2) - 1.0;
+        let (velocity, immersion) = (input.condition.velocity, input.immersion);
+        if self.is_in_proportion() {
+            let drag = input.predicted_drag() * more;
+            return emit(0, Part::Hull, input.at(drag, &immersion.center_of_buoyancy));
+        }
         let pressure = input.half_density() * velocity.norm() * more;
         for (index, panel) in input.body.panels.iter().enumerate() {
             let part = &immersion.panels[index];

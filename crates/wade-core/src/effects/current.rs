@@ -6,9 +6,10 @@
 //! [`DragSpeed::PerAxis`] the drag is `D_i(v) = -K_i |v_i| v_i` (the cross-flow principle; Fossen, Handbook of Marine Craft
 //! Hydrodynamics, section 6.4).
 
-use super::input::{DragSpeed, Input, Memory, Part};
+use super::input::{DragSpeed, Elsewhere, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, finite, form};
 use super::spec::{Coefficient, EffectSpec, Quantity};
+use crate::condition::Condition;
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
@@ -49,12 +50,20 @@ impl Law for Current {
         [self.east_mps, self.north_mps, f64::from(self.speed as u8)]
     }
 
+    fn elsewhere(&self, input: &Input) -> Option<Elsewhere> {
+        let water = input.body_from_world(self.east_mps, self.north_mps);
+        let condition = Condition { velocity: input.condition.velocity - water, ..*input.condition };
+        (water.norm() > 0.0).then_some(Elsewhere { condition, wheels_at_rest: false, with_waves: false })
+    }
+
     fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
         let velocity = input.condition.velocity;
         let estimate = input.body_from_world(self.east_mps, self.north_mps);
         let through = velocity - estimate;
         let (fast, slow) = (through.norm(), velocity.norm());
         let drag = input.own_drag(self.speed);
+        let estimates = [self.east_mps, self.north_mps];
+        let mut law = Wrench::default();
         for (number, (east, north)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
             let w = input.body_from_world(east, north);
             let change = if self.speed == DragSpeed::PerAxis {
@@ -72,8 +81,16 @@ impl Law for Current {
                 let facing = panel.windward(&through);
                 let area = facing.component_mul(&drag) * (input.half_density() * wet);
                 let force: Vec3 = area.component_mul(&change);
-                emit(number, Part::Panel(index), input.at(force, &part.point));
+                let load = input.at(force, &part.point);
+                emit(number, Part::Panel(index), load);
+                law += load * estimates[number];
             }
+        }
+        if let Some(change) = input.elsewhere {
+            // along the estimate, so that at it the loads of both numbers sum to the change
+            let left = change + law * -1.0;
+            let square: f64 = estimates.iter().map(|w| w * w).sum();
+            (0..2).for_each(|number| emit(number, Part::Hull, left * (estimates[number] / square)));
         }
     }
 }

@@ -6,9 +6,10 @@
 //! [`DragLaw`] has other forms: `|v_i| v_i`, and the model's own drag `D` in proportion, `F_i = C_i / K_i D_i` with its
 //! coefficients `K`: the part of its force across gravity, whatever law it follows.
 
-use super::input::{Input, Memory, Part};
+use super::input::{Elsewhere, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, form, unused};
 use super::spec::{Coefficient, EffectSpec, Quantity};
+use crate::condition::Condition;
 use crate::frame::Vec3;
 use crate::wrench::Wrench;
 
@@ -22,6 +23,13 @@ pub enum DragLaw {
     CrossFlow,
     /// 2: the model's own drag, in proportion.
     Proportional,
+    /// 3: all that the model makes of the motion, in proportion: with the waves that the motion until now has left.
+    WithWaves,
+}
+
+impl DragLaw {
+    /// In the order of their numbers.
+    pub const ALL: [Self; 4] = [Self::Quadratic, Self::CrossFlow, Self::Proportional, Self::WithWaves];
 }
 
 /// An error of the drag coefficients with the law that it follows.
@@ -45,6 +53,7 @@ impl Law for DragCoefficientError {
             Coefficient::published("heave", -4.0, 4.0, [-1.0, 1.0]),
         ],
         reference: "added to the coefficient",
+        acts_on_own_drag: true,
         inputs: &[Quantity::Velocity],
         experiment: "hold at least four steady speeds over the whole range at two depths",
         ..EffectSpec::COMMON
@@ -52,7 +61,7 @@ impl Law for DragCoefficientError {
 
     fn from_numbers(numbers: &Numbers) -> Result<Self, ShapeFault> {
         unused(numbers, 1)?;
-        Ok(Self { law: form(numbers, 0, &[DragLaw::Quadratic, DragLaw::CrossFlow, DragLaw::Proportional])? })
+        Ok(Self { law: form(numbers, 0, &DragLaw::ALL)? })
     }
 
     fn to_numbers(&self) -> Numbers {
@@ -81,16 +90,36 @@ impl Law for DragCoefficientError {
         }
     }
 
+    fn elsewhere(&self, input: &Input) -> Option<Elsewhere> {
+        let (velocity, ground_velocity) = (Vec3::zeros(), Vec3::zeros());
+        let condition = Condition { velocity, ground_velocity, ..*input.condition };
+        let with_waves = self.law == DragLaw::WithWaves;
+        self.is_in_proportion().then_some(Elsewhere { condition, wheels_at_rest: true, with_waves })
+    }
+
     fn is_in_proportion(&self) -> bool {
-        self.law == DragLaw::Proportional
+        matches!(self.law, DragLaw::Proportional | DragLaw::WithWaves)
     }
 }
 
 fn of_the_model(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let drag = input.predicted_drag();
+    let drag = match input.elsewhere {
+        // what the motion makes of the load, along the body's axes as in the other forms
+        Some(change) => change.force * -1.0,
+        None => input.predicted_drag(),
+    };
     let center = input.immersion.center_of_buoyancy;
     for axis in (0..2).filter(|&axis| input.base_drag[axis] > 1e-3) {
-        let share = Vec3::ith(axis, drag[axis] / input.base_drag[axis]);
-        emit(axis, Part::Hull, input.at(share, &center));
+        let force = Vec3::ith(axis, drag[axis]);
+        let load = match input.elsewhere {
+            Some(Wrench { moment, .. }) => {
+                // a force along x turns about y, one along y about x and z
+                let moment =
+                    if axis == 0 { Vec3::y() * -moment.y } else { Vec3::new(-moment.x, 0.0, -moment.z) };
+                Wrench { force, moment }
+            }
+            None => input.at(force, &center),
+        };
+        emit(axis, Part::Hull, load * input.base_drag[axis].recip());
     }
 }

@@ -37,6 +37,9 @@ pub struct Input<'a> {
     pub immersion: &'a Immersion,
     /// The model's own wrench about the center of mass [N, N m].
     pub predicted: Wrench,
+    /// How much the model's wrench is another in the state that [`super::Shape::elsewhere`] says [N, N m]; none where it was not
+    /// asked there, and the law takes what it knows of the model.
+    pub elsewhere: Option<Wrench>,
     /// The model's own drag.
     pub base_drag: BaseDrag,
     /// Heading: angle from the world's x to the body's x [rad].
@@ -58,6 +61,7 @@ impl<'a> Input<'a> {
             condition,
             immersion,
             predicted: Wrench::default(),
+            elsewhere: None,
             base_drag: Vec3::zeros(),
             yaw: 0.0,
             wetting_rate: 0.0,
@@ -129,6 +133,17 @@ impl Input<'_> {
         let (sine, cosine) = self.yaw.sin_cos();
         ahead * (cosine * east + sine * north) + left * (cosine * north - sine * east)
     }
+}
+
+/// A state in which the model is to be asked besides that of an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Elsewhere {
+    /// The state.
+    pub condition: Condition,
+    /// The wheels stand still there.
+    pub wheels_at_rest: bool,
+    /// What waves remember of the motion until now is part of the change.
+    pub with_waves: bool,
 }
 
 /// The part of a hull that carries a load.

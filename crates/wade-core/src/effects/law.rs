@@ -1,6 +1,6 @@
 //! What every effect's file defines, and how typed parameters become the three numbers of `shape` in a file and back.
 
-use super::input::{Input, Memory, Part};
+use super::input::{Elsewhere, Input, Memory, Part};
 use super::spec::EffectSpec;
 use crate::wrench::Wrench;
 
@@ -28,6 +28,11 @@ pub(super) trait Law: Copy + Default {
 
     /// Advances what it remembers, see [`super::Shape::advance`].
     fn advance(&self, _memory: &mut Memory, _input: &Input, _dt: f64) {}
+
+    /// See [`super::Shape::elsewhere`].
+    fn elsewhere(&self, _input: &Input) -> Option<Elsewhere> {
+        None
+    }
 
     /// See [`super::Shape::is_in_proportion`].
     fn is_in_proportion(&self) -> bool {
@@ -94,7 +99,7 @@ mod tests {
     fn every_form_has_its_numbers() {
         let forms: &[(Effect, &[Numbers])] = &[
             (Effect::AddedMass, &[[1.0, 0.0, 0.0]]),
-            (Effect::DragCoefficientError, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
+            (Effect::DragCoefficientError, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]),
             (Effect::Rotation, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]),
             (Effect::Current, &[[-0.3, 0.2, 0.0], [-0.3, 0.2, 1.0]]),
             (Effect::WaterLevelOffset, &[[-0.02, 0.0, 0.0]]),
@@ -178,6 +183,7 @@ mod tests {
             condition: &condition,
             immersion: &immersion,
             predicted: Wrench { force, moment: force },
+            elsewhere: None,
             base_drag: Vec3::new(1.1, 1.3, 0.9),
             yaw: 0.6 + more(Quantity::Heading),
             wetting_rate: 0.2 + more(Quantity::DepthRate),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::input::{Input, Memory, Part};
+use super::input::{Elsewhere, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault};
 use super::spec::{Coefficient, EffectSpec, Kind};
 use super::{
@@ -70,6 +70,12 @@ macro_rules! effects {
             /// none.
             pub fn advance(&self, memory: &mut Memory, input: &Input, dt: f64) {
                 match self { $(Self::$effect(law) => law.advance(memory, input, dt),)* }
+            }
+
+            /// The state in which the model is to be asked as well, for a law of what it answers there
+            /// ([`Input::elsewhere`]).
+            pub fn elsewhere(&self, input: &Input) -> Option<Elsewhere> {
+                match self { $(Self::$effect(law) => law.elsewhere(input),)* }
             }
 
             /// True for the form that takes the drag of the prediction itself, in proportion.

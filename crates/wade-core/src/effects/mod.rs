@@ -53,7 +53,7 @@ pub use channel_flow::is_choked;
 pub use file::{ActiveEffect, Between, EffectsFile, EffectsFileError, Evidence, ParameterValue};
 pub use hull_flooding::level_after;
 pub use immersion::{Immersion, WetPanel};
-pub use input::{BaseDrag, DragSpeed, Input, Memory, Part};
+pub use input::{BaseDrag, DragSpeed, Elsewhere, Input, Memory, Part};
 pub use law::{Numbers, ShapeFault};
 pub use library::{Effect, MAX_COEFFICIENTS, PHYSICS, Shape};
 pub use spec::{Coefficient, EffectSpec, Kind, Parameter, Quantity, Rate};

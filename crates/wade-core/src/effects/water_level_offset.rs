@@ -6,9 +6,10 @@
 //! fifth of the depth. Fitting sets the estimate to the offset again and again.
 
 use super::immersion::Immersion;
-use super::input::{DragSpeed, Input, Memory, Part};
+use super::input::{DragSpeed, Elsewhere, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, finite, unused};
 use super::spec::{Coefficient, EffectSpec, Quantity};
+use crate::condition::Condition;
 use crate::frame::GRAVITY;
 use crate::wrench::Wrench;
 
@@ -45,8 +46,28 @@ impl Law for WaterLevelOffset {
         [self.estimate_m, 0.0, 0.0]
     }
 
+    fn elsewhere(&self, input: &Input) -> Option<Elsewhere> {
+        let condition = input.condition;
+        let condition = Condition {
+            depth: condition.depth + self.estimate_m,
+            // a depth is counted along the body's z
+            water_level: condition.water_level.map(|level| level + self.estimate_m * condition.up.z),
+            ..*condition
+        };
+        (self.estimate_m.abs() >= THIN).then_some(Elsewhere {
+            condition,
+            wheels_at_rest: false,
+            with_waves: false,
+        })
+    }
+
     fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
         let (state, immersion) = (input.condition, input.immersion);
+        let mut law = Wrench::default();
+        let mut emit_law = |part: Part, load: Wrench| {
+            law += load;
+            emit(0, part, load);
+        };
         let upwards = state.up.into_inner() * (state.density * GRAVITY);
         let layer = if self.estimate_m.abs() < THIN {
             input.at(upwards * (immersion.waterplane_area * state.up.z), &immersion.waterplane_center)
@@ -61,7 +82,7 @@ impl Law for WaterLevelOffset {
             let per_meter = self.estimate_m.recip();
             buoyancy(&raised, per_meter) + buoyancy(immersion, -per_meter)
         };
-        emit(0, Part::Hull, layer);
+        emit_law(Part::Hull, layer);
         let velocity = state.velocity;
         let drag = input.own_drag(DragSpeed::Whole);
         for (index, panel) in input.body.panels.iter().enumerate() {
@@ -71,8 +92,11 @@ impl Law for WaterLevelOffset {
             if part.fraction > 0.0 && part.fraction < 1.0 && height > 0.0 {
                 let area = panel.windward(&velocity).component_mul(&drag) / height;
                 let force = area.component_mul(&velocity) * (-input.half_density() * velocity.norm());
-                emit(0, Part::Panel(index), input.at(force, &part.point));
+                emit_law(Part::Panel(index), input.at(force, &part.point));
             }
+        }
+        if let Some(change) = input.elsewhere {
+            emit(0, Part::Hull, change * self.estimate_m.recip() + law * -1.0);
         }
     }
 }

@@ -72,6 +72,11 @@ impl Memory {
         Self { recorded: true, ..Self::default() }
     }
 
+    /// The same without what waves remember.
+    pub fn without_waves(&self) -> Self {
+        Self { waves: Self::default().waves, ..*self }
+    }
+
     fn with_slopes<const N: usize>(&self) -> Memory<Dual<N>> {
         let dual = |vector: &Vector6<f64>| vector.map(Dual::from);
         Memory {

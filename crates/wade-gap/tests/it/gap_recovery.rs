@@ -1069,12 +1069,15 @@ fn the_model_is_asked_about_the_level_and_the_bed_of_a_trial() {
     let mut asked = 0;
     let mut model = |about: &Asked<'_>| {
         let state = about.condition;
-        assert_eq!((state.water_level, state.bed_clearance), (Some(0.0625), Some(0.5)));
-        assert_eq!((state.stated_bed, state.depth), (Some(0.25), 0.0625 / 0.3_f64.cos() - z0));
+        // then in states that effects move it to
+        if asked < TRIALS * SAMPLES {
+            assert_eq!((state.water_level, state.depth), (Some(0.0625), 0.0625 / 0.3_f64.cos() - z0));
+        }
+        assert_eq!((state.bed_clearance, state.stated_bed), (Some(0.5), Some(0.25)));
         asked += 1;
         Predicted::default()
     };
     let body = wade_gap::body_of(&trials).expect("a body");
     let _ = wade_gap::run(&trials, &body, &mut model, &Config::default());
-    assert_eq!(asked, TRIALS * SAMPLES);
+    assert!(asked >= TRIALS * SAMPLES, "{asked}");
 }
