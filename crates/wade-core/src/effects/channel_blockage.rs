@@ -1,7 +1,9 @@
 //! The walls of a channel: the flow past the hull is faster than the hull.
 //!
-//! Two laws. By windward areas, `W = k D ((1 - m)^-2 - 1)` with the section that the wet front takes as the blockage `m`: by
-//! continuity the flow beside the hull is `1 / (1 - m)` times as fast. Qi, Eames, Johnson (JFM 2014) have
+//! The drag of the model at the velocity of the faster flow, less that at the hull's: `W = k (D(c v) - D(v))`. Two laws of `c`,
+//! which say what `W` is where the model cannot be asked as well. By windward areas, `W = k D ((1 - m)^-2 - 1)` with the section
+//! that the wet front takes as the blockage `m`: by continuity the flow beside the hull is `1 / (1 - m)` times as fast. Qi, Eames,
+//! Johnson (JFM 2014) have
 //! `(1 + Cd0 b / 2w)^2` instead, which agrees to a few per cent for b/w of 0.1 to 0.4, where both are meant to hold. And with
 //! the model's own drag `D`, whatever law it follows, and the surface that falls where the flow is fast,
 //! `channel_flow`. `k` is about 1.
@@ -47,7 +49,7 @@ impl Law for ChannelBlockage {
     const SPEC: EffectSpec = EffectSpec {
         name: "channel_blockage",
         summary: "side walls accelerate the flow",
-        equation: "W = k D ((1 - m)^-2 - 1), m = A_wet,front / (w d), or W = k D (((1 - m)(1 - s / d))^-2 - 1) with m and s of squat in a channel",
+        equation: "W = k (D(c v) - D(v)), c = 1 / (1 - m), m = A_wet,front / (w d), or c = 1 / ((1 - m)(1 - s / d)) with m and s of squat in a channel",
         corrects: "none: the base is in open water",
         total: "adds to the drag",
         coefficients: &[Coefficient::published("strength", 0.0, 5.0, [0.5, 1.5])],

@@ -1,9 +1,11 @@
 //! Water that moves over ground with `u`, fixed in the world.
 //!
-//! `f = D(v - w) - D(v)` on each wet panel, `w = R^T u`, with the drag of the model itself, `D(v) = -K |v| v`, `K` from
-//! what the model answers in the state (`Input::own_drag`). Exact for a uniform flow and a quadratic law. Written as `K |v - w0| w + K v ((2 v - w0) . w) / (|v - w0| + |v|)`, which is linear in
-//! `w` and exact at `w = w0`, the estimate `u0` of the law, to which fitting sets it again and again. With
-//! [`DragSpeed::PerAxis`] the drag is `D_i(v) = -K_i |v_i| v_i` (the cross-flow principle; Fossen, Handbook of Marine Craft
+//! `f = F(v - w) - F(v)` with what the model answers at either velocity through the water, `w = R^T u`. That is not linear in
+//! `u`: a law `D(v - w) - D(v)` is, on each wet panel, with the drag of the model itself, `D(v) = -K |v| v`, `K` from
+//! what the model answers in the state (`Input::own_drag`), written as
+//! `K |v - w0| w + K v ((2 v - w0) . w) / (|v - w0| + |v|)`. It is exact at `w = w0`, the estimate `u0`, and what the model answers
+//! otherwise there is added along the estimate. Fitting sets it to the current again and again. Without a model to ask the law stands
+//! alone. With [`DragSpeed::PerAxis`] the drag is `D_i(v) = -K_i |v_i| v_i` (the cross-flow principle; Fossen, Handbook of Marine Craft
 //! Hydrodynamics, section 6.4).
 
 use super::input::{DragSpeed, Elsewhere, Input, Memory, Part};
@@ -28,7 +30,7 @@ impl Law for Current {
     const SPEC: EffectSpec = EffectSpec {
         name: "current",
         summary: "water that moves over ground",
-        equation: "f = D(v - R^T u) - D(v) with the model's drag D",
+        equation: "W = F(v - R^T u) - F(v) with the model's answer F",
         corrects: "none: the velocity through the water, unless a state has a current",
         total: "either",
         coefficients: &[

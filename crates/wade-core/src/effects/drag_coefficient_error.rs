@@ -4,7 +4,8 @@
 //! drag that the model has already, so it may be negative. Bluff bodies lie between 0.3 and 2.1 (Qi, Eames, Johnson, JFM
 //! 2014; FEMA P-646 takes 2.0). Valid while the flow is subcritical; the local velocity of a turning hull is `rotation`.
 //! [`DragLaw`] has other forms: `|v_i| v_i`, and the model's own drag `D` in proportion, `F_i = C_i / K_i D_i` with its
-//! coefficients `K`: the part of its force across gravity, whatever law it follows.
+//! coefficients `K`, whatever law it follows: what the model answers less what it answers at rest. Where it cannot be asked,
+//! `D` is the part of its force across gravity.
 
 use super::input::{Elsewhere, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, form, unused};

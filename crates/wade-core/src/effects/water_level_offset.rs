@@ -1,9 +1,10 @@
 //! The water level is higher than stated.
 //!
-//! Per meter the buoyancy of the layer up to the estimate `o` of the offset, `rho g (V(h + o) - V(h)) / o` upwards at its center
-//! (Archimedes), which is exact at `o`; without an estimate its limit, `rho g A_wp`. And the model's drag in proportion to the
-//! wet part of each panel, whose area is taken as even over its height; this part is of first order, meant for offsets below a
-//! fifth of the depth. Fitting sets the estimate to the offset again and again.
+//! At the estimate `o` of the offset, `F(h + o) - F(h)` with what the model answers at either level. Without an estimate, and
+//! where the model cannot be asked, a law: per meter the buoyancy of the layer up to `o`, `rho g (V(h + o) - V(h)) / o` upwards at
+//! its center (Archimedes); without an estimate its limit, `rho g A_wp`. And the model's drag in proportion to the wet part of
+//! each panel, whose area is taken as even over its height; this part is of first order, meant for offsets below a fifth of the
+//! depth. Fitting sets the estimate to the offset again and again.
 
 use super::immersion::Immersion;
 use super::input::{DragSpeed, Elsewhere, Input, Memory, Part};
@@ -27,7 +28,7 @@ impl Law for WaterLevelOffset {
     const SPEC: EffectSpec = EffectSpec {
         name: "water_level_offset",
         summary: "the water level is higher than stated",
-        equation: "W = rho g (V(h + offset) - V(h)) upwards, and the model's drag in proportion to the depth",
+        equation: "W = F(h + offset) - F(h) with the model's answer F",
         corrects: "pressure of still water: its level",
         total: "either",
         coefficients: &[Coefficient::new("offset", "m", -0.2, 0.2).up_to(0.05)],
