@@ -136,8 +136,8 @@ mod tests {
             assert_eq!(drag(number).unwrap().to_numbers()[0], nearest, "{number}");
         }
         for (effect, numbers, expected) in [
-            (Effect::DragCoefficientError, [3.0, 0.0, 0.0], "shape[0] must be 0 or 1 or 2"),
-            (Effect::DragCoefficientError, [f64::NAN, 0.0, 0.0], "shape[0] must be 0 or 1 or 2"),
+            (Effect::DragCoefficientError, [4.0, 0.0, 0.0], "shape[0] must be 0 or 1 or 2 or 3"),
+            (Effect::DragCoefficientError, [f64::NAN, 0.0, 0.0], "shape[0] must be 0 or 1 or 2 or 3"),
             (Effect::LinearDamping, [0.0, 0.0, 0.1], "shape[2] must be 0"),
             (Effect::Squat, [0.7, 1.0, 0.0], "shape[1] must be 0 or 2"),
             (Effect::Squat, [0.0, 2.0, 0.0], "shape[0] must be greater than 0"),
