@@ -9,6 +9,7 @@
 mod bundles;
 mod common;
 
+use std::cell::RefCell;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -18,7 +19,7 @@ use wade_core::bundle;
 use wade_core::condition::Condition;
 use wade_core::effects::{
     ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectsFile, EffectsSession,
-    Evidence, Kind, ParameterValue, Shape, Validity,
+    Elsewhere, Evidence, Kind, ParameterValue, Shape, Validity,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, WaterPlane, up_from_roll_pitch};
@@ -237,13 +238,21 @@ fn effects(vehicle: &str) -> Vec<Subject> {
         let mut forces = Forces::default();
         model.evaluate(&condition, &mut Workspace::new(), &mut forces);
         let (mut session, mut loads) = (EffectsSession::default(), EffectLoads::default());
+        let asked = self::model(vehicle, Isa::available()[0]);
+        let room = RefCell::new((Workspace::new(), Forces::default()));
         let work = move || {
+            let elsewhere = |there: &Elsewhere| {
+                let (workspace, forces) = &mut *room.borrow_mut();
+                asked.evaluate(&there.condition, workspace, forces);
+                forces.wrench
+            };
             let answer = Answer {
                 condition: black_box(&condition),
                 surfaces: &forces.surfaces,
                 wrench: forces.wrench,
                 wet_parts_known: true,
-                at_edge: None,
+                is_calm: true,
+                elsewhere: &elsewhere,
             };
             active.evaluate(&told, &answer, Some(&mut session), &mut loads);
         };

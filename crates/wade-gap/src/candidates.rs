@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::base_drag::BaseDrag;
-use super::elsewhere::Changes;
+use super::elsewhere::Asking;
 use super::measurement::{of_each_axis, rolling_direction};
 use super::rates::{mean_square, mean_step};
 use super::series::Series;
@@ -60,7 +60,7 @@ pub(super) struct Setting<'a> {
     pub one_clock: bool,
     pub first_stamp: f64,
     /// What the model makes of other states ([`super::elsewhere::Questions::changes`]); none where another simulator predicts.
-    pub elsewhere: Option<&'a dyn Fn(&Shape, &Series) -> Option<Changes>>,
+    pub elsewhere: Option<&'a Asking<'a>>,
 }
 
 impl Setting<'_> {

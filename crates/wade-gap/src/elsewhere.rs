@@ -13,6 +13,9 @@ use wade_core::wrench::Wrench;
 /// The change of the wrench of each sample of a trial, or the wrench.
 pub(super) type Changes = Rc<Vec<Wrench>>;
 
+/// [`Questions::changes`] of some model.
+pub(super) type Asking<'a> = dyn Fn(&Shape, &Series) -> Option<Changes> + 'a;
+
 /// A trial by name, an effect, and the form of its law.
 type Place = (String, Effect, u64);
 
