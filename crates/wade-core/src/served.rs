@@ -12,9 +12,11 @@ use crate::physics::{Memory, Motion, Physics};
 use crate::wrench::Wrench;
 
 /// Step of the differences of effects in the unit of each column: in double precision their rounding is below 1e-9 of a load, and
-/// their curvature below 1e-8. A network that they ask in other states is of single precision: a wider step keeps both below 1e-3.
+/// their curvature below 1e-8.
 const STEP: f64 = 1e-5;
-const STEP_OF_NETWORK: f64 = 1e-3;
+/// The same where they ask a network in other states, which is of single precision: shorter where a switch of the network is near,
+/// at another level or attitude, and longest for the density, of which a step of one is a thousandth.
+const STEPS_OF_NETWORK: [f64; COLUMNS] = [1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4, 1e-4, 1.0];
 
 /// What a served vehicle answers. Reused from query to query.
 #[derive(Debug, Clone, Default)]
@@ -183,9 +185,9 @@ impl ServedVehicle {
                     steps.clear();
                     let before = session.as_deref().copied();
                     let asks_network = self.model.weights().is_some() && effects.ask_elsewhere();
-                    let step = if asks_network { STEP_OF_NETWORK } else { STEP };
                     for column in 0..COLUMNS {
                         let slope = jacobian.column(column).into_owned();
+                        let step = if asks_network { STEPS_OF_NETWORK[column] } else { STEP };
                         let [ahead, behind] = [step, -step].map(|step| {
                             let condition = &stepped(condition, self.model.vehicle().z0, column, step);
                             let wrench = *wrench + Wrench::from_column(&slope) * step;

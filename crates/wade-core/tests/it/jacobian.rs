@@ -10,7 +10,7 @@ use wade_core::physics::{BaseLoads, Memory, Motion, Physics, STATED_NONE};
 use wade_core::served::{Loads, ServedVehicle, Session};
 use wade_core::vehicle::MAX_SURFACES;
 
-use crate::common::{VEHICLES, every_effect};
+use crate::common::{VEHICLES, every_effect, served_with};
 use crate::physics::{Subject, subjects};
 use crate::random::Random;
 
@@ -275,6 +275,53 @@ fn derivatives_with_effects_are_those_of_the_wrench() {
         let kinks = f64::from(kinks) / f64::from(columns);
         println!("{vehicle}: worst {worst:.1e}, {:.1} % at kinks, {outside} outside", 100.0 * kinks);
         assert!(worst < 1e-4 && kinks < 0.05 && outside > 100, "{vehicle}: {worst:e}, {kinks} at kinks");
+    }
+}
+
+/// The same with weights, which effects ask in other states: in single precision, with the switches of the network.
+#[test]
+fn derivatives_with_effects_and_weights_are_those_of_the_wrench() {
+    for vehicle in VEHICLES {
+        let subject = subjects().iter().find(|subject| subject.vehicle.name == vehicle).expect("shipped");
+        let served = served_with(vehicle, every_effect(vehicle));
+        let z0 = subject.vehicle.z0;
+        let (mut random, mut loads) = (Random::new(31), Loads::default());
+        let circumstances = Circumstances {
+            heading: Some(0.4),
+            wheel_speeds: Some([3.0, 4.0, 5.0, 6.0].into()),
+            ..Circumstances::default()
+        };
+        let mut wrench = |state: &Condition, jacobian: bool| {
+            served.evaluate(state, &Circumstances { jacobian, ..circumstances }, None, &mut loads);
+            (loads.forces.wrench.column(), loads.jacobian)
+        };
+        let mut errors: [Vec<f64>; COLUMNS] = Default::default();
+        for _ in 0..STATES {
+            let (sine, cosine) = (std::f64::consts::TAU * random.unit()).sin_cos();
+            let state = Condition {
+                up: UnitVector3::new_normalize(Vec3::z() + random.direction() * (0.1 * random.unit())),
+                angular_velocity: random.direction() * 0.2,
+                ..Condition::level(
+                    // neither in nor out of the water: between the two the load of entry begins
+                    Vec3::new(cosine, sine, 0.1) * (0.5 + 1.5 * random.unit()),
+                    subject.vehicle.dimensions.height * (0.2 + 0.5 * random.unit()),
+                )
+            };
+            let jacobian = wrench(&state, true).1.expect("a base");
+            for (column, errors) in errors.iter_mut().enumerate() {
+                let step = [1e-3, 1e-4, 1.0][usize::from(column >= 6) + usize::from(column == 10)];
+                let [ahead, behind] =
+                    [step, -step].map(|step| wrench(&stepped(&state, z0, column, step), false).0);
+                let difference = (ahead - behind) / (2.0 * step);
+                errors.push((jacobian.column(column) - difference).norm() / difference.norm());
+            }
+        }
+        for (column, errors) in errors.iter_mut().enumerate() {
+            errors.sort_by(f64::total_cmp);
+            let [median, most] = [0.5, 0.95].map(|share| errors[(errors.len() as f64 * share) as usize]);
+            println!("{vehicle} column {column}: median {median:.1e}, 95 % below {most:.1e}");
+            assert!(median < 2e-3 && most < 5e-2, "{vehicle} column {column}: {median:e} {most:e}");
+        }
     }
 }
 
