@@ -14,7 +14,7 @@ use wade_core::model::{Model, Workspace};
 use wade_core::physics::{Memory, Motion, Physics};
 use wade_gap::{Asked, Config, GapError, NotApplicable, Predicted, Report, effects_file};
 use wade_learn::files::write_whole;
-use wade_learn::trials::{SimIs, Trials};
+use wade_learn::trials::{SimIs, Trial, Trials};
 
 use super::gap_bench::GapBench;
 use super::running::Running;
@@ -241,7 +241,7 @@ impl Source {
             let config = if is_anothers(&trials) { config } else { config.predicted_by(physics) };
             wade_gap::run(&trials, &body, &mut predictor(&model, physics), &config)
         } else {
-            let alone = trials.trials.iter().find(|trial| trial.simulated.iter().all(Option::is_none));
+            let alone = trials.trials.iter().find(|trial| !trial.is_simulated());
             let nothing = || format!("there is no vehicle `{vehicle}` ({})", library.origin());
             if let Some(trial) = alone {
                 let (trial, vehicle) = (trial.name.clone(), vehicle.clone());
@@ -368,8 +368,7 @@ impl Source {
 
 /// True where the gap is another simulator's, and what explains it has no place in a bundle.
 fn is_anothers(trials: &Trials) -> bool {
-    let simulated = trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some));
-    simulated && !has_control(trials)
+    trials.trials.iter().any(Trial::is_simulated) && !has_control(trials)
 }
 
 fn has_control(trials: &Trials) -> bool {

@@ -65,12 +65,8 @@ impl<'a> Questions<'a> {
     /// The wrench of each sample's state alone, as it was the first time: what is smoothed is smoothed before.
     fn alone(&self, series: &Series) -> Changes {
         let asked = || {
-            let state = |sample: usize| Elsewhere {
-                condition: series.conditions[sample],
-                wheels_at_rest: false,
-                with_waves: false,
-            };
-            Rc::new((0..series.t.len()).map(|sample| self.ask(series, sample, &state(sample), 0.0)).collect())
+            let ask = |sample| self.ask(series, sample, &Elsewhere::of(series.conditions[sample]), 0.0);
+            Rc::new((0..series.t.len()).map(ask).collect())
         };
         Rc::clone(self.alone.borrow_mut().entry(series.name.clone()).or_insert_with(asked))
     }

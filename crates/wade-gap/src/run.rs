@@ -24,7 +24,7 @@ use super::verdict::{Found, floor_loss};
 use super::{Asked, Config, GapError, Predicted};
 use wade_core::effects::{Block, Body, Effect, Shape};
 use wade_core::frame::GRAVITY;
-use wade_learn::trials::Trials;
+use wade_learn::trials::{Trial, Trials};
 
 /// The body that `trials.toml` describes, for another simulator's prediction; its wheels are as large as they roll.
 pub fn body_of(trials: &Trials) -> Result<Body, GapError> {
@@ -66,7 +66,7 @@ pub fn run(
     let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
     check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
     let floors = floors(&all, &naming, &trials.manifest, &components);
-    let simulated = trials.trials.iter().any(|trial| trial.simulated.iter().any(Option::is_some));
+    let simulated = trials.trials.iter().any(Trial::is_simulated);
     let questions = Questions::new(body, predict);
     let changes = |shape: &Shape, series: &Series| questions.changes(shape, series);
     let setting = Setting {

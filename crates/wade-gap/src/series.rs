@@ -119,12 +119,11 @@ pub(super) fn series(
     in_order_of_recording(&mut used);
     let mut all = Vec::new();
     let mut common: Option<[bool; 6]> = None;
-    let simulated = |trial: &Trial| trial.simulated.iter().any(Option::is_some);
     let controlled = trials.manifest.measured.sim_is == SimIs::Control;
-    if let Some(trial) = used.iter().find(|trial| controlled && !simulated(trial)) {
+    if let Some(trial) = used.iter().find(|trial| controlled && !trial.is_simulated()) {
         return Err(GapError::NoControl { trial: trial.name.clone() });
     }
-    if let Some(trial) = used.iter().find(|trial| simulated(trial) != simulated(used[0])) {
+    if let Some(trial) = used.iter().find(|trial| trial.is_simulated() != used[0].is_simulated()) {
         return Err(GapError::Predictions { trial: trial.name.clone(), other: used[0].name.clone() });
     }
     let sampled = samplings(&used, body, config.bin_s, MOST_SAMPLES);
@@ -186,7 +185,7 @@ fn of_trial(
     let twin = twin(trials, &trial)?.map(|twin| Sampling::new(twin, body, config.bin_s).apply(twin).trial);
     let Measurement { wrench: measured, motion, other } =
         measurement(&trials.manifest, &trial, twin.as_deref(), body.mass)?;
-    let simulated = trial.simulated.iter().any(Option::is_some);
+    let simulated = trial.is_simulated();
     let mut present: [bool; 6] = std::array::from_fn(|c| measured[c].is_some());
     if simulated {
         (0..6).for_each(|c| present[c] &= trial.simulated[c].is_some());

@@ -261,8 +261,9 @@ impl ActiveEffects {
         }
         let without_rate = still(&state);
         // with the drag of one state and an effect of another nothing would fit
-        let here = || elsewhere(&Elsewhere { condition: state, wheels_at_rest: false, with_waves: false });
+        let here = || elsewhere(&Elsewhere::of(state));
         let at_edge = (self.ask_elsewhere() && state != *condition).then(here);
+        let mut alone = at_edge;
         let current_stated = condition.velocity != condition.ground_velocity;
         let EffectLoads { loads, surface_forces, immersion, added_mass, .. } = out;
         // set for each effect below
@@ -297,8 +298,11 @@ impl ActiveEffects {
             let left_out = entry.inputs.iter().find_map(missing);
             let there = if left_out.is_none() { entry.shape.elsewhere(&input) } else { None };
             input.elsewhere = there.map(|there| {
-                let here = if there.with_waves && is_calm { input.predicted } else { here() };
-                elsewhere(&there) + here * -1.0
+                let before = match there.with_waves && is_calm {
+                    true => input.predicted,
+                    false => *alone.get_or_insert_with(here),
+                };
+                elsewhere(&there) + before * -1.0
             });
             let memory = match (session.as_deref_mut(), entry.memory) {
                 (Some(session), Some(place)) => {

@@ -78,15 +78,15 @@ impl Law for ChannelBlockage {
     fn elsewhere(&self, input: &Input) -> Option<Elsewhere> {
         let faster = (1.0 + self.excess(input)?).sqrt();
         let condition = Condition { velocity: input.condition.velocity * faster, ..*input.condition };
-        Some(Elsewhere { condition, wheels_at_rest: false, with_waves: false })
+        Some(Elsewhere::of(condition))
     }
 
     fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-        let Some(more) = self.excess(input) else { return };
         if let Some(Wrench { force, moment }) = input.elsewhere {
             // the change of the drag alone: how the hull is drawn down is squat
             return emit(0, Part::Hull, Wrench { force: Vec3::new(force.x, force.y, 0.0), moment });
         }
+        let Some(more) = self.excess(input) else { return };
         let (velocity, immersion) = (input.condition.velocity, input.immersion);
         if self.is_in_proportion() {
             let drag = input.predicted_drag() * more;

@@ -55,7 +55,7 @@ impl Law for Current {
     fn elsewhere(&self, input: &Input) -> Option<Elsewhere> {
         let water = input.body_from_world(self.east_mps, self.north_mps);
         let condition = Condition { velocity: input.condition.velocity - water, ..*input.condition };
-        (water.norm() > 0.0).then_some(Elsewhere { condition, wheels_at_rest: false, with_waves: false })
+        (water.norm() > 0.0).then_some(Elsewhere::of(condition))
     }
 
     fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {

@@ -146,6 +146,13 @@ pub struct Elsewhere {
     pub with_waves: bool,
 }
 
+impl Elsewhere {
+    /// A state alone in which the wheels turn as they do.
+    pub fn of(condition: Condition) -> Self {
+        Self { condition, wheels_at_rest: false, with_waves: false }
+    }
+}
+
 /// The part of a hull that carries a load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {

@@ -55,11 +55,7 @@ impl Law for WaterLevelOffset {
             water_level: condition.water_level.map(|level| level + self.estimate_m * condition.up.z),
             ..*condition
         };
-        (self.estimate_m.abs() >= THIN).then_some(Elsewhere {
-            condition,
-            wheels_at_rest: false,
-            with_waves: false,
-        })
+        (self.estimate_m.abs() >= THIN).then_some(Elsewhere::of(condition))
     }
 
     fn basis(&self, _memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {

@@ -140,6 +140,11 @@ pub struct Trial {
 }
 
 impl Trial {
+    /// True where a simulator's forces stand beside the measured ones.
+    pub fn is_simulated(&self) -> bool {
+        self.simulated.iter().any(Option::is_some)
+    }
+
     /// Reads and checks one file.
     pub(super) fn read(path: &Path, manifest: &Manifest) -> Result<Self, TrialError> {
         let Measured { other_forces, known_loads, .. } = &manifest.measured;
