@@ -185,9 +185,9 @@ impl ServedVehicle {
                     steps.clear();
                     let before = session.as_deref().copied();
                     let asks_network = self.model.weights().is_some() && effects.ask_elsewhere();
-                    for column in 0..COLUMNS {
+                    for (column, wide) in STEPS_OF_NETWORK.into_iter().enumerate() {
                         let slope = jacobian.column(column).into_owned();
-                        let step = if asks_network { STEPS_OF_NETWORK[column] } else { STEP };
+                        let step = if asks_network { wide } else { STEP };
                         let [ahead, behind] = [step, -step].map(|step| {
                             let condition = &stepped(condition, self.model.vehicle().z0, column, step);
                             let wrench = *wrench + Wrench::from_column(&slope) * step;
