@@ -318,7 +318,9 @@ fn a_current_acts_as_the_velocity_that_it_takes_off() {
     assert!(east(0.0).x > 1.0 && east(0.0).y.abs() < 1e-9);
     // and from one that looks north it comes from the left
     let north = east(std::f64::consts::FRAC_PI_2);
-    assert!(north.y < -1.0 && north.x.abs() < 0.5 * north.y.abs(), "{north}");
+    let from_the_left = Condition { velocity: Vec3::y() * 0.4, ..parked };
+    let expected = change(&parked, &from_the_left).force;
+    assert!(north.y < -1.0 && close(&north, &expected, 1e-6), "{north} {expected}");
 }
 
 #[test]
