@@ -41,6 +41,25 @@ pub struct NamedEffect {
     /// Parameters by name.
     #[serde(default)]
     pub parameters: BTreeMap<String, Estimate>,
+    /// Drag of the prediction itself as coefficients along x, y, z; absent where the tool states none.
+    #[serde(default)]
+    base_drag: [f64; 3],
+}
+
+impl NamedEffect {
+    /// Adds coefficients of drag as shares of the prediction's own, which differ less from tool to tool.
+    fn add_shares(&mut self) {
+        for (name, of) in ["surge", "sway"].into_iter().zip(self.base_drag).filter(|(_, of)| *of > 0.0) {
+            let Some(coefficient) = self.parameters.get(name) else { continue };
+            let share = Estimate {
+                value: coefficient.value / of,
+                std: coefficient.std.map(|std| std / of),
+                interval: coefficient.interval.map(|ends| ends.map(|end| end / of)),
+                unit: coefficient.unit.clone(),
+            };
+            self.parameters.insert(format!("{name}_share"), share);
+        }
+    }
 }
 
 /// Names that explain as much: a list, or a table that holds one.
@@ -136,7 +155,9 @@ pub struct Answer {
 impl Answer {
     /// Reads a report.
     pub fn from_report(report: &Value) -> Result<Self, serde_json::Error> {
-        Self::deserialize(report)
+        let mut answer = Self::deserialize(report)?;
+        answer.effects.iter_mut().for_each(NamedEffect::add_shares);
+        Ok(answer)
     }
 
     /// What the numbers of the report say against its verdict.

@@ -53,6 +53,8 @@ pub struct Judged {
     pub noise: NoiseKind,
     /// What was hidden.
     pub hidden: BTreeSet<String>,
+    /// Parameters of each as planted, by effect.
+    pub planted: BTreeMap<String, Vec<Parameter>>,
     /// True where the trials cannot tell the hidden effect from another, so that both may be held possible.
     pub has_twin: bool,
     /// True where further trials resolve a pair.
@@ -87,14 +89,15 @@ impl Judged {
     /// Holds an answer against the truth.
     pub fn new(case: &Case, generated: &Generated, answer: Result<Answer, String>, seconds: f64) -> Self {
         let truth = &generated.truth;
-        let hidden = truth.effects.iter().map(|hidden| hidden.effect.name()).collect();
+        let names = || truth.effects.iter().map(|hidden| hidden.effect.name());
         let mut judged = Self {
             case: case.name.clone(),
             family: case.family,
             strength: case.strength,
             strengths: truth.strengths.clone(),
             noise: case.noise,
-            hidden,
+            hidden: names().collect(),
+            planted: names().zip(truth.parameters.iter().cloned()).collect(),
             has_twin: case.twin.is_some() && !case.resolved,
             resolved: case.resolved,
             error: None,

@@ -5,7 +5,7 @@ use crate::hull::wrench;
 use crate::{Track, Wrench6};
 use wade_core::frame::Vec3;
 
-/// Draft at which the kernel is as stated; it is proportional to the draft [m].
+/// Draft at which the kernel is as stated; it is proportional to the volume under water [m].
 pub(crate) const DRAFT: f64 = 0.2;
 /// Sway and heave over surge.
 pub(crate) const RATIO: [f64; 3] = [1.0, 1.5, 1.2];
@@ -23,9 +23,10 @@ pub(super) fn convolution(hidden: &Hidden, setting: &Setting, track: &Track) -> 
     let velocity: Vec<Vec3> = track.states.iter().map(|state| state.velocity).collect();
     let remembered = remembered(&velocity, track.step, a, b);
     let loads = remembered.iter().zip(&track.states).map(|(v, state)| {
-        let draft = state.depth.clamp(0.0, setting.simulator.hull.height);
-        let force = -v.component_mul(&Vec3::from(RATIO)) * (hidden.size * draft / DRAFT);
         let hull = setting.simulator.hull;
+        let draft = state.depth.clamp(0.0, hull.height);
+        let kernel = hidden.size * hull.filled(draft) / hull.filled(DRAFT);
+        let force = -v.component_mul(&Vec3::from(RATIO)) * kernel;
         wrench(force, Vec3::z() * (hull.z0 + 0.5 * draft) - hull.center_of_mass)
     });
     loads.collect()

@@ -160,8 +160,8 @@ pub struct Hidden {
 impl Hidden {
     /// Plausible parameters at random.
     ///
-    /// Sizes: multiple of strip theory (added mass, slamming, rotation), N s/m3 (linear damping, by length and draft),
-    /// share (drag, density, gain, drive gain), m/s (current), m (water level), share of the waterplane (flooding), N/m
+    /// Sizes: multiple of strip theory (added mass, slamming, rotation), N s/m3 (linear damping),
+    /// share (drag, density, gain, drive gain), m/s (current), m (water level), share of the volume (flooding), N/m
     /// (wave memory), multiple of one-dimensional flow (blockage, squat), lug coefficient (paddle), coefficient (bed),
     /// s (delay), N or N m (bias and its step), N/s (drift), rad (misalignment), coefficient (rolling resistance, vortex),
     /// kg (mass), N/m (tether), share at the end (thermal), N/s^0.5 (mud), N (seiche).

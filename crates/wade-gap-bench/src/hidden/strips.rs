@@ -55,15 +55,16 @@ pub(super) fn momenta(strips: &[Strip], state: &State) -> (Vec3, Vec3) {
     sum
 }
 
-/// `-b T (v + r x)` on each strip, and as much along x over the width.
+/// `-b A (v + r x)` on each strip, A being half the wet area of the sides that look along y, and as much along x.
 pub(super) fn linear_damping(hidden: &Hidden, setting: &Setting, state: &State) -> Wrench6 {
     let hull = setting.simulator.hull;
     let (v, r) = (state.velocity, state.angular_velocity.z);
     let mut sum = Wrench6::zeros();
     for strip in hull.strips(state, 0.0) {
-        let per_length = hidden.size * strip.draft * strip.dx;
-        let side = -per_length * (v.y + r * strip.x);
-        let along = -per_length * hull.width / hull.length * v.x;
+        let of_sides =
+            |axis: usize| hidden.size * 0.5 * hull.facing(strip.draft, axis) * strip.dx / hull.length;
+        let side = -of_sides(1) * (v.y + r * strip.x);
+        let along = -of_sides(0) * v.x;
         sum += wrench(Vec3::new(along, side, 0.0), Vec3::new(strip.x, 0.0, strip.z));
     }
     sum

@@ -3,7 +3,7 @@
 use super::{Effect, Hidden, Setting};
 use crate::simulator::DRAG;
 use crate::track::DENSITY;
-use crate::{State, Track};
+use crate::{Prediction, State, Track};
 use wade_core::frame::GRAVITY;
 
 /// A planted parameter with the names that a report may give it. A tool that states it in another way adds its name here:
@@ -26,10 +26,13 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
         Effect::AddedMass => added_mass(size, setting, tracks),
         Effect::LinearDamping => linear_damping(size, setting, mean_depth(tracks)),
         Effect::DragCoefficientError => {
-            let share =
-                Parameter { names: &["relative_error", "share", "factor", "error"], unit: "1", value: size };
-            let coefficient = |names, of: f64| Parameter { names, unit: "1", value: size * of };
-            vec![share, coefficient(&["surge"], DRAG[0]), coefficient(&["sway"], DRAG[1])]
+            let of = |names, value| Parameter { names, unit: "1", value };
+            let [surge, sway] = match setting.simulator.prediction {
+                Prediction::Analytic => [of(&["surge"], size * DRAG[0]), of(&["sway"], size * DRAG[1])],
+                // a model has no coefficients of its own
+                Prediction::Model(_) => [of(&["surge_share"], size), of(&["sway_share"], size)],
+            };
+            vec![of(&["relative_error", "share", "factor", "error"], size), surge, sway]
         }
         Effect::Rotation => {
             let factor = Parameter { names: &["coefficient", "factor", "scale"], unit: "1", value: size };
@@ -55,23 +58,7 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
                 Parameter { names: &["density", "difference"], unit: "kg/m3", value: size * DENSITY };
             vec![relative, difference]
         }
-        Effect::HullFlooding => {
-            let hull = setting.simulator.hull;
-            let area = Parameter {
-                names: &["area", "waterplane"],
-                unit: "m2",
-                value: size * hull.length * hull.width,
-            };
-            // of the volume that the hull displaces
-            let depth = mean_depth(tracks);
-            let displaced = size * hull.length * hull.width * depth / hull.volume(depth);
-            let share = Parameter {
-                names: &["share", "permeability", "fraction", "flooded_share"],
-                unit: "1",
-                value: displaced,
-            };
-            vec![area, share]
-        }
+        Effect::HullFlooding => one(&["share", "permeability", "fraction", "flooded_share"], "1", size),
         Effect::WaterEntrySlamming => one(&["coefficient", "c_s", "factor"], "1", size),
         Effect::WaveMemory => wave_memory(size, setting),
         Effect::ChannelBlockage => one(&["coefficient", "factor", "scale", "strength"], "1", size),
@@ -119,18 +106,16 @@ pub fn parameters(hidden: &Hidden, setting: &Setting, tracks: &[Track]) -> Vec<P
     }
 }
 
-/// Of the whole body along x, and over the density, the speed of waves as long as the body, and the sides that look along an axis.
+/// Of the whole body along x, and over the density and the speed of waves as long as the body.
 fn linear_damping(size: f64, setting: &Setting, depth: f64) -> Vec<Parameter> {
     let hull = setting.simulator.hull;
     let per_area = Parameter { names: &["b", "coefficient"], unit: "N s/m3", value: size };
-    let whole = size * depth * hull.width;
+    let whole = size * 0.5 * hull.facing(depth, 0);
     let along = Parameter { names: &["b_x", "surge", "coefficient_x"], unit: "N s/m", value: whole };
     let waves = (GRAVITY * hull.length).sqrt();
-    let number =
-        |axis: usize, across: f64| size * depth * across / (DENSITY * waves * hull.facing(depth, axis));
-    let surge = Parameter { names: &["surge"], unit: "1", value: number(0, hull.width) };
-    let sway = Parameter { names: &["sway"], unit: "1", value: number(1, hull.length) };
-    vec![per_area, along, surge, sway]
+    let number = 0.5 * size / (DENSITY * waves);
+    let of = |names| Parameter { names, unit: "1", value: number };
+    vec![per_area, along, of(&["surge"]), of(&["sway"])]
 }
 
 /// The kernel at the draft for which it is stated, and over the weight of the water displaced there and the length.

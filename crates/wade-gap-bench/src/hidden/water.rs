@@ -56,7 +56,7 @@ pub(super) fn density(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<
     track.states.iter().map(|state| setting.simulator.predict(state) * hidden.size).collect()
 }
 
-/// Two volumes, in front and behind, that together cover a share `size` of the waterplane (of which the front one has
+/// Two volumes, in front and behind, that together fill a share `size` of the body at every height (of which the front one has
 /// `shape[1]`), fill through orifices and take their buoyancy away. A trial that begins in water begins with the body
 /// just set down, its volumes empty. `shape[0]` is the time to fill to 0.2 m outside [s].
 pub(super) fn flooding(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec<Wrench6> {
@@ -80,9 +80,9 @@ pub(super) fn flooding(hidden: &Hidden, setting: &Setting, track: &Track) -> Vec
     track.states.iter().map(&mut force).collect()
 }
 
-/// Load of a column of water that stands at `x` over an area, about the center of mass.
+/// Load of the water in a volume that stands to a level at `x`, about the center of mass.
 fn lost(hull: &Hull, up: &Vec3, level: f64, area: f64, x: f64) -> Wrench6 {
-    let force = up * (-DENSITY * GRAVITY * area * level);
+    let force = up * (-DENSITY * GRAVITY * area * hull.filled(level));
     crate::hull::wrench(force, Vec3::new(x, 0.0, hull.z0 + 0.5 * level) - hull.center_of_mass)
 }
 
