@@ -12,7 +12,7 @@ use super::effects_file::remarks;
 use super::experiment::{next_step, separating};
 use super::explanations::{Weighed, stated, suspected};
 use super::fit::{Fit, Parameter, fit};
-use super::holdout::{Closure, Explained, closures, explained_of_rows, worse};
+use super::holdout::{Closure, Explained, closures, explained_of_rows, explained_where_acting, worse};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
@@ -44,13 +44,26 @@ fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
         .collect()
 }
 
+/// Share of the squared gap that is explained by what is half as large as the gap: what is named must be no less where it acts. Else
+/// something else is most of the gap, such as the model's own error, and what is small beside that may be a part of it.
+const HALF_AS_LARGE: f64 = 0.25;
+
 /// What a set of effects does for the held-out trials.
 struct HeldOut {
     fitted: Option<Fit>,
     named: Vec<Named>,
     closures: BTreeMap<&'static str, Closure>,
-    /// Share of the squared gap that it explains, where that says that it is not what is missing.
-    disproof: Option<f64>,
+    /// What says that it is not what is missing.
+    disproof: Option<Disproof>,
+}
+
+/// Share of the squared gap that a set of effects explains where that is too little, or less than nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Disproof {
+    /// Of all of the held-out trials.
+    Everywhere(f64),
+    /// Of what they hold where the set acts.
+    WhereItActs(f64),
 }
 
 impl HeldOut {
@@ -64,7 +77,12 @@ impl HeldOut {
             let explained = explained_of_rows(&named, all, held, judge).unwrap_or(closure.explained());
             closure.disproof(explained, config.coverage, judge.has_fault(members))
         });
+        let slight = || {
+            let share = explained_where_acting(&named, all, held, (setting, judge.floors), config)?;
+            (share < HALF_AS_LARGE).then_some(Disproof::WhereItActs(share))
+        };
         let disproof = small.or_else(|| disproved(&closures, judge.floors));
+        let disproof = disproof.map(Disproof::Everywhere).or_else(slight);
         Self { fitted, named, closures, disproof }
     }
 }
@@ -92,10 +110,13 @@ pub(super) fn compose(
     let members = if fits { found.members.as_slice() } else { &[] };
     let HeldOut { fitted, mut named, closures: mut held_out, disproof } = HeldOut::of(judge, members, &held);
     let is_fault = judge.has_fault(&found.members);
-    // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows; a fault is
-    // exact or is none
-    let disproof =
-        disproof.filter(|share| fits && (found.verdict == Verdict::Named || is_fault || *share < 0.0));
+    // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows or is another's; a
+    // fault is exact or is none
+    let is_for_all = |disproof: &Disproof| match disproof {
+        Disproof::Everywhere(share) => found.verdict == Verdict::Named || is_fault || *share < 0.0,
+        Disproof::WhereItActs(_) => true,
+    };
+    let disproof = disproof.filter(|disproof| fits && is_for_all(disproof));
     if disproof.is_some() {
         found.verdict = Verdict::NoCandidateFits;
         found.left = found.of_gap.clone();

@@ -151,6 +151,13 @@ pub(super) fn more_probable_than_not(weighed: &[Weighed]) -> Vec<&'static str> {
     Effect::ALL.into_iter().map(Effect::name).filter(|name| probability(name) > 0.5).collect()
 }
 
+/// Probability that some effects all act, alone or with others.
+pub(super) fn probability_of_all(effects: &[&'static str], weighed: &[Weighed]) -> f64 {
+    let explanations = weighed.iter().map(|weighed| &weighed.explanation);
+    let hold_all = |e: &&Explanation| effects.iter().all(|effect| e.effects.contains(effect));
+    explanations.filter(hold_all).map(|e| e.probability).sum()
+}
+
 /// Logarithm of the probability of a set before the trials, over that of nothing: all sets of a size are alike, but for effects
 /// that the prediction is known to leave out, and so are all forms of a law.
 fn log_prior(judge: &Judge, effects: &[Effect], library: &[Effect]) -> f64 {
@@ -308,5 +315,7 @@ mod tests {
         let weighed: Vec<Weighed> = explanations.into_iter().map(of).collect();
         assert_eq!(more_probable_than_not(&weighed), ["added_mass"]);
         assert_eq!(more_probable_than_not(&weighed[1..]), [""; 0]);
+        assert!((probability_of_all(&["added_mass"], &weighed) - 0.6).abs() < 1e-12);
+        assert!((probability_of_all(&["squat", "added_mass"], &weighed) - 0.35).abs() < 1e-12);
     }
 }

@@ -7,10 +7,10 @@ use serde::Serialize;
 use super::candidates::{Column, Setting, columns};
 use super::design::{Rows, to_rows};
 use super::features::{Features, of_bins};
-use super::judge::Judge;
+use super::judge::{Judge, telling};
 use super::locate::{Limits, OPEN, Region, inside};
 use super::model_error::ModelError;
-use super::noise::Floor;
+use super::noise::{Floor, sample_noise};
 use super::series::Series;
 use super::statistics::quantile;
 use super::{Config, Named};
@@ -24,6 +24,8 @@ const ABOVE: f64 = 1.02;
 /// Floors below which a gap hardly stands above them, and what must be left then: where less is, the floor is none, and hundreds of per
 /// cent of what stands above it tell nobody anything.
 const NEAR: [f64; 2] = [1.5, 0.9];
+/// Times the noise of all trials from which that of one is its own: noise of a sensor is known to far better than a factor of two.
+const LOUDER: f64 = 2.0;
 /// A region may not become worse by more than this share.
 const WORSE: f64 = 0.05;
 
@@ -217,6 +219,47 @@ pub(super) fn explained_of_rows(
     Some(Explained { share: above_noise(whole, whole_left), closes_at_most })
 }
 
+/// Share that named effects explain where they act: of the squared gap above its noise in the samples and components of the held-out
+/// trials that hold nine tenths of what they add, each in noise and what the model states of itself. None where they add less there than
+/// matters beside the noise of a sample: trials without them say nothing of them.
+pub(super) fn explained_where_acting(
+    named: &[Named],
+    all: &[Series],
+    held: &[usize],
+    (setting, floors): (&Setting, &[Floor; 6]),
+    config: &Config,
+) -> Option<f64> {
+    let (mut energy, mut squares) = (Vec::new(), Vec::new());
+    for &trial in held {
+        let series = &all[trial];
+        let added = explained(named, series, trial, setting);
+        // of a trial that is clearly louder than the others, its own
+        let mut noise = floors.map(|floor| floor.total());
+        for &c in &setting.components {
+            let own = sample_noise(series, c);
+            noise[c] = if own > LOUDER * noise[c] { own } else { noise[c] };
+        }
+        for (gap, added) in series.gap.iter().zip(&added) {
+            for &c in &setting.components {
+                let weight = noise[c].hypot(floors[c].model).max(1e-12).powi(-2);
+                energy.push(added[c].powi(2) * weight);
+                squares.push([gap[c], gap[c] - added[c], noise[c]].map(|x| x * x * weight));
+            }
+        }
+    }
+    share_where_acting(&energy, &squares, config.relevance)
+}
+
+/// The same of squares of what is added to each value, and of its gap before and after and of its noise.
+fn share_where_acting(added: &[f64], squares: &[[f64; 3]], relevance: f64) -> Option<f64> {
+    let acting = telling(added);
+    let sum = |of: usize| acting.iter().map(|&value| squares[value][of]).sum::<f64>();
+    let [before, after, noise] = [0, 1, 2].map(sum);
+    let adds = acting.iter().map(|&value| added[value]).sum::<f64>();
+    let matters = adds > relevance.powi(2) * noise;
+    matters.then(|| (before - after) / (before - noise).max(f64::MIN_POSITIVE))
+}
+
 /// Share that is explained of what stands above the noise, of mean squares in units of it.
 fn above_noise(before: f64, after: f64) -> f64 {
     (before - after) / (before - 1.0).max(f64::MIN_POSITIVE)
@@ -334,5 +377,20 @@ mod tests {
             closure.disproof(closure.explained(), 0.6, true)
         };
         assert!(fault(0.64).is_some() && fault(0.82).is_none(), "a zero that is off explains all of it");
+    }
+
+    #[test]
+    fn the_share_where_effects_act_is_that_of_the_gap_there() {
+        // 3 of what is 5 in the first tenth of the values, with 1 of noise; elsewhere a gap that is none of theirs
+        let added: Vec<f64> = (0..100).map(|i| if i < 10 { 9.0 } else { 0.0 }).collect();
+        let squares = |left: f64| -> Vec<[f64; 3]> {
+            (0..100).map(|i| if i < 10 { [26.0, left, 1.0] } else { [900.0, 900.0, 1.0] }).collect()
+        };
+        let share = |left: f64, relevance: f64| share_where_acting(&added, &squares(left), relevance);
+        assert_eq!(share(1.0, 0.08), Some(1.0));
+        assert_eq!(share(17.0, 0.08), Some(0.36));
+        assert!(share(30.0, 0.08).is_some_and(|share| share < 0.0), "it makes the gap there larger");
+        assert_eq!(share(17.0, 3.1), None, "too little beside the noise to say");
+        assert_eq!(share_where_acting(&[0.0; 100], &squares(1.0), 0.08), None);
     }
 }

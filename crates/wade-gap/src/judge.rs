@@ -528,7 +528,7 @@ pub(super) fn lives_on_a_rate(effect: Effect) -> bool {
 }
 
 /// The fewest that together hold [`TELLING`] of the energy.
-fn telling(energy: &[f64]) -> Vec<usize> {
+pub(super) fn telling(energy: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..energy.len()).collect();
     order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]).then(a.cmp(&b)));
     let (most, mut held) = (TELLING * energy.iter().sum::<f64>(), 0.0);

@@ -1,5 +1,6 @@
 //! What was found, in sentences.
 
+use super::compose::Disproof;
 use super::detect::GapSize;
 use super::explanations::{Explanation, NOTHING, OUTSIDE_LIBRARY};
 use super::gated::Gated;
@@ -11,7 +12,7 @@ use super::report::{NamedEffect, Report, Verdict};
 use super::verdict::{Found, STRUCTURE, Unfit};
 
 /// What has no name, where it matters: how much of it is structure, and what came nearest.
-pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -> Option<String> {
+pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<Disproof>) -> Option<String> {
     let left = &found.left;
     let whole = judge.missing();
     let share = left.gain / whole;
@@ -72,15 +73,17 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<f64>) -
             100.0 * gated.share.min(1.0)
         );
     }
-    if let Some(share) = disproof {
+    if let Some(disproof) = disproof {
         let names = judge.names(&found.members).join(" and ").replace('_', " ");
+        let (share, place) = match disproof {
+            Disproof::Everywhere(share) => (share, ""),
+            Disproof::WhereItActs(share) => (share, ", where it acts"),
+        };
         text += &if share > 0.0 {
-            format!(
-                "; {names} would explain {:.0} % of the squared gap of the held-out trials",
-                100.0 * share
-            )
+            let share = 100.0 * share;
+            format!("; {names} would explain {share:.0} % of the squared gap of the held-out trials{place}")
         } else {
-            format!("; {names} would increase the gap of the held-out trials")
+            format!("; {names} would increase the gap of the held-out trials{place}")
         };
     }
     Some(text)

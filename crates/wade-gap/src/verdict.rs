@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::design::Design;
 use super::detect::sizes;
-use super::explanations::{NOTHING, OUTSIDE_LIBRARY, Weighed, more_probable_than_not};
+use super::explanations::{NOTHING, OUTSIDE_LIBRARY, Weighed, more_probable_than_not, probability_of_all};
 use super::features::{energy, without_zeros};
 use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
@@ -161,19 +161,21 @@ impl Found {
     }
 
     /// The set of the effects that are more probable than not, where it is none of what was found: a search that adds one effect
-    /// after the other can end in a set too many or too few. Where it ended in none, a set must be far more probable than not.
+    /// after the other can end in a set too many or too few. Where it ended in none, it must be far more probable than not that
+    /// all of them act, whatever acts beside them.
     pub fn set_to_name(&self, judge: &Judge, weighed: &[Weighed]) -> Option<Vec<Member>> {
         let likely = more_probable_than_not(weighed);
         let is_named = matches!(self.verdict, Verdict::Named | Verdict::Ambiguous);
-        let first = weighed.first().map(|first| &first.explanation);
-        let is_likely = self.is_relevant
-            && first.is_some_and(|first| first.effects == likely && first.probability >= LIKELY);
+        // functions of the state see as much of an error that the model states as of an effect
+        let matters = self.is_relevant || judge.design.noise.model;
+        let is_likely = matters && probability_of_all(&likely, weighed) >= LIKELY;
         // of several that stand beside each other the first is the one that is far more probable than the others
         let stands_beside =
             !is_likely && self.alternatives.iter().any(|set| judge.sorted_names(set) == likely);
-        let is_another =
-            (is_named && likely != self.names || is_likely) && !likely.is_empty() && !stands_beside;
-        let set = weighed.iter().find(|weighed| is_another && weighed.explanation.effects == likely)?;
+        let is_said = self.verdict == Verdict::Named && likely == self.names;
+        let is_another = is_named && likely != self.names || is_likely && !is_said;
+        let is_tried = is_another && !likely.is_empty() && !stands_beside;
+        let set = weighed.iter().find(|weighed| is_tried && weighed.explanation.effects == likely)?;
         let mut set = set.set.clone();
         set.sort_by_key(|member| judge.effect(member));
         Some(set)
