@@ -4,6 +4,7 @@
 
 mod planted;
 
+mod calibration;
 mod driven;
 mod explanations;
 mod gap_recovery;
