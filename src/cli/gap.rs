@@ -36,7 +36,6 @@ const SETTINGS: &str = "  # library = [\"added_mass\", \"current\"]   # default:
   share_of_gap = 0.01          # least share of the explained gap
   relevance = 0.08             # least size over the noise of a sample
   most_effects = 4             # named together
-  placebos = 20                # surrogates that an effect must beat
   bootstrap = 400              # draws
   coverage = 0.6               # least share of the structure that is explained
 ";

@@ -294,7 +294,6 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
         let others: Vec<Member> =
             found.members.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, m)| m.clone()).collect();
         let without = design.solve(&judge.columns(&others)).map_or(found.loss, |(_, loss)| loss);
-        let placebo = judge.placebo_gains(&found.members, member).unwrap_or_default();
         let specs = one.effect.coefficients();
         let mut parameters = BTreeMap::new();
         for (i, &(coefficient, value)) in one.coefficients.iter().enumerate() {
@@ -321,7 +320,6 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             parameters,
             share_of_gap: ((without - found.loss) / whole).clamp(0.0, 1.0),
             provisional: fitted.provisional[index],
-            placebo: [placebo.0, placebo.1],
             surfaces: carriers(std::slice::from_ref(one), judge.all, judge.setting, &OPEN),
             covariance: with(index),
             covariance_with: (index + 1..named.len()).map(|j| (named[j].effect.name(), with(j))).collect(),

@@ -39,8 +39,6 @@ pub struct Config {
     pub relevance: f64,
     /// Most effects that are named together.
     pub most_effects: usize,
-    /// Phase-shifted placebos.
-    pub placebos: usize,
     /// Draws of the bootstrap.
     pub bootstrap: usize,
     /// Least share of the structure that the named effects must explain.
@@ -64,7 +62,6 @@ impl Default for Config {
             share_of_gap: 0.01,
             relevance: 0.08,
             most_effects: 4,
-            placebos: 20,
             bootstrap: 400,
             coverage: 0.6,
         }
@@ -99,7 +96,6 @@ impl Config {
             ("folds", self.folds, 2..=usize::MAX, "2 or more"),
             ("least_trials", self.least_trials, 3..=usize::MAX, "3 or more"),
             ("most_effects", self.most_effects, 1..=Effect::ALL.len(), "from 1 to the size of the library"),
-            ("placebos", self.placebos, 0..=10_000, "at most 10000"),
             ("bootstrap", self.bootstrap, 20..=100_000, "from 20 to 100000"),
         ];
         if let Some((key, value)) =
@@ -131,7 +127,6 @@ mod tests {
     fn numbers_that_make_no_sense_and_counts_without_end_are_refused() {
         for (text, expected) in [
             ("bootstrap = 1000000000", "bootstrap = 1000000000 must be from 20 to 100000"),
-            ("placebos = 1000000000000000000", "placebos = 1000000000000000000 must be at most 10000"),
             ("most_effects = 99", "most_effects = 99 must be from 1 to the size of the library"),
             ("significance = 1.0", "significance = 1 must be above 0 and below 1"),
             ("significance = 0.0", "significance = 0 must be above 0 and below 1"),
@@ -143,7 +138,7 @@ mod tests {
             let config: Config = toml::from_str(text).unwrap();
             assert_eq!(config.check().unwrap_err().to_string(), expected);
         }
-        for text in ["", "bootstrap = 100000\nplacebos = 0", "most_effects = 23\nsignificance = 0.5"] {
+        for text in ["", "bootstrap = 100000", "most_effects = 23\nsignificance = 0.5"] {
             assert_eq!(toml::from_str::<Config>(text).unwrap().check(), Ok(()));
         }
     }

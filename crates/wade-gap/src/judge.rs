@@ -3,8 +3,8 @@
 //! Physics, sensors and drive compete in one regression, scored by the loss of blocks left out (Burman, Chow, Nolan,
 //! Biometrika 1994) and Schwarz's price of a number (Annals of Statistics 1978). Each effect of a set must pass every gate given the others:
 //! significant by cluster-robust errors, inside its physical bounds, of one sign in every fold, better in most folds and in
-//! most of the blocks that excite it, a stated share of the remaining gap above the floor, larger than its phase-shifted
-//! placebos, and large enough to matter beside the noise of a sample.
+//! most of the blocks that excite it, a stated share of the remaining gap above the floor, and large enough to
+//! matter beside the noise of a sample.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -15,13 +15,12 @@ use nalgebra::DVector;
 use super::design::{Design, Fitted};
 use super::noise::Floor;
 use super::rates::mean_square;
-use super::robust::{Error, contribution, errors, group, shadow, total};
+use super::robust::{Error, contribution, errors, group, shadow};
 use super::series::Series;
 use super::shared::{exceeds_noise, outlasts_noise};
 use super::statistics::deviate_of;
 use super::{Config, candidates::Setting};
 use wade_core::effects::{Effect, Kind};
-use wade_learn::random::Random;
 
 /// Least deviate of a column that stays in a group.
 const COLUMN_DEVIATE: f64 = 2.5;
@@ -35,8 +34,6 @@ const MOST_SCATTER: f64 = 0.75;
 /// What holds this share of an effect's energy tells of it: where there is nearly none, the noise of the recorded motion is in
 /// the effect and, with the other sign, in the gap.
 const TELLING: f64 = 0.9;
-/// A shifted sum that still points the same way is no placebo.
-const SAME_DIRECTION: f64 = 0.9;
 
 /// An effect of a set: its candidate, and the columns that are in use with their coefficients.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,8 +69,6 @@ pub enum Refusal {
     SmallShare,
     /// Does not help in most folds, or changes sign between them.
     Unstable,
-    /// Placebos do as well.
-    Placebo,
     /// The others of the set say the same.
     NotNew,
     /// Agrees with the gap from sample to sample alone, as the noise of the recorded motion does.
@@ -140,7 +135,7 @@ impl<'a> Judge<'a> {
         set.iter().map(|member| self.effect(member).name()).collect()
     }
 
-    /// The best form of an effect beside a set, by every gate but the placebos.
+    /// The best form of an effect beside a set, by every gate but that of shared noise.
     pub fn judge(&self, set: &[Member], effect: Effect) -> Option<Judged> {
         let ranked = self.ranked(set, effect)?;
         let before = self.design.solve(&self.columns(set))?.1;
@@ -370,50 +365,6 @@ impl<'a> Judge<'a> {
         2 * telling.iter().filter(|&&block| change[block] < 0.0).count() > telling.len()
     }
 
-    /// Gain of a member, and that of the best of copies of itself that are shifted in time around each trial, which have its
-    /// spectrum but not its phase (surrogate data; Theiler and others, Physica D 1992).
-    pub fn placebo_gains(&self, set: &[Member], member: &Member) -> Option<(f64, f64)> {
-        let design = self.design;
-        let others: Vec<Member> = set.iter().filter(|other| *other != member).cloned().collect();
-        let base = self.columns(&others);
-        let (beta, before) = design.solve(&base)?;
-        let residual = design.residual(&base, &beta);
-        let own: Vec<usize> = member.columns.iter().map(|(column, _)| *column).collect();
-        let all: Vec<usize> = base.iter().chain(&own).copied().collect();
-        let (fitted, after) = design.solve(&all)?;
-        let sum = total(design, &own, &fitted.as_slice()[base.len()..]);
-        let mut random = Random::new(self.config.seed ^ 0x9e37);
-        let mut strongest: f64 = 0.0;
-        for _ in 0..self.config.placebos {
-            let order = self.shifted(&mut random);
-            let of = |column: &DVector<f64>| DVector::from_fn(order.len(), |row, _| column[order[row]]);
-            let shifted = of(&sum);
-            let alike = shifted.dot(&sum) / (shifted.norm() * sum.norm()).max(1e-12) > SAME_DIRECTION;
-            if !alike {
-                let columns: Vec<DVector<f64>> =
-                    own.iter().map(|&c| of(&design.x.column(c).into_owned())).collect();
-                strongest = strongest.max(design.gain(&columns, &base, &residual));
-            }
-        }
-        let real = before - after;
-        Some((real, strongest))
-    }
-
-    /// For every row the row of the same component whose time is shifted within its trial.
-    fn shifted(&self, random: &mut Random) -> Vec<usize> {
-        let rows = &self.design.rows;
-        let mut order = Vec::with_capacity(rows.rows.len());
-        for trial in &rows.of_trial {
-            let bins = trial.len() / rows.width;
-            let shift = ((0.25 + 0.5 * random.unit()) * bins as f64) as usize;
-            for bin in 0..bins {
-                let from = trial.start + (bin + shift) % bins * rows.width;
-                order.extend(from..from + rows.width);
-            }
-        }
-        order
-    }
-
     pub fn taken(&self, set: &[Member], effect: Effect) -> bool {
         set.iter().any(|member| self.effect(member) == effect)
     }
@@ -436,20 +387,12 @@ impl<'a> Judge<'a> {
     /// The best form of an effect beside a set, by every gate.
     pub fn weighed(&self, set: &[Member], effect: Effect) -> Option<Judged> {
         let judged = self.judge(set, effect)?;
-        self.beyond_chance(set, judged)
+        self.beyond_noise(set, judged)
     }
 
-    /// The gates that look at a form once it has passed the others: its placebos, and the noise that it shares with the gap.
-    pub fn beyond_chance(&self, set: &[Member], mut judged: Judged) -> Option<Judged> {
-        if judged.refused.is_some() {
-            return Some(judged);
-        }
-        let mut whole = set.to_vec();
-        whole.push(judged.member.clone());
-        let (real, placebo) = self.placebo_gains(&whole, &judged.member)?;
-        if real <= 1.05 * placebo {
-            judged.refused = Some(Refusal::Placebo);
-        } else if !self.outlasts_noise(set, &judged.member)? {
+    /// The gate that looks at a form once it has passed the others: the noise that it shares with the gap.
+    pub fn beyond_noise(&self, set: &[Member], mut judged: Judged) -> Option<Judged> {
+        if judged.refused.is_none() && !self.outlasts_noise(set, &judged.member)? {
             judged.refused = Some(Refusal::SharedNoise);
         }
         Some(judged)

@@ -153,19 +153,9 @@ fn effects(report: &Report) -> String {
     }
     let rows = report.effects.iter().flat_map(parameters);
     let published = prose("published");
-    let heads = [
-        "effect",
-        "fault of",
-        "parameter",
-        "value",
-        "90 % interval",
-        &published,
-        "share of gap",
-        "best surrogate",
-    ];
+    let heads = ["effect", "fault of", "parameter", "value", "90 % interval", &published, "share of gap"];
     let mut text = format!(
-        "<h2>Named effects</h2>{}<p class=\"small\">Share of gap: increase of the gap if this effect alone is removed. Best \
-         surrogate: the largest share that phase-shifted copies of the effect explain, over the share of the effect itself. \
+        "<h2>Named effects</h2>{}<p class=\"small\">Share of gap: increase of the gap if this effect alone is removed. \
          Provisional: observed in one condition only. Published: range of the literature in gray, the estimate with its \
          interval over it.</p>\n",
         table(&heads, NO_PAPER, rows)
@@ -189,7 +179,6 @@ fn parameters(effect: &NamedEffect) -> impl Iterator<Item = Vec<String>> + '_ {
         Kind::Drive => "drive",
     };
     let name = format!("{}{}", plain(effect.name), if effect.provisional { " (provisional)" } else { "" });
-    let [gain, placebo] = effect.placebo;
     effect.parameters.iter().map(move |(parameter, p)| {
         let band = p.literature.map(|band| against(band, p.value, p.interval));
         vec![
@@ -200,7 +189,6 @@ fn parameters(effect: &NamedEffect) -> impl Iterator<Item = Vec<String>> + '_ {
             interval(p.interval, number),
             format!("<div class=\"text\">{}</div>", band.unwrap_or_else(|| "no band".into())),
             percent(effect.share_of_gap),
-            percent(placebo / gain.max(f64::MIN_POSITIVE)),
         ]
     })
 }
@@ -399,7 +387,6 @@ pub(super) fn refusal(why: Refusal) -> &'static str {
         Refusal::Unstable => "absent in most folds, or its sign changes",
         Refusal::NotNew => "collinear with the named effects",
         Refusal::SharedNoise => "correlates only from sample to sample, as noise of the motion does",
-        Refusal::Placebo => "no better than its surrogates",
         Refusal::Incomplete => "passes, but all passing effects together explain too little",
     }
 }

@@ -40,8 +40,6 @@ pub struct NamedEffect {
     pub share_of_gap: f64,
     /// Seen in one condition only.
     pub provisional: bool,
-    /// Gain of the loss, and that of the best phase-shifted placebo.
-    pub placebo: [f64; 2],
     /// Surfaces that carry it, with their shares of its load.
     pub surfaces: BTreeMap<String, f64>,
     /// Covariance of the coefficients in the order of `coefficients`.

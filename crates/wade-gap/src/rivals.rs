@@ -59,7 +59,7 @@ impl Judge<'_> {
                 return None;
             }
             let judged = self.judge_form(set, &base, before, candidate)?;
-            self.beyond_chance(set, judged).filter(|judged| judged.refused.is_none())
+            self.beyond_noise(set, judged).filter(|judged| judged.refused.is_none())
         };
         let plain = if effect == Effect::SensorGain { plain() } else { None };
         best.into_iter().chain(plain).collect()

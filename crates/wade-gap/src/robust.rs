@@ -103,7 +103,7 @@ pub(super) fn shadow(design: &Design, base: &[usize], own: &[usize], beta: &[f64
 }
 
 /// A sum of columns.
-pub(super) fn total(design: &Design, own: &[usize], beta: &[f64]) -> DVector<f64> {
+fn total(design: &Design, own: &[usize], beta: &[f64]) -> DVector<f64> {
     let mut sum = DVector::zeros(design.y.len());
     own.iter().zip(beta).for_each(|(&column, &beta)| sum.axpy(beta, &design.x.column(column), 1.0));
     sum

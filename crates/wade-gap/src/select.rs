@@ -27,7 +27,7 @@ impl Judge<'_> {
     fn passes_still(&self, others: &[Member], candidate: usize) -> Option<Member> {
         let base = self.columns(others);
         let before = self.design.solve(&base)?.1;
-        let judged = self.beyond_chance(others, self.judge_form(others, &base, before, candidate)?)?;
+        let judged = self.beyond_noise(others, self.judge_form(others, &base, before, candidate)?)?;
         judged.refused.is_none().then_some(judged.member)
     }
 

@@ -698,7 +698,7 @@ fn trials_are_in_the_order_of_their_numbers_or_of_one_clock() {
 }
 
 #[test]
-fn a_placebo_of_several_columns_counts_though_one_of_them_hardly_changes() {
+fn a_gain_of_several_channels_is_named_though_one_of_them_hardly_changes() {
     // at one depth a trial the vertical force stays, and its gain is a constant
     let (trials, _) = pushed(|motion| {
         motion
@@ -716,8 +716,6 @@ fn a_placebo_of_several_columns_counts_though_one_of_them_hardly_changes() {
         "{:?}",
         gain.parameters
     );
-    let [real, placebo] = gain.placebo;
-    assert!(placebo > 0.0 && placebo < real, "{:?}", gain.placebo);
 }
 
 /// Why an effect was not named.
@@ -784,12 +782,6 @@ fn a_force_that_a_shifted_drag_explains_as_well_is_not_called_drag() {
         vec![[mean, 0.0, 0.0, 0.0, 0.0, 0.0]; motion.len()]
     });
     assert_eq!(report.verdict, Verdict::NoCandidateFits, "{} {:?}", report.summary, report.rejected);
-    assert_eq!(
-        why(&report, "drag_coefficient_error"),
-        Some(wade_gap::Refusal::Placebo),
-        "{:?}",
-        report.rejected
-    );
 }
 
 #[test]
