@@ -275,7 +275,9 @@ fn chain(shape: &Shape, series: &Series, rank: usize, setting: &Setting, columns
             Shape::RollingResistance(_) => {
                 let load = (setting.mass * GRAVITY * up.z - p[2]).max(0.0);
                 let dry = setting.mass * series.dry_rolling[sample];
-                columns[0][sample][0] = dry - load * rolling_direction(state.ground_velocity.x);
+                let force = dry - load * rolling_direction(state.ground_velocity.x);
+                columns[0][sample][0] = force;
+                columns[1][sample][4] = -force;
             }
             Shape::MassError(_) => {
                 // a wrench that comes inferred was so with an acceleration that nobody knows: with what is expected of it

@@ -7,7 +7,9 @@ use super::spec::{Coefficient, EffectSpec, Kind, Quantity, Rate};
 /// What these faults have in common.
 const DRIVE: EffectSpec = EffectSpec { kind: Kind::Drive, ..EffectSpec::COMMON };
 
-/// Rolling resistance that was not subtracted.
+/// Rolling resistance that was not subtracted, `F_x = -c N sgn(v_x)` with the load `N` on the wheels. It acts at the ground, below the
+/// center of mass, and the load on a rolling wheel stands before its axle: `M_y = m N sgn(v_x)`, with `m / c` between the height of the
+/// center of mass less the wheels' radius and that height.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RollingResistance;
 
@@ -15,8 +17,12 @@ impl Law for RollingResistance {
     const SPEC: EffectSpec = EffectSpec {
         name: "rolling_resistance",
         summary: "not subtracted from an inferred wrench",
-        coefficients: &[Coefficient::published("coefficient", 0.0, 0.5, [0.01, 0.15])],
+        coefficients: &[
+            Coefficient::published("coefficient", 0.0, 0.5, [0.01, 0.15]),
+            Coefficient::new("pitch", "m", -0.5, 0.5),
+        ],
         inputs: &[Quantity::InferredWrench, Quantity::GroundVelocity],
+        needs_its_first: true,
         experiment: "tow the vehicle over the same dry ground at two speeds",
         ..DRIVE
     };
