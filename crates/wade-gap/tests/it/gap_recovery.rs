@@ -283,6 +283,27 @@ fn errors_of_mass_and_drive_and_rolling_are_found_in_wrenches_less_those_of_dry_
 }
 
 #[test]
+fn the_pitch_moment_of_rolling_at_the_ground_is_no_zero_of_the_sensor() {
+    const ROLLING: f64 = 0.05;
+    const LEVER_M: f64 = 0.3;
+    let motions = pushes(TRIALS, SAMPLES, 34);
+    let load = |s: &State| {
+        let on_wheels = (planted::MASS * 9.81 - planted::simulate(s)[2]).max(0.0);
+        let back = ROLLING * on_wheels * s.v.x / s.v.x.hypot(0.05);
+        [-back, 0.0, 0.0, 0.0, LEVER_M * back, 0.0]
+    };
+    let loads: Vec<Vec<[f64; 6]>> = motions.iter().map(|motion| motion.iter().map(load).collect()).collect();
+    let mut trials = trials(&motions, &loads, &Noise::white(NOISE), 34);
+    trials.manifest.measured.method = Some(Method::InverseDynamics);
+    let library = vec![Effect::RollingResistance, Effect::SensorBias];
+    let report = run_with(&trials, &Config { library, ..Config::default() });
+    assert_eq!(names(&report), ["rolling_resistance"], "{} {:?}", report.summary, report.rejected);
+    let found = |name| report.effects[0].parameters[name].value;
+    assert!((found("coefficient") / ROLLING - 1.0).abs() < 0.06, "{}", found("coefficient"));
+    assert!((found("pitch") / (ROLLING * LEVER_M) - 1.0).abs() < 0.06, "{}", found("pitch"));
+}
+
+#[test]
 fn a_report_says_what_an_inferred_wrench_rests_on_where_the_trials_leave_it_open() {
     let remarks = |change: &dyn Fn(&mut Trials)| {
         let mut trials = with_dry_twins(1.0, 1.0, 0.0);
@@ -782,6 +803,7 @@ fn a_force_that_a_shifted_drag_explains_as_well_is_not_called_drag() {
         vec![[mean, 0.0, 0.0, 0.0, 0.0, 0.0]; motion.len()]
     });
     assert_eq!(report.verdict, Verdict::NoCandidateFits, "{} {:?}", report.summary, report.rejected);
+    assert!(why(&report, "drag_coefficient_error").is_some(), "{:?}", report.rejected);
 }
 
 #[test]
