@@ -12,7 +12,9 @@ use super::effects_file::remarks;
 use super::experiment::{next_step, separating};
 use super::explanations::{Weighed, stated, suspected};
 use super::fit::{Fit, Parameter, fit};
-use super::holdout::{Closure, Explained, closures, explained_of_rows, explained_where_acting, worse};
+use super::holdout::{
+    Closure, Explained, closures, explained_of_rows, explained_of_trials, explained_where_acting, worse,
+};
 use super::judge::{Judge, Member, Refusal};
 use super::locate::{self, OPEN};
 use super::noise::{Floor, floors_of};
@@ -72,13 +74,14 @@ impl HeldOut {
         let fitted = if members.is_empty() { None } else { fit(design, members, all, setting, config) };
         let named = fitted.as_ref().map_or_else(Vec::new, |fitted| named(design, members, fitted));
         let floors = floors_of(all, held, judge.floors, &setting.components);
-        let closures = closures(&named, all, held, setting, &floors, config);
+        let added = explained_of_trials(&named, all, held, setting);
+        let closures = closures(&added, all, held, setting, &floors, config);
         let small = closures.get("all").and_then(|closure| {
-            let explained = explained_of_rows(&named, all, held, judge).unwrap_or(closure.explained());
+            let explained = explained_of_rows(&added, all, held, judge).unwrap_or(closure.explained());
             closure.disproof(explained, config.coverage, judge.has_fault(members))
         });
         let slight = || {
-            let share = explained_where_acting(&named, all, held, (setting, judge.floors), config)?;
+            let share = explained_where_acting(&added, all, held, (setting, judge.floors), config)?;
             (share < HALF_AS_LARGE).then_some(Disproof::WhereItActs(share))
         };
         let disproof = small.or_else(|| disproved(&closures, judge.floors));

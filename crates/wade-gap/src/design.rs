@@ -423,7 +423,7 @@ impl Design {
     }
 
     /// Gain of columns that are no part of the design beside a base of which `residual` is what it leaves.
-    pub fn gain(&self, columns: &[DVector<f64>], base: &[usize], residual: &DVector<f64>) -> f64 {
+    fn gain(&self, columns: &[DVector<f64>], base: &[usize], residual: &DVector<f64>) -> f64 {
         let inverse = self.inverse(base).filter(|_| !base.is_empty());
         let clean: Vec<DVector<f64>> = columns
             .iter()

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::candidates::{Column, Setting, columns};
 use super::design::{Rows, to_rows};
 use super::features::{Features, of_bins};
-use super::judge::{Judge, telling};
+use super::judge::{Judge, informative};
 use super::locate::{Limits, OPEN, Region, inside};
 use super::model_error::ModelError;
 use super::noise::{Floor, sample_noise};
@@ -105,6 +105,16 @@ pub(super) fn explained(named: &[Named], series: &Series, rank: usize, setting: 
     sum
 }
 
+/// The same of each of several trials, in their order.
+pub(super) fn explained_of_trials(
+    named: &[Named],
+    all: &[Series],
+    trials: &[usize],
+    setting: &Setting,
+) -> Vec<Column> {
+    trials.iter().map(|&trial| explained(named, &all[trial], trial, setting)).collect()
+}
+
 /// Squares before and after of one trial, by component, and its samples.
 #[derive(Clone)]
 struct Sums {
@@ -115,7 +125,7 @@ struct Sums {
 
 /// The closure of each component, and of all together, each in its noise and what the model states of itself.
 pub(super) fn closures(
-    named: &[Named],
+    added: &[Column],
     all: &[Series],
     held: &[usize],
     setting: &Setting,
@@ -124,11 +134,11 @@ pub(super) fn closures(
 ) -> BTreeMap<&'static str, Closure> {
     let sums: Vec<Sums> = held
         .iter()
-        .map(|&trial| {
+        .zip(added)
+        .map(|(&trial, added)| {
             let series = &all[trial];
-            let added = explained(named, series, trial, setting);
             let mut sums = Sums { before: [0.0; 6], after: [0.0; 6], count: series.t.len() as f64 };
-            for (gap, added) in series.gap.iter().zip(&added) {
+            for (gap, added) in series.gap.iter().zip(added) {
                 for &c in &setting.components {
                     sums.before[c] += gap[c].powi(2);
                     sums.after[c] += (gap[c] - added[c]).powi(2);
@@ -177,16 +187,16 @@ pub(super) fn closures(
 /// What is explained as naming saw it, where the model states how far it may be off: in rows without the share that its error has in
 /// them. What was named is held to nothing that its naming did not look at.
 pub(super) fn explained_of_rows(
-    named: &[Named],
+    added: &[Column],
     all: &[Series],
     held: &[usize],
     judge: &Judge,
 ) -> Option<Explained> {
-    let (noise, setting, config) = (&judge.design.noise, judge.setting, judge.config);
+    let (noise, config) = (&judge.design.noise, judge.config);
     if !noise.model {
         return None;
     }
-    let components = &setting.components;
+    let components = &judge.setting.components;
     let rows = Rows::new(all, held, components, config.block_s);
     let error = ModelError::new(all, held, components, noise);
     let squares = |value: &dyn Fn(usize) -> Column| -> Vec<f64> {
@@ -194,9 +204,9 @@ pub(super) fn explained_of_rows(
         rows.of_trial.iter().map(|of| of_all[of.clone()].iter().map(|row| row * row).sum()).collect()
     };
     let left = |trial: usize| {
-        let added = explained(named, &all[trial], trial, setting);
+        let added = held.iter().zip(added).filter(|(of, _)| **of == trial).flat_map(|(_, added)| added);
         let less = |(gap, added): (&[f64; 6], &[f64; 6])| std::array::from_fn(|c| gap[c] - added[c]);
-        all[trial].gap.iter().zip(&added).map(less).collect()
+        all[trial].gap.iter().zip(added).map(less).collect()
     };
     let (before, after) = (squares(&|trial| all[trial].gap.clone()), squares(&left));
     let means = |trials: &[usize]| {
@@ -223,23 +233,22 @@ pub(super) fn explained_of_rows(
 /// trials that hold nine tenths of what they add, each in noise and what the model states of itself. None where they add less there than
 /// matters beside the noise of a sample: trials without them say nothing of them.
 pub(super) fn explained_where_acting(
-    named: &[Named],
+    added: &[Column],
     all: &[Series],
     held: &[usize],
     (setting, floors): (&Setting, &[Floor; 6]),
     config: &Config,
 ) -> Option<f64> {
     let (mut energy, mut squares) = (Vec::new(), Vec::new());
-    for &trial in held {
+    for (&trial, added) in held.iter().zip(added) {
         let series = &all[trial];
-        let added = explained(named, series, trial, setting);
         // of a trial that is clearly louder than the others, its own
         let mut noise = floors.map(|floor| floor.total());
         for &c in &setting.components {
             let own = sample_noise(series, c);
             noise[c] = if own > LOUDER * noise[c] { own } else { noise[c] };
         }
-        for (gap, added) in series.gap.iter().zip(&added) {
+        for (gap, added) in series.gap.iter().zip(added) {
             for &c in &setting.components {
                 let weight = noise[c].hypot(floors[c].model).max(1e-12).powi(-2);
                 energy.push(added[c].powi(2) * weight);
@@ -252,7 +261,7 @@ pub(super) fn explained_where_acting(
 
 /// The same of squares of what is added to each value, and of its gap before and after and of its noise.
 fn share_where_acting(added: &[f64], squares: &[[f64; 3]], relevance: f64) -> Option<f64> {
-    let acting = telling(added);
+    let acting = informative(added);
     let sum = |of: usize| acting.iter().map(|&value| squares[value][of]).sum::<f64>();
     let [before, after, noise] = [0, 1, 2].map(sum);
     let adds = acting.iter().map(|&value| added[value]).sum::<f64>();

@@ -33,7 +33,7 @@ const MOST_FOLDS: f64 = 0.75;
 const MOST_SCATTER: f64 = 0.75;
 /// What holds this share of an effect's energy tells of it: where there is nearly none, the noise of the recorded motion is in
 /// the effect and, with the other sign, in the gap.
-const TELLING: f64 = 0.9;
+const INFORMATIVE: f64 = 0.9;
 
 /// An effect of a set: its candidate, and the columns that are in use with their coefficients.
 #[derive(Debug, Clone, PartialEq)]
@@ -361,8 +361,8 @@ impl<'a> Judge<'a> {
             energy[place.block] += own * own;
             change[place.block] += (design.y[row] - b).powi(2) - (design.y[row] - a).powi(2);
         }
-        let telling = telling(&energy);
-        2 * telling.iter().filter(|&&block| change[block] < 0.0).count() > telling.len()
+        let informative = informative(&energy);
+        2 * informative.iter().filter(|&&block| change[block] < 0.0).count() > informative.len()
     }
 
     pub fn taken(&self, set: &[Member], effect: Effect) -> bool {
@@ -470,11 +470,11 @@ pub(super) fn lives_on_a_rate(effect: Effect) -> bool {
         || matches!(effect, DriveDelay | SensorDelay)
 }
 
-/// The fewest that together hold [`TELLING`] of the energy.
-pub(super) fn telling(energy: &[f64]) -> Vec<usize> {
+/// The fewest that together hold [`INFORMATIVE`] of the energy.
+pub(super) fn informative(energy: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..energy.len()).collect();
     order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]).then(a.cmp(&b)));
-    let (most, mut held) = (TELLING * energy.iter().sum::<f64>(), 0.0);
+    let (most, mut held) = (INFORMATIVE * energy.iter().sum::<f64>(), 0.0);
     order.retain(|&index| {
         let needed = held <= most;
         held += energy[index];
@@ -501,7 +501,7 @@ fn scatter(design: &Design, columns: &[usize], beta: &DVector<f64>, index: usize
     };
     let energy = |rows: &Range<usize>| x.as_slice()[rows.clone()].iter().map(|x| x * x).sum::<f64>();
     let energies: Vec<f64> = design.rows.of_trial.iter().map(energy).collect();
-    let trials: Vec<(f64, f64)> = telling(&energies).into_iter().filter_map(of_trial).collect();
+    let trials: Vec<(f64, f64)> = informative(&energies).into_iter().filter_map(of_trial).collect();
     let (sum, squares) =
         trials.iter().fold((0.0, 0.0), |(s, q), (weight, _)| (s + weight, q + weight * weight));
     let freedom = trials.len().max(2) as f64 - 1.0;

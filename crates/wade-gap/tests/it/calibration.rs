@@ -2,18 +2,16 @@
 //! from what the workflow believes before it sees any (simulation-based calibration; Talts, Betancourt, Simpson, Vehtari and Gelman,
 //! "Validating Bayesian Inference Algorithms with Simulation-Based Calibration", 2018).
 
-use crate::planted::{
-    DRAFT, LENGTH, MASS, Noise, RATE, RHO, State, VOLUME, WIDTH, gaussian, motions, simulate, trials,
-};
+use crate::planted::{Noise, RATE, RHO, State, gaussian, motions, simulate, trials};
 use wade_core::condition::Condition;
-use wade_core::effects::{Block, Body, Effect, Immersion, Input, Memory};
+use wade_core::effects::{Body, Effect, Immersion, Input, Memory};
 use wade_core::frame::Vec3;
 use wade_core::wrench::Wrench;
 use wade_gap::{Config, NOTHING, Predicted, Report, Verdict};
 use wade_learn::random::Random;
 
 const DRAWS: u64 = 500;
-/// Of each component; as it is in a bin of a tenth of a second.
+/// Standard deviation of a sample of each component [N, N m].
 const NOISE: [f64; 6] = [8.0, 8.0, 12.0, 4.0, 4.0, 4.0];
 /// Components that are measured.
 const MEASURED: [usize; 4] = [0, 2, 4, 5];
@@ -82,7 +80,7 @@ fn square(load: &[f64; 6]) -> f64 {
     MEASURED.iter().map(of).sum::<f64>() / MEASURED.len() as f64
 }
 
-/// The load with its law's own error, and the factor that stands in front of it.
+/// The load with its law's own error.
 fn bent(load: &Load, motions: &[Vec<State>], random: &mut Random) -> Load {
     let states = || motions.iter().flatten().zip(load.iter().flatten());
     let whole = states().map(|(_, load)| square(load)).sum::<f64>();
@@ -109,18 +107,9 @@ fn bent(load: &Load, motions: &[Vec<State>], random: &mut Random) -> Load {
 fn draw(seed: u64) -> Draw {
     let mut random = Random::new(0x5bc_0000 + seed);
     let motions = motions(10, 400, 7000 + seed);
-    let body = Body::of_block(
-        "box",
-        Block {
-            length: LENGTH,
-            width: WIDTH,
-            draft: DRAFT,
-            mass: MASS,
-            displaced_volume: VOLUME,
-            center_of_mass: [0.0; 3],
-            wheel_radius: None,
-        },
-    );
+    // the motion is known: its noise is not what is looked at here
+    let noise = Noise { velocity: 1e-4, depth: 1e-6, acceleration: 1e-3, ..Noise::white(NOISE) };
+    let body = wade_gap::body_of(&trials(&[], &[], &noise, seed)).unwrap();
     let mut sum: Load = motions.iter().map(|motion| vec![[0.0; 6]; motion.len()]).collect();
     let mut left = LIBRARY.to_vec();
     let mut hidden = Vec::new();
@@ -137,12 +126,9 @@ fn draw(seed: u64) -> Draw {
         }
         hidden.push((effect.name(), value));
     }
-    // the motion is known: its noise is not what is looked at here
-    let noise = Noise { velocity: 1e-4, depth: 1e-6, acceleration: 1e-3, ..Noise::white(NOISE) };
     let trials = trials(&motions, &sum, &noise, seed);
     let config =
         Config { library: LIBRARY.map(|(effect, ..)| effect).to_vec(), bootstrap: 100, ..Config::default() };
-    let body = wade_gap::body_of(&trials).unwrap();
     let report = wade_gap::run(&trials, &body, &mut |_| Predicted::default(), &config).unwrap();
     Draw { hidden, report }
 }
