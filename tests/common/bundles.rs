@@ -10,8 +10,8 @@ use tempfile::TempDir;
 use wade_core::bundle;
 use wade_core::condition::{Condition, GroundContact};
 use wade_core::effects::{
-    ActiveEffect, Between, Circumstances, Effect, EffectsFile, Evidence, Kind, ParameterValue, Shape,
-    Validity,
+    ActiveEffect, Between, Circumstances, Effect, EffectRegion, EffectsFile, Evidence, Kind, ParameterValue,
+    Shape, Validity,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_roll_pitch};
@@ -103,6 +103,7 @@ pub fn effect(name: Effect, value: f64) -> ActiveEffect {
         shape: Shape::from_numbers(name, numbers).expect("numbers that mean something"),
         base_drag: [1.1, 1.3, 0.9],
         channel_width: (name == Effect::ChannelBlockage).then_some(4.0),
+        region: EffectRegion::default(),
         coefficients: coefficients.iter().map(|c| c.name.to_owned()).collect(),
         covariance: (0..count)
             .map(|i| (0..count).map(|j| if i == j { 1e-4 } else { 0.0 }).collect())

@@ -323,6 +323,7 @@ pub fn rows(judged: &[Judged]) -> Vec<Row> {
         (0..all).map(move |index| index < said)
     });
     rows.push(share("not excited: said so", Reach::AtLeast(0.95), unexcited));
+    rows.push(share("region: right name", Reach::AtLeast(0.8), of(Family::Gated).map(Judged::is_right)));
     let overlaps: Vec<f64> = of(Family::Gated).map(|case| case.overlap.unwrap_or(0.0)).collect();
     rows.push(bootstrap(
         "region: overlap with the planted one, mean",

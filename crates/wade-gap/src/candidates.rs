@@ -21,7 +21,9 @@ use wade_core::effects::squat::Squat;
 use wade_core::effects::water_entry_slamming::WaterEntrySlamming;
 use wade_core::effects::wave_memory::{Kernel, WaveMemory};
 use wade_core::effects::wheel_paddle_thrust::{Rim, WheelPaddleThrust};
-use wade_core::effects::{Body, DragSpeed, Effect, Kind, MAX_COEFFICIENTS, Memory, Quantity, Shape};
+use wade_core::effects::{
+    Body, DragSpeed, Effect, EffectRegion, Kind, MAX_COEFFICIENTS, Memory, Quantity, Shape,
+};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_learn::trials::Manifest;
 
@@ -209,6 +211,24 @@ pub(super) fn columns(shape: &Shape, series: &Series, rank: usize, setting: &Set
     match effect.kind() {
         Kind::Physics => physics(shape, series, setting, &mut columns),
         _ => chain(shape, series, rank, setting, &mut columns),
+    }
+    columns
+}
+
+/// [`columns`] of an effect that acts in a region.
+pub(super) fn columns_within(
+    (shape, region): (&Shape, &EffectRegion),
+    series: &Series,
+    rank: usize,
+    setting: &Setting,
+) -> Vec<Column> {
+    let mut columns = columns(shape, series, rank, setting);
+    if region.is_everywhere() {
+        return columns;
+    }
+    for (sample, condition) in series.conditions.iter().enumerate() {
+        let share = region.share(condition);
+        columns.iter_mut().for_each(|column| column[sample].iter_mut().for_each(|load| *load *= share));
     }
     columns
 }

@@ -8,7 +8,7 @@ use super::features::of_bins;
 use super::locate::{Limits, Region, inside};
 use super::noise::Floor;
 use super::series::Series;
-use wade_core::effects::{Effect, Kind, Memory, Part};
+use wade_core::effects::{Effect, EffectRegion, Kind, Memory, Part};
 
 /// Components of a load along the water's surface and across it: the force along x and y with the moment about z, the force along
 /// z with the moments about x and y.
@@ -38,9 +38,10 @@ pub(super) fn carriers(
                 if !inside(limits, &features[index]) {
                     continue;
                 }
+                let share = named.region.share(input.condition);
                 named.shape.basis(&memory, &input, |coefficient, part, load| {
-                    let value =
-                        named.coefficients.iter().find(|(c, _)| *c == coefficient).map_or(0.0, |(_, v)| *v);
+                    let own = named.coefficients.iter().find(|(c, _)| *c == coefficient);
+                    let value = own.map_or(0.0, |(_, value)| share * value);
                     let name = match part {
                         Part::Panel(panel) => setting.body.panels[panel].name.clone(),
                         Part::Hull => "hull".to_owned(),
@@ -103,5 +104,7 @@ pub(super) fn of_region(
         false => Effect::WaterLevelOffset,
     };
     let coefficients = (0..effect.coefficients().len()).map(|coefficient| (coefficient, 1.0)).collect();
-    carriers(&[Named { effect, shape: effect.plain(), coefficients }], all, setting, &region.limits)
+    let everywhere = EffectRegion::default();
+    let named = Named { effect, shape: effect.plain(), region: everywhere, coefficients };
+    carriers(&[named], all, setting, &region.limits)
 }

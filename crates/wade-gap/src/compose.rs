@@ -41,7 +41,8 @@ fn named(design: &Design, members: &[Member], fit: &Fit) -> Vec<Named> {
                 .iter()
                 .map(|&(_, coefficient)| (coefficient, values.next().copied().unwrap_or(0.0)))
                 .collect();
-            Named { effect: candidate.effect, shape: candidate.shape, coefficients }
+            let (effect, shape, region) = (candidate.effect, candidate.shape, candidate.region.clone());
+            Named { effect, shape, region, coefficients }
         })
         .collect()
 }
@@ -57,6 +58,8 @@ struct HeldOut {
     closures: BTreeMap<&'static str, Closure>,
     /// What says that it is not what is missing.
     disproof: Option<Disproof>,
+    /// True where they add enough to those trials to be judged by them.
+    acts: bool,
 }
 
 /// Share of the squared gap that a set of effects explains where that is too little, or less than nothing.
@@ -80,19 +83,24 @@ impl HeldOut {
             let explained = explained_of_rows(&added, all, held, judge).unwrap_or(closure.explained());
             closure.disproof(explained, config.coverage, judge.has_fault(members))
         });
-        let slight = || {
-            let share = explained_where_acting(&added, all, held, (setting, judge.floors), config)?;
-            (share < HALF_AS_LARGE).then_some(Disproof::WhereItActs(share))
-        };
+        let share = explained_where_acting(&added, all, held, (setting, judge.floors), config);
+        let slight = share.filter(|share| *share < HALF_AS_LARGE).map(Disproof::WhereItActs);
         let disproof = small.or_else(|| disproved(&closures, judge.floors));
-        let disproof = disproof.map(Disproof::Everywhere).or_else(slight);
-        Self { fitted, named, closures, disproof }
+        let disproof = disproof.map(Disproof::Everywhere).or(slight);
+        Self { fitted, named, closures, disproof, acts: share.is_some() }
     }
 }
 
 /// True for effects with which the gap of the held-out trials grows, or which leave too much of it.
 pub(super) fn is_disproved(judge: &Judge, members: &[Member], held: &[usize]) -> bool {
     HeldOut::of(judge, members, held).disproof.is_some()
+}
+
+/// True for effects that the held-out trials show: they act in them, and are not disproved. What was seen in a region is asked for
+/// this, since naming chose its borders.
+pub(super) fn is_shown(judge: &Judge, members: &[Member], held: &[usize]) -> bool {
+    let of = HeldOut::of(judge, members, held);
+    of.acts && of.disproof.is_none()
 }
 
 pub(super) fn compose(
@@ -111,7 +119,8 @@ pub(super) fn compose(
     // nothing that does not fit is applied or shown as if it did
     let fits = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
     let members = if fits { found.members.as_slice() } else { &[] };
-    let HeldOut { fitted, mut named, closures: mut held_out, disproof } = HeldOut::of(judge, members, &held);
+    let HeldOut { fitted, mut named, closures: mut held_out, disproof, .. } =
+        HeldOut::of(judge, members, &held);
     let is_fault = judge.has_fault(&found.members);
     // of several explanations one may hold, and the trials that tell them apart are asked for, unless the gap grows or is another's; a
     // fault is exact or is none
@@ -133,7 +142,7 @@ pub(super) fn compose(
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
     let (mut regions, regions_tried) = match found.verdict {
         Verdict::NothingMissing => (Vec::new(), 0),
-        _ => locate::locate(all, &design.trials, gap_excess, found.gated, config),
+        _ => locate::locate(all, &design.trials, gap_excess, found.gated.as_ref(), config),
     };
     for region in &mut regions {
         region.surfaces = of_region(region, &named, all, setting, judge.floors);
@@ -203,7 +212,7 @@ pub(super) fn compose(
         traces,
         trends,
     };
-    report.summary = summary(&report, found.gated);
+    report.summary = summary(&report, found.gated.as_ref());
     report
 }
 
@@ -329,6 +338,7 @@ fn named_effects(judge: &Judge, found: &Found, named: &[Named], fitted: &Fit) ->
             coefficients: one.coefficients.iter().map(|&(c, _)| specs[c].name).collect(),
             effect: one.effect,
             shape: one.shape,
+            region: one.region.clone(),
             base_drag: judge.setting.base_drag.of(&one.shape).into(),
         });
     }

@@ -10,19 +10,21 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::Config;
-use super::candidates::{Column, Setting, columns};
+use super::candidates::{Column, Setting, columns_within};
 use super::color::Color;
 use super::model_error::ModelError;
 use super::series::Series;
 use super::smoothing::Smoothing;
 use super::split::folds;
-use wade_core::effects::{Effect, Shape};
+use wade_core::effects::{Effect, EffectRegion, Shape};
 
-/// An effect of one shape with the columns of its coefficients.
+/// An effect of one shape, everywhere or in a region, with the columns of its coefficients.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
     pub effect: Effect,
     pub shape: Shape,
+    /// Where it acts.
+    pub region: EffectRegion,
     /// Column and coefficient.
     pub columns: Vec<(usize, usize)>,
 }
@@ -283,10 +285,18 @@ impl Design {
             total: Fold { xx: DMatrix::zeros(0, 0), xy: DVector::zeros(0), yy: 0.0 },
             rows,
         };
-        let mut values: Vec<f64> = Vec::new();
-        for &shape in library {
-            let columns = this.candidate_columns(all, setting, &shape);
-            let mut candidate = Candidate { effect: shape.effect(), shape, columns: Vec::new() };
+        let laws: Vec<_> = library.iter().map(|&shape| (shape, EffectRegion::default())).collect();
+        this.add(all, setting, &laws, config.folds);
+        this
+    }
+
+    /// Adds the columns of more candidates, each a law and where it acts.
+    pub fn add(&mut self, all: &[Series], setting: &Setting, laws: &[(Shape, EffectRegion)], folds: usize) {
+        let mut values = std::mem::replace(&mut self.x, DMatrix::zeros(0, 0)).data.into();
+        let columns_of = |this: &mut Self, values: &mut Vec<f64>, (shape, region): &(Shape, EffectRegion)| {
+            let columns = this.candidate_columns(all, setting, (shape, region));
+            let (effect, region) = (shape.effect(), region.clone());
+            let mut candidate = Candidate { effect, shape: *shape, region, columns: Vec::new() };
             for (coefficient, column, scale) in columns {
                 candidate.columns.push((this.scale.len(), coefficient));
                 this.scale.push(scale);
@@ -295,10 +305,21 @@ impl Design {
             if !candidate.columns.is_empty() {
                 this.candidates.push(candidate);
             }
-        }
-        this.x = DMatrix::from_vec(this.y.len(), this.scale.len(), values);
-        this.sum(config.folds);
-        this
+        };
+        laws.iter().for_each(|law| columns_of(self, &mut values, law));
+        self.x = DMatrix::from_vec(self.y.len(), self.scale.len(), values);
+        self.sum(folds);
+    }
+
+    /// Takes out the candidates past a number, which were added last.
+    pub fn keep(&mut self, candidates: usize) {
+        let added = self.candidates.split_off(candidates);
+        let first = added.iter().flat_map(|candidate| candidate.columns.first()).map(|(column, _)| *column);
+        let columns = first.min().unwrap_or(self.scale.len());
+        self.scale.truncate(columns);
+        let x = std::mem::replace(&mut self.x, DMatrix::zeros(0, 0));
+        self.x = x.columns(0, columns).into_owned();
+        self.sum(self.folds.len());
     }
 
     /// Place of a trial among those of the design.
@@ -312,13 +333,13 @@ impl Design {
         &self,
         all: &[Series],
         setting: &Setting,
-        shape: &Shape,
+        law: (&Shape, &EffectRegion),
         noise: &RowNoise,
     ) -> Vec<Vec<f64>> {
-        let count = shape.effect().coefficients().len();
+        let count = law.0.effect().coefficients().len();
         let mut rows = vec![Vec::with_capacity(self.rows.rows.len()); count];
         for &trial in &self.trials {
-            let columns = columns(shape, &all[trial], trial, setting);
+            let columns = columns_within(law, &all[trial], trial, setting);
             for (rows, column) in rows.iter_mut().zip(&columns) {
                 rows_of_trial(&all[trial], trial, &setting.components, noise, column, rows);
             }
@@ -336,10 +357,10 @@ impl Design {
         &self,
         all: &[Series],
         setting: &Setting,
-        shape: &Shape,
+        law: (&Shape, &EffectRegion),
     ) -> Vec<(usize, Vec<f64>, f64)> {
         let mut found = Vec::new();
-        let rows = self.rows_of_shape(all, setting, shape, &self.noise);
+        let rows = self.rows_of_shape(all, setting, law, &self.noise);
         for (coefficient, mut column) in rows.into_iter().enumerate() {
             let scale = (column.iter().map(|v| v * v).sum::<f64>() / column.len().max(1) as f64).sqrt();
             if scale > 1e-9 && scale.is_finite() {
@@ -380,7 +401,8 @@ impl Design {
             if own.is_empty() {
                 continue;
             }
-            let mut rows = self.rows_of_shape(all, setting, &candidate.shape, &self.unsmoothed_noise());
+            let law = (&candidate.shape, &candidate.region);
+            let mut rows = self.rows_of_shape(all, setting, law, &self.unsmoothed_noise());
             for (place, (column, coefficient)) in own {
                 let rows = DVector::from_vec(std::mem::take(&mut rows[coefficient]));
                 found[place] = rows / self.scale[column];
@@ -392,7 +414,7 @@ impl Design {
     /// Gives a candidate another shape.
     pub fn reshape(&mut self, all: &[Series], setting: &Setting, candidate: usize, shape: Shape) {
         self.candidates[candidate].shape = shape;
-        let found = self.candidate_columns(all, setting, &shape);
+        let found = self.candidate_columns(all, setting, (&shape, &self.candidates[candidate].region));
         let held = self.candidates[candidate].columns.clone();
         for (column, coefficient) in held {
             if let Some((_, values, scale)) = found.iter().find(|(c, ..)| *c == coefficient) {
@@ -408,11 +430,11 @@ impl Design {
         &self,
         all: &[Series],
         setting: &Setting,
-        shape: &Shape,
+        law: (&Shape, &EffectRegion),
         coefficients: &[usize],
         others: &[usize],
     ) -> f64 {
-        let found = self.candidate_columns(all, setting, shape);
+        let found = self.candidate_columns(all, setting, law);
         let own: Vec<DVector<f64>> = found
             .into_iter()
             .filter(|(coefficient, ..)| coefficients.contains(coefficient))
@@ -457,8 +479,8 @@ impl Design {
         columns: &[(usize, usize, f64)],
     ) -> DVector<f64> {
         const STEP: f64 = 0.02;
-        let shape = self.candidates[candidate].shape.scaled(axis, 1.0 + STEP);
-        let moved = self.candidate_columns(all, setting, &shape);
+        let Candidate { shape, region, .. } = &self.candidates[candidate];
+        let moved = self.candidate_columns(all, setting, (&shape.scaled(axis, 1.0 + STEP), region));
         let mut change = DVector::zeros(self.y.len());
         for &(column, coefficient, beta) in columns {
             if let Some((_, values, scale)) = moved.iter().find(|(c, ..)| *c == coefficient) {

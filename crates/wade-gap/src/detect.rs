@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use super::candidates::{Column, Setting, columns, unavailable};
-use super::design::Design;
+use super::design::{Candidate, Design};
 use super::model_error::ModelError;
 use super::noise::{Floor, left_out};
 use super::rates::mean_square;
@@ -145,8 +145,9 @@ fn of_effect(
     if found.not_testable.is_some() {
         return found;
     }
+    let is_whole = |candidate: &Candidate| candidate.effect == effect && candidate.region.is_everywhere();
     let forms: Vec<usize> =
-        (0..design.candidates.len()).filter(|&i| design.candidates[i].effect == effect).collect();
+        (0..design.candidates.len()).filter(|&i| is_whole(&design.candidates[i])).collect();
     let Some(&form) = forms.get(forms.len() / 2) else {
         found.not_testable = Some(effect.spec().not_excited.into());
         return found;

@@ -143,6 +143,7 @@ fn active(effect: &NamedEffect, trials: &Trials) -> ActiveEffect {
         provisional: effect.provisional,
         share_of_gap: effect.share_of_gap,
         shape: effect.shape,
+        region: effect.region.clone(),
         base_drag: effect.base_drag,
         channel_width: (trials.manifest.channel_width.filter(|width| width.is_finite()))
             .or_else(|| narrowest(&trials.manifest)),

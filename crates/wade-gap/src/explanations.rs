@@ -4,7 +4,7 @@
 //! Its weight is how well it predicts blocks of trials that its fit left out, averaged over a Bayesian bootstrap of the trials, so
 //! that what one trial alone decides is not certain (pseudo-BMA+; Yao, Vehtari, Simpson, Gelman, Bayesian Analysis 13, 2018).
 //! Rows that are correlated count for less (Bartlett, J. Roy. Stat. Soc. Suppl. 1946), and so does all that a law may be off by.
-//! Every number that was fitted is charged (Schwarz, Annals of Statistics 6, 1978). Before the trials, nothing, an unknown load,
+//! Every number that was fitted is charged, each border of a region as one (Schwarz, Annals of Statistics 6, 1978). Before the trials, nothing, an unknown load,
 //! and each number of effects are equally probable, and so are all sets of a size and all forms of a law. An effect that the
 //! prediction is known to leave out is as likely there as not.
 
@@ -12,6 +12,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::design::Design;
+use super::features::LIMITING;
 use super::fit::FORMULA;
 use super::judge::{Judge, Member, Refusal};
 use super::lasting::memory_of;
@@ -106,8 +108,9 @@ pub(super) fn weigh(judge: &Judge, found: &Found, library: &[Effect]) -> Vec<Wei
         let names = place.1.iter().map(|effect| effect.name()).collect();
         let weighed = Weighed {
             explanation: Explanation { effects: names, probability: 0.0 },
-            log_prior: log_prior(judge, &place.1, library),
-            numbers: judge.columns(&set).len(),
+            log_prior: log_prior(judge, &place.1, library)
+                - borders(judge, &set) as f64 * (2.0 * LIMITING.len() as f64).ln(),
+            numbers: judge.columns(&set).len() + borders(judge, &set),
             set,
             losses,
         };
@@ -156,6 +159,13 @@ pub(super) fn probability_of_all(effects: &[&'static str], weighed: &[Weighed]) 
     let explanations = weighed.iter().map(|weighed| &weighed.explanation);
     let hold_all = |e: &&Explanation| effects.iter().all(|effect| e.effects.contains(effect));
     explanations.filter(hold_all).map(|e| e.probability).sum()
+}
+
+/// Borders of the regions in which the effects of a set act.
+fn borders(judge: &Judge, set: &[Member]) -> usize {
+    let regions = set.iter().map(|member| &judge.design.candidates[member.candidate].region);
+    let limits = regions.flat_map(|region| &region.limits);
+    limits.flat_map(|limit| [limit.above, limit.at_most]).flatten().count()
 }
 
 /// Logarithm of the probability of a set before the trials, over that of nothing: all sets of a size are alike, but for effects
@@ -258,17 +268,22 @@ fn pairs(judge: &Judge, library: &[Effect]) -> Vec<Set> {
     pairs
 }
 
+/// Variance of a row of which rows with a memory leave a sum of squares: what is left is noise, never less than where the model is
+/// as wrong as it says, and rows that are correlated say the same several times; what a law leaves open of all that is explained is
+/// one number more, since it is off in the same way everywhere.
+pub(super) fn variance(design: &Design, left: f64, memory: f64) -> f64 {
+    let rows = design.y.len().max(1) as f64;
+    let noise = (left / rows).max(design.noise.stated()).max(f64::MIN_POSITIVE) * memory;
+    noise + FORMULA.powi(2) * (design.empty_loss() - left).max(0.0)
+}
+
 /// Weights of explanations over a Bayesian bootstrap of the trials (Rubin, Annals of Statistics 9, 1981).
 fn weights(all: &[Weighed], judge: &Judge, found: &Found) -> Vec<f64> {
     let design = judge.design;
     let rows = design.y.len().max(1) as f64;
     let least = all.iter().map(|weighed| weighed.losses.iter().sum::<f64>()).fold(f64::INFINITY, f64::min);
-    // what the best explanation leaves is noise, never less than where the model is as wrong as it says, and rows that are
-    // correlated say the same several times; what a law leaves open of all that is explained is one number more, since it is off in
-    // the same way everywhere
     let memory = memory_of(design, &found.residual);
-    let variance = (least / rows).max(design.noise.stated()).max(f64::MIN_POSITIVE) * memory;
-    let variance = variance + FORMULA.powi(2) * (design.empty_loss() - least).max(0.0);
+    let variance = variance(design, least, memory);
     // of a number, by Schwarz's criterion
     let price = 0.5 * (rows / memory).max(1.0).ln();
     let trials = design.trials.len();

@@ -8,6 +8,7 @@ use super::robust::strided;
 use super::series::Series;
 use super::smoothing::{running_mean, white_kept};
 use super::statistics::white_variance;
+use wade_core::effects::RegionQuantity;
 use wade_core::frame::GRAVITY;
 
 /// Names of the features of a place, with units; all the same for a mirrored vehicle.
@@ -26,6 +27,14 @@ pub(super) const FEATURES: [(&str, &str); 9] = [
 /// Places in [`FEATURES`].
 pub(super) const DEPTH: usize = 0;
 pub(super) const SPEED: usize = 2;
+
+/// The features that may limit an effect, with their places in [`FEATURES`].
+pub(super) const LIMITING: [(usize, RegionQuantity); 4] = [
+    (DEPTH, RegionQuantity::Depth),
+    (1, RegionQuantity::FroudeDepth),
+    (SPEED, RegionQuantity::Speed),
+    (7, RegionQuantity::Pitch),
+];
 
 /// The features of a place, in the order of [`FEATURES`].
 pub(super) type Features = [f64; FEATURES.len()];

@@ -1,4 +1,5 @@
-//! An effect that acts in a part of the state space alone: where what the whole space does not fit, a region does.
+//! An effect that acts in a part of the state space alone: where what the whole space does not fit, a region does. It is named there
+//! where it passes what every effect must, and the held-out trials show it.
 //!
 //! The columns of an effect are set to zero outside a region, and the region grows by one limit at a time, that which
 //! explains most, as long as a limit says much. A tree over the size of the gap, as in `locate`, cuts where the gap is
@@ -6,15 +7,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::candidates::Setting;
 use super::design::{Candidate, Design};
-use super::features::{Features, of_bins};
-use super::judge::{Judge, lives_on_a_rate};
+use super::explanations::variance;
+use super::features::{Features, LIMITING, of_bins};
+use super::judge::{Judge, Member, lives_on_a_rate};
+use super::lasting::memory_of;
 use super::locate::{Limits, OPEN, inside};
+use super::nonlinear::settle;
+use super::series::Series;
 use super::shared::outlasts_noise;
-use wade_core::effects::Effect;
+use super::statistics::{Z90, median};
+use wade_core::effects::{Effect, EffectRegion, Kind, RegionLimit, RegionQuantity, Shape};
 
-/// Features that may limit an effect of the water: depth, Froude number, speed.
-const FEATURES_USED: usize = 3;
 /// Cuts of a feature that are tried.
 const CUTS: usize = 24;
 /// Limits of a region.
@@ -28,10 +33,14 @@ const EXPLAINED: f64 = 0.6;
 const RIDGE: f64 = 1e-5;
 
 /// What a gap is like in a region.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Gated {
     pub effect: Effect,
+    pub shape: Shape,
+    /// Its borders where each is best.
     pub limits: Limits,
+    /// The same with the interval of each border; none where no state lies clearly within one of them.
+    pub region: Option<EffectRegion>,
     /// Share of the gap above the floor that it explains there.
     pub share: f64,
     /// Cuts that were tried, of all effects.
@@ -58,25 +67,18 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
             }
             found = next;
         }
-        Some(Gated { effect: candidate.effect, limits: found.0, share: found.1 / whole, tried })
+        let (effect, shape) = (candidate.effect, candidate.shape);
+        Some(Gated { effect, shape, limits: found.0, region: None, share: found.1 / whole, tried })
     };
     // where an effect is hardly excited, the noise of the recorded motion is in it and, with the other sign, in the gap
     let of_noise = |gated: &Gated, candidate: &Candidate| {
         if lives_on_a_rate(gated.effect) {
             return false;
         }
-        let (columns, bins) = (columns(candidate), sums(design, &columns(candidate)));
-        let inside: Vec<bool> = places.iter().map(|place| inside(&gated.limits, place)).collect();
-        let Some(sum) = total(bins.iter().zip(&inside).filter(|(_, inside)| **inside).map(|(bin, _)| bin))
-        else {
-            return true;
-        };
-        let beta = sum.solve(RIDGE * sum.xx.diagonal().max());
-        let load = |row: usize| {
-            let of = |(column, beta): (&usize, &f64)| design.x[(row, *column)] * beta;
-            if inside[row / design.rows.width] { columns.iter().zip(beta.iter()).map(of).sum() } else { 0.0 }
-        };
-        let load = DVector::from_fn(design.y.len(), |row, _| load(row));
+        let columns = columns(candidate);
+        let whole = total(sums(design, &columns).iter()).map_or(0.0, |sum| sum.xx.diagonal().max());
+        let (left, _) = left_within(design, &columns, &places, &gated.limits, RIDGE * whole);
+        let load = &design.y - left;
         !outlasts_noise(design, &load, &design.y)
     };
     // what remembers, or begins in the middle of the trials, has a border of its own
@@ -88,8 +90,159 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
     let mut found: Vec<(Gated, &Candidate)> = candidates.filter_map(|of| Some((one(of)?, of))).collect();
     let tried = found.iter().map(|(gated, _)| gated.tried).sum();
     found.sort_by(|(a, _), (b, _)| b.share.total_cmp(&a.share).then(a.effect.cmp(&b.effect)));
-    let (best, _) = found.into_iter().find(|(gated, candidate)| !of_noise(gated, candidate))?;
-    (best.limits != OPEN && best.share > EXPLAINED).then_some(Gated { tried, ..best })
+    found.retain(|(gated, candidate)| !of_noise(gated, candidate));
+    let most = found.first()?.0.share;
+    // a fault of a sensor or of the drive knows no region, and stands in for a load of the water that explains no less
+    let is_near = |gated: &Gated| has_borders(gated.effect) && gated.share > most - WORTH;
+    let first = found.iter().position(|(gated, _)| is_near(gated)).unwrap_or(0);
+    let (best, candidate) = found.swap_remove(first);
+    if best.limits == OPEN || best.share <= EXPLAINED {
+        return None;
+    }
+    let region = region(design, candidate, &places, &best);
+    Some(Gated { tried, region, ..best })
+}
+
+impl Gated {
+    /// Adds to the design what may act in the region, each effect of the library in its best form, and gives the one that was found to;
+    /// none where the region has no clear border.
+    pub fn add_to(
+        &self,
+        design: &mut Design,
+        all: &[Series],
+        setting: &Setting,
+        library: &[Effect],
+        folds: usize,
+    ) -> Option<Member> {
+        let region = self.region.as_ref()?;
+        let best = |effect: Effect| {
+            let forms = design.candidates.iter().filter(|candidate| candidate.effect == effect);
+            let loss =
+                |form: &&Candidate| design.solve(&columns(form)).map_or(f64::INFINITY, |(_, loss)| loss);
+            let first = forms.min_by(|a, b| loss(a).total_cmp(&loss(b)));
+            first.map(|candidate| if effect == self.effect { self.shape } else { candidate.shape })
+        };
+        let limited = library.iter().copied().filter(|effect| has_borders(*effect));
+        let laws: Vec<_> = limited.filter_map(best).map(|shape| (shape, region.clone())).collect();
+        let first = design.candidates.len();
+        design.add(all, setting, &laws, folds);
+        settle(design, all, setting, first);
+        let own = |&index: &usize| design.candidates[index].effect == self.effect;
+        let candidate = (first..design.candidates.len()).find(own)?;
+        Some(Member { candidate, columns: design.candidates[candidate].columns.clone() })
+    }
+}
+
+/// True for what may be named in a region: a load of the water, unless it remembers and so acts beyond any border.
+fn has_borders(effect: Effect) -> bool {
+    effect.kind() == Kind::Physics && !effect.spec().has_memory
+}
+
+/// The borders of a region as intervals: where the likelihood of the rows falls by as much as it does for a normal variable at the
+/// ends of 90 %, and no less than the quantity changes from bin to bin across it, which a mean over a bin cannot tell apart. None where
+/// no state lies on the inner side of the whole interval: what acts at the last value alone, such as at rest, is not seen to act beyond
+/// a border.
+fn region(
+    design: &Design,
+    candidate: &Candidate,
+    places: &[Features],
+    gated: &Gated,
+) -> Option<EffectRegion> {
+    let columns = columns(candidate);
+    let bins = sums(design, &columns);
+    let ridge = RIDGE * total(bins.iter()).map_or(0.0, |sum| sum.xx.diagonal().max());
+    let (residual, best) = left_within(design, &columns, places, &gated.limits, ridge);
+    let slack = Z90 * Z90 * variance(design, design.empty_loss() - best, memory_of(design, &residual));
+    let border = |feature: usize, end: usize| -> Option<[f64; 2]> {
+        let at = gated.limits[feature][end];
+        if !at.is_finite() {
+            return None;
+        }
+        let mut open = gated.limits;
+        open[feature][end] = OPEN[feature][end];
+        let cuts = gains(&bins, places, &open, feature, ridge);
+        let near = cuts.iter().filter(|cut| cut.gain[1 - end] >= best - slack);
+        let (low, high) =
+            near.fold((at, at), |(low, high), cut| (low.min(cut.between[0]), high.max(cut.between[1])));
+        let crossing = step_across(design, places, feature, at);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).max(crossing));
+        Some([middle - half, middle + half])
+    };
+    let limit = |&(feature, quantity): &(usize, RegionQuantity)| {
+        let (above, at_most) = (border(feature, 0), border(feature, 1));
+        (above.is_some() || at_most.is_some()).then_some(RegionLimit { quantity, above, at_most })
+    };
+    let within = places.iter().filter(|place| inside(&gated.limits, place));
+    let is_seen = |limit: &RegionLimit, feature: usize| {
+        let mut values = within.clone().map(|place| place[feature]);
+        let beyond = limit.above.is_none_or(|[_, high]| values.clone().any(|value| value > high));
+        let below = limit.at_most.is_none_or(|[low, _]| values.any(|value| value < low));
+        beyond && below
+    };
+    let limits: Vec<(usize, RegionLimit)> =
+        LIMITING.iter().filter_map(|own| Some((own.0, limit(own)?))).collect();
+    let all_seen = limits.iter().all(|(feature, limit)| is_seen(limit, *feature));
+    all_seen.then(|| EffectRegion { limits: limits.into_iter().map(|(_, limit)| limit).collect() })
+}
+
+/// What an effect within limits leaves, row by row, and what it takes off the sum of squares.
+fn left_within(
+    design: &Design,
+    columns: &[usize],
+    places: &[Features],
+    limits: &Limits,
+    ridge: f64,
+) -> (DVector<f64>, f64) {
+    let within: Vec<bool> = places.iter().map(|place| inside(limits, place)).collect();
+    let bins = sums(design, columns);
+    let Some(sum) = total(bins.iter().zip(&within).filter(|(_, within)| **within).map(|(bin, _)| bin)) else {
+        return (design.y.clone(), 0.0);
+    };
+    let beta = sum.solve(ridge);
+    let load = |row: usize| {
+        let of = |(column, beta): (&usize, &f64)| design.x[(row, *column)] * beta;
+        if within[row / design.rows.width] { columns.iter().zip(beta.iter()).map(of).sum() } else { 0.0 }
+    };
+    (DVector::from_fn(design.y.len(), |row, _| design.y[row] - load(row)), sum.gain(ridge))
+}
+
+/// The median change of a feature from a bin to the next one of its trial where it crosses a value; 0 where none does.
+fn step_across(design: &Design, places: &[Features], feature: usize, at: f64) -> f64 {
+    let rows: Vec<_> = design.rows.rows.iter().step_by(design.rows.width).collect();
+    let pairs = rows.windows(2).zip(places.windows(2));
+    let of_one = pairs.filter(|(rows, _)| rows[0].trial == rows[1].trial && rows[0].bin + 1 == rows[1].bin);
+    let ends = of_one.map(|(_, places)| [places[0][feature], places[1][feature]]);
+    let mut steps: Vec<f64> =
+        ends.filter(|[a, b]| (a - at) * (b - at) < 0.0).map(|[a, b]| (a - b).abs()).collect();
+    if steps.is_empty() { 0.0 } else { median(&mut steps) }
+}
+
+/// A cut between two values of a feature that differ, and what an effect explains below it and above it.
+struct Cut {
+    between: [f64; 2],
+    gain: [f64; 2],
+}
+
+/// Every cut of a feature that is tried within limits.
+fn gains(bins: &[Sum], places: &[Features], limits: &Limits, feature: usize, ridge: f64) -> Vec<Cut> {
+    let mut order: Vec<usize> = (0..bins.len()).filter(|&bin| inside(limits, &places[bin])).collect();
+    order.sort_by(|&a, &b| places[a][feature].total_cmp(&places[b][feature]));
+    let Some(whole) = total(order.iter().map(|&bin| &bins[bin])) else { return Vec::new() };
+    let mut below: Option<Sum> = None;
+    let step = (order.len() / CUTS).max(1);
+    let mut cuts = Vec::new();
+    for (index, pair) in order.windows(2).enumerate() {
+        match &mut below {
+            Some(sum) => sum.add(&bins[pair[0]]),
+            None => below = Some(bins[pair[0]].clone()),
+        }
+        let between = [places[pair[0]][feature], places[pair[1]][feature]];
+        let is_tried = index % step == 0 || between[1] - between[0] >= 0.01;
+        let Some(low) = below.as_ref().filter(|_| between[1] > between[0] && is_tried) else { continue };
+        let high = Sum { xx: &whole.xx - &low.xx, xy: &whole.xy - &low.xy };
+        cuts.push(Cut { between, gain: [low.gain(ridge), high.gain(ridge)] });
+    }
+    cuts
 }
 
 /// Normal equations of one bin.
@@ -149,31 +302,14 @@ fn best_limit(
     tried: &mut usize,
 ) -> Option<(Limits, f64)> {
     let mut best: Option<(Limits, f64)> = None;
-    for feature in 0..FEATURES_USED {
-        let mut order: Vec<usize> = (0..bins.len()).filter(|&bin| inside(limits, &places[bin])).collect();
-        order.sort_by(|&a, &b| places[a][feature].total_cmp(&places[b][feature]));
-        let whole = total(order.iter().map(|&bin| &bins[bin]))?;
-        let mut below: Option<Sum> = None;
-        let step = (order.len() / CUTS).max(1);
-        for (index, &bin) in order.iter().enumerate() {
-            match &mut below {
-                Some(sum) => sum.add(&bins[bin]),
-                None => below = Some(bins[bin].clone()),
-            }
-            let next = order.get(index + 1).map(|&next| places[next][feature]);
-            // a cut lies between two values that differ
-            let Some(next) = next.filter(|next| *next > places[bin][feature]) else { continue };
-            if index % step != 0 && next - places[bin][feature] < 0.01 {
-                continue;
-            }
-            let Some(low) = &below else { continue };
-            let high = Sum { xx: &whole.xx - &low.xx, xy: &whole.xy - &low.xy };
-            let at = 0.5 * (places[bin][feature] + next);
+    for (feature, _) in LIMITING {
+        for Cut { between: [low, high], gain } in gains(bins, places, limits, feature, ridge) {
             *tried += 1;
-            for (end, gain) in [(1, low.gain(ridge)), (0, high.gain(ridge))] {
+            // the effect stays below a cut at the upper end, and above it at the lower end
+            for (end, gain) in [(1, gain[0]), (0, gain[1])] {
                 if best.as_ref().is_none_or(|(_, most)| gain > *most) {
                     let mut cut = *limits;
-                    cut[feature][end] = at;
+                    cut[feature][end] = 0.5 * (low + high);
                     best = Some((cut, gain));
                 }
             }

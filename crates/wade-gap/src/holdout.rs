@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::candidates::{Column, Setting, columns};
+use super::candidates::{Column, Setting, columns_within};
 use super::design::{Rows, to_rows};
 use super::features::{Features, of_bins};
 use super::judge::{Judge, informative};
@@ -95,7 +95,7 @@ pub struct Worse {
 pub(super) fn explained(named: &[Named], series: &Series, rank: usize, setting: &Setting) -> Vec<[f64; 6]> {
     let mut sum = vec![[0.0; 6]; series.t.len()];
     for named in named {
-        let columns = columns(&named.shape, series, rank, setting);
+        let columns = columns_within((&named.shape, &named.region), series, rank, setting);
         for &(coefficient, value) in &named.coefficients {
             for (sum, column) in sum.iter_mut().zip(&columns[coefficient]) {
                 (0..6).for_each(|c| sum[c] += value * column[c]);

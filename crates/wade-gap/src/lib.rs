@@ -75,7 +75,7 @@ pub use report::{GapReport, NamedEffect, NotTestable, Rejected, Report, Sources,
 pub use run::{body_of, run};
 
 use wade_core::condition::Condition;
-use wade_core::effects::{Effect, Shape};
+use wade_core::effects::{Effect, EffectRegion, Shape};
 use wade_core::vehicle::PerWheel;
 use wade_core::wrench::Wrench;
 
@@ -106,6 +106,8 @@ pub struct Predicted {
 struct Named {
     effect: Effect,
     shape: Shape,
+    /// Where it acts.
+    region: EffectRegion,
     /// Coefficient and value.
     coefficients: Vec<(usize, f64)>,
 }

@@ -13,6 +13,7 @@ use super::Config;
 use super::features::{FEATURES, Features, of_bins};
 use super::gated::Gated;
 use super::series::Series;
+use wade_core::effects::{EffectRegion, RegionLimit};
 use wade_learn::random::Random;
 
 /// Least share of the bins that a region may hold.
@@ -87,7 +88,7 @@ pub(super) fn locate(
     all: &[Series],
     trials: &[usize],
     excess: impl Fn(usize) -> Vec<f64>,
-    fitted: Option<Gated>,
+    fitted: Option<&Gated>,
     config: &Config,
 ) -> (Vec<Region>, usize) {
     let mut points = Vec::new();
@@ -283,6 +284,18 @@ fn permuted(limits: &Limits, points: &[&Point], observed: f64, random: &mut Rand
             usize::from(here[0] / f64::max(here[1], 1.0) - there[0] / f64::max(there[1], 1.0) >= observed);
     }
     (1 + as_large) as f64 / (1 + DRAWS) as f64
+}
+
+/// The region of an effect in words, each border in the middle of its interval.
+pub(super) fn region_in_words(region: &EffectRegion) -> String {
+    let middle = |border: Option<[f64; 2]>| border.map(|[low, high]| 0.5 * (low + high));
+    let of = |limit: &RegionLimit| Condition {
+        quantity: limit.quantity.name(),
+        unit: limit.quantity.unit(),
+        above: middle(limit.above),
+        at_most: middle(limit.at_most),
+    };
+    region.limits.iter().map(|limit| text(&of(limit))).collect::<Vec<_>>().join(" and ")
 }
 
 /// Limits in words.

@@ -16,9 +16,10 @@ use wade_core::frame::GRAVITY;
 /// Last and smallest factor of the search.
 const SHORTEST_STEP: f64 = 1.015;
 
-/// Sets the shapes that are estimates of the effect's own coefficients: a current, an error of the water level.
-pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting) {
-    for candidate in 0..design.candidates.len() {
+/// Sets the shapes that are estimates of the effect's own coefficients, of the candidates from a number on: a current, an error
+/// of the water level.
+pub(super) fn settle(design: &mut Design, all: &[Series], setting: &Setting, from: usize) {
+    for candidate in from..design.candidates.len() {
         if matches!(design.candidates[candidate].effect, Effect::Current | Effect::WaterLevelOffset) {
             let member = Member { candidate, columns: design.candidates[candidate].columns.clone() };
             iterate(design, all, setting, &member, &[]);
@@ -124,6 +125,7 @@ pub(super) fn through_sensors(
             .map(|member| Named {
                 effect: effect(design, member),
                 shape: design.candidates[member.candidate].shape,
+                region: design.candidates[member.candidate].region.clone(),
                 coefficients: member.columns.iter().map(|&(column, k)| (k, value(column))).collect(),
             })
             .collect();
@@ -171,9 +173,9 @@ fn search(design: &mut Design, all: &[Series], setting: &Setting, member: &Membe
     /// Shapes from which two numbers are looked for.
     const STARTS: usize = 3;
     let coefficients: Vec<usize> = member.columns.iter().map(|(_, coefficient)| *coefficient).collect();
-    let Candidate { effect, shape: own, .. } = design.candidates[member.candidate];
+    let Candidate { effect, shape: own, ref region, .. } = design.candidates[member.candidate];
     let axes = effect.spec().parameters.len();
-    let loss = |shape: &Shape| design.loss_with(all, setting, shape, &coefficients, others);
+    let loss = |shape: &Shape| design.loss_with(all, setting, (shape, region), &coefficients, others);
     let mut starts = vec![own];
     if axes > 1 {
         let alike = |candidate: &&Candidate| candidate.effect == effect && candidate.shape != own;

@@ -7,7 +7,7 @@ use super::holdout::Closure;
 use super::judge::Refusal;
 use super::noise::FloorSource;
 use super::report::{NamedEffect, Report, Trace, Verdict};
-use wade_core::effects::Kind;
+use wade_core::effects::{Kind, RegionLimit, RegionQuantity};
 use wade_learn::page::plot::{BLUE, GRAY, RED, Series, scatter, traces};
 use wade_learn::page::{PlotError, document, escape, table};
 
@@ -179,7 +179,8 @@ fn parameters(effect: &NamedEffect) -> impl Iterator<Item = Vec<String>> + '_ {
         Kind::Drive => "drive",
     };
     let name = format!("{}{}", plain(effect.name), if effect.provisional { " (provisional)" } else { "" });
-    effect.parameters.iter().map(move |(parameter, p)| {
+    let borders = borders(effect, &name, kind);
+    let parameters = effect.parameters.iter().map(move |(parameter, p)| {
         let band = p.literature.map(|band| against(band, p.value, p.interval));
         vec![
             name.clone(),
@@ -190,7 +191,28 @@ fn parameters(effect: &NamedEffect) -> impl Iterator<Item = Vec<String>> + '_ {
             format!("<div class=\"text\">{}</div>", band.unwrap_or_else(|| "no band".into())),
             percent(effect.share_of_gap),
         ]
-    })
+    });
+    parameters.chain(borders)
+}
+
+/// A row for each border of the region in which an effect acts.
+fn borders(effect: &NamedEffect, name: &str, kind: &str) -> Vec<Vec<String>> {
+    let row = |quantity: RegionQuantity, side: &str, [low, high]: [f64; 2]| {
+        vec![
+            name.to_owned(),
+            kind.into(),
+            prose(&plain(&format!("acts {side} this {}", quantity.name()))),
+            with_unit(0.5 * (low + high), quantity.unit()),
+            interval([low, high], number),
+            "<div class=\"text\">no band</div>".into(),
+            percent(effect.share_of_gap),
+        ]
+    };
+    let of = |limit: &RegionLimit| {
+        let above = limit.above.map(|border| row(limit.quantity, "above", border));
+        above.into_iter().chain(limit.at_most.map(|border| row(limit.quantity, "up to", border)))
+    };
+    effect.region.limits.iter().flat_map(of).collect()
 }
 
 /// A published band as a bar, with the estimate and its interval over it.

@@ -11,7 +11,7 @@ use super::holdout::{Closure, Worse};
 use super::judge::Refusal;
 use super::locate::Region;
 use super::noise::Floor;
-use wade_core::effects::{Effect, Kind, Shape};
+use wade_core::effects::{Effect, EffectRegion, Kind, Shape};
 
 /// The answer in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -40,6 +40,8 @@ pub struct NamedEffect {
     pub share_of_gap: f64,
     /// Seen in one condition only.
     pub provisional: bool,
+    /// Where it acts; nothing of one that acts everywhere.
+    pub region: EffectRegion,
     /// Surfaces that carry it, with their shares of its load.
     pub surfaces: BTreeMap<String, f64>,
     /// Covariance of the coefficients in the order of `coefficients`.

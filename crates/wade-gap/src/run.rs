@@ -4,7 +4,7 @@ use super::base_drag::BaseDrag;
 use super::calibrate::calibrate;
 use super::candidates::{Setting, shapes, unavailable};
 use super::color::Color;
-use super::compose::{compose, is_disproved};
+use super::compose::{compose, is_disproved, is_shown};
 use super::contradictions;
 use super::design::{Design, Rows};
 use super::elsewhere::Questions;
@@ -102,7 +102,7 @@ pub fn run(
         .for_each(|(length, _)| *length = 0.0);
     let noise = row_noise(&all, &naming, &setting.components, (&floors, &trials.manifest), smoothing, colors);
     let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
-    settle(&mut design, &all, &setting);
+    settle(&mut design, &all, &setting, 0);
     let general = General::new(&all, &design, &setting.components);
     let gap_structure = general.structure(&design, &setting.components, &design.y);
     let floor_loss = floor_loss(&design, &gap_structure);
@@ -116,7 +116,7 @@ pub fn run(
     // where the search ended in nothing, a set that is far more probable than not is taken for its weight: it has passed no gate of
     // the search, and the held-out trials judge it
     let mut for_its_weight = false;
-    loop {
+    let (found, weighed) = loop {
         let asked = members.clone();
         refine(&mut design, &all, &setting, &members);
         through_sensors(&mut design, &mut all, &setting, &members);
@@ -146,12 +146,35 @@ pub fn run(
         for_its_weight = searched.is_some() && !matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
         let Some(next) = next else {
             found.heed(&weighed, |set| names(set) != refuted && !is_disproved(set));
-            return Ok(compose(trials, &judge, found, &weighed, held, &library));
+            break (found, weighed);
         };
         is_tried = true;
         members = next;
         see(&mut design, &mut all, &setting, &[]);
+    };
+    let candidates = design.candidates.len();
+    let in_region = found.gated.as_ref().filter(|_| found.verdict == Verdict::NoCandidateFits);
+    let limited = in_region.and_then(|gated| {
+        see(&mut design, &mut all, &setting, &[]);
+        let member = gated.add_to(&mut design, &all, &setting, &library, config.folds)?;
+        refine(&mut design, &all, &setting, std::slice::from_ref(&member));
+        let judge = Judge::new(&design, &all, &setting, config, &floors, floor_loss);
+        let members = judge.confirmed(&[member]);
+        let mut limited = Found::of(&judge, &members, &library, &general, &gap_structure, false);
+        let weighed = weigh(&judge, &limited, &library);
+        let is_shown = |set: &[Member]| is_shown(&judge, set, &held);
+        limited.heed(&weighed, is_shown);
+        limited.gated = Some(gated.clone());
+        // with borders that nobody stated an effect imitates many others
+        let is_named = limited.verdict == Verdict::Named && limited.is_likely(&weighed);
+        (is_named && is_shown(&limited.members)).then_some((limited, weighed))
+    });
+    if limited.is_none() {
+        design.keep(candidates);
     }
+    let (found, weighed) = limited.unwrap_or((found, weighed));
+    let judge = Judge::new(&design, &all, &setting, config, &floors, floor_loss);
+    Ok(compose(trials, &judge, found, &weighed, held, &library))
 }
 
 /// The color of the noise of forces that were inferred from the motion of the trials themselves. Moments are left out: the rates in their

@@ -65,7 +65,7 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<Disproo
             Unfit::Leaves => format!("; the closest candidate is {names}, but serial correlation remains"),
         };
     }
-    if let Some(gated) = found.gated.filter(|_| found.verdict == Verdict::NoCandidateFits) {
+    if let Some(gated) = found.gated.as_ref().filter(|_| found.verdict == Verdict::NoCandidateFits) {
         text += &format!(
             "; where {}, it resembles {}, which explains {:.0} % of it there",
             locate::in_words(&gated.limits),
@@ -163,15 +163,22 @@ fn nearest(report: &Report) -> String {
 }
 
 /// The verdict.
-pub(super) fn summary(report: &Report, gated: Option<Gated>) -> String {
+pub(super) fn summary(report: &Report, gated: Option<&Gated>) -> String {
     let mut text = verdict(report, gated);
     text.push_str(&nearest(report));
     text
 }
 
-fn verdict(report: &Report, gated: Option<Gated>) -> String {
+fn verdict(report: &Report, gated: Option<&Gated>) -> String {
     let names = |effects: &[NamedEffect]| {
-        effects.iter().map(|e| e.name.replace('_', " ")).collect::<Vec<_>>().join(" and ")
+        let of = |effect: &NamedEffect| match effect.region.is_everywhere() {
+            true => effect.name.replace('_', " "),
+            false => {
+                let place = locate::region_in_words(&effect.region);
+                format!("{} where {place}", effect.name.replace('_', " "))
+            }
+        };
+        effects.iter().map(of).collect::<Vec<_>>().join(" and ")
     };
     let held = report.gap.held_out.get("all");
     let closed = held.and_then(|all| Some((all.closure?, all.interval))).map_or_else(String::new, |(c, interval)| {
@@ -191,7 +198,8 @@ fn verdict(report: &Report, gated: Option<Gated>) -> String {
             hidden(report).map_or_else(|| format!("{within}."), |why| format!("{within}{why}"))
         }
         Verdict::Named => {
-            let there = gated.map_or_else(String::new, |gated| {
+            let is_whole = report.effects.iter().all(|effect| effect.region.is_everywhere());
+            let there = gated.filter(|_| is_whole).map_or_else(String::new, |gated| {
                 format!(" It explains more if it acts only where {}.", locate::in_words(&gated.limits))
             });
             let worse = report.gap.worse_regions.first();

@@ -41,7 +41,7 @@ const LIMITED: f64 = 0.1;
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
 
-/// Probability from which a set that the search passed by is tried, and that of `nothing` below which nothing is not what is said:
+/// Probability from which a set that the search passed by is tried and an effect in a region is named, and that of `nothing` below which nothing is not what is said:
 /// nine to one, as the intervals of a report have it, and twenty to one.
 const LIKELY: f64 = 0.9;
 const UNLIKELY: f64 = 0.05;
@@ -111,9 +111,11 @@ impl Found {
         let missing = !members.is_empty() || is_structured(judge, gap_structure);
         // what one effect explains in a region, a sum of others can imitate everywhere; never the other way round, since a limit
         // takes from an effect
-        let gated = missing.then(|| gated(judge, library)).flatten();
+        // of what acts in a region nothing is taken any more
+        let is_limited = members.iter().any(|m| !design.candidates[m.candidate].region.is_everywhere());
+        let gated = (missing && !is_limited).then(|| gated(judge, library)).flatten();
         let gated = gated.filter(|gated| gated.share > coverage + WORTH);
-        let imitated = gated.is_some_and(|gated| {
+        let imitated = gated.as_ref().is_some_and(|gated| {
             let same = matches!(members, [one] if judge.effect(one) == gated.effect);
             !same || gated.share > coverage + LIMITED
         });
@@ -158,6 +160,11 @@ impl Found {
     /// The explanation that the members are, in whatever forms and columns of their laws.
     fn own<'a>(&self, weighed: &'a [Weighed]) -> Option<&'a Weighed> {
         weighed.iter().find(|weighed| weighed.explanation.effects == self.names)
+    }
+
+    /// True where the members are far more probable than all other explanations together.
+    pub fn is_likely(&self, weighed: &[Weighed]) -> bool {
+        self.own(weighed).is_some_and(|own| own.explanation.probability >= LIKELY)
     }
 
     /// The set of the effects that are more probable than not, where it is none of what was found: a search that adds one effect

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Quaternion, UnitQuaternion};
 
 use wade_core::domain::{Domain, Outside, Quantity};
-use wade_core::effects::{self, BoxQuantity, EffectLoads, EffectsFile, OutsideBox};
+use wade_core::effects::{self, BoxQuantity, EffectLoads, EffectsFile, OutsideBox, RegionLimit};
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_quaternion, up_from_roll_pitch};
 use wade_core::model::{COLUMNS, Jacobian};
@@ -463,8 +463,19 @@ fn active_effects(file: &EffectsFile) -> Vec<proto::ActiveEffect> {
         equation: effect.equation.clone(),
         parameters: effect.parameters.iter().map(parameter).collect(),
         provisional: effect.provisional,
+        region: effect.region.limits.iter().map(region_limit).collect(),
     };
     file.effects.iter().map(active).collect()
+}
+
+fn region_limit(limit: &RegionLimit) -> proto::RegionLimit {
+    let border = |border: Option<[f64; 2]>| border.map_or_else(Vec::new, |border| border.to_vec());
+    proto::RegionLimit {
+        quantity: limit.quantity.name().into(),
+        unit: limit.quantity.unit().into(),
+        above: border(limit.above),
+        at_most: border(limit.at_most),
+    }
 }
 
 fn box_ranges(file: &EffectsFile) -> Vec<proto::BoxRange> {

@@ -31,7 +31,7 @@ from .latency import Latency, Percentiles
 from .rpc import GrpcClient
 from .stability import Foot, Ford, Stability, StabilityModes
 from .state import GroundContact, Physics, State
-from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
+from .vehicle import ActiveEffect, EffectParameter, RegionLimit, Reloaded, Surface, Vehicle
 from .version import VERSION as __version__
 from .world import state_in_world, wrench_in_world
 
@@ -60,6 +60,7 @@ __all__ = [
     "Physics",
     "Quantity",
     "Refused",
+    "RegionLimit",
     "Reloaded",
     "ResourceExhausted",
     "ServerUnavailable",

@@ -35,7 +35,7 @@ from .latency import Latency, Percentiles
 from .stability import Foot, Ford, Stability, StabilityModes
 from .state import TIME_STEP_AT, TOLD_AT, VECTORS, WHEELS_END, State
 from .v1 import admin_pb2, hydrodynamics_pb2
-from .vehicle import ActiveEffect, EffectParameter, Reloaded, Surface, Vehicle
+from .vehicle import ActiveEffect, EffectParameter, RegionLimit, Reloaded, Surface, Vehicle
 
 # packed enumerations and truth values too: a value below 128 is one byte
 _PACKED = (
@@ -355,7 +355,15 @@ def _active_effect(effect: Any) -> ActiveEffect:
         equation=effect.equation,
         parameters=tuple(EffectParameter(p.name, p.value, p.std, p.unit) for p in effect.parameters),
         provisional=effect.provisional,
+        region=tuple(_region_limit(limit) for limit in effect.region),
     )
+
+
+def _region_limit(limit: Any) -> RegionLimit:
+    def border(numbers: Any) -> tuple[float, float] | None:
+        return (numbers[0], numbers[1]) if len(numbers) == 2 else None
+
+    return RegionLimit(limit.quantity, limit.unit, border(limit.above), border(limit.at_most))
 
 
 def stability(response: Any, ford: Ford) -> Stability:

@@ -43,12 +43,30 @@ class EffectParameter:
 
 
 @dataclass(frozen=True, slots=True)
+class RegionLimit:
+    """A limit of a quantity beyond which an effect does not act.
+
+    Attributes:
+        quantity: "depth", "froude_depth", "speed" or "pitch".
+        unit: 1 where it has none.
+        above: The effect is not there up to the first, and whole from the second; None without such a border.
+        at_most: The effect is whole up to the first, and not there from the second; None without such a border.
+    """
+
+    quantity: str
+    unit: str
+    above: tuple[float, float] | None
+    at_most: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
 class ActiveEffect:
     """An effect that was added to a model, with its numbers.
 
     Attributes:
         effect: A number that this client does not know is of a newer server.
         provisional: Seen in one condition only.
+        region: Where it acts: within all of these limits. Empty: everywhere.
     """
 
     effect: Effect | int
@@ -56,6 +74,7 @@ class ActiveEffect:
     equation: str
     parameters: tuple[EffectParameter, ...]
     provisional: bool
+    region: tuple[RegionLimit, ...]
 
 
 @dataclass(frozen=True, slots=True)

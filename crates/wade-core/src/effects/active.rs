@@ -10,6 +10,7 @@ use super::file::EffectsFile;
 use super::immersion::Immersion;
 use super::input::{BaseDrag, Elsewhere, Input, Memory, Part};
 use super::library::{Effect, MAX_COEFFICIENTS, MEMORIES, PHYSICS, Shape};
+use super::region::EffectRegion;
 use super::spec::Quantity;
 use super::validity::OutsideBox;
 use crate::condition::Condition;
@@ -158,6 +159,7 @@ struct Entry {
     values: [f64; MAX_COEFFICIENTS],
     base_drag: BaseDrag,
     channel_width: Option<f64>,
+    region: EffectRegion,
     /// What the caller may have left unsaid.
     inputs: &'static [Quantity],
     acts_on_own_drag: bool,
@@ -200,6 +202,7 @@ impl ActiveEffects {
             values: effect.values(),
             base_drag: effect.base_drag(),
             channel_width: effect.channel_width,
+            region: effect.region.clone(),
             inputs: effect.effect().spec().inputs,
             acts_on_own_drag: effect.effect().spec().acts_on_own_drag,
             memory: effect.effect().memory_place(),
@@ -313,9 +316,10 @@ impl ActiveEffects {
                 _ => Memory::default(),
             };
             let mut wrench = Wrench::default();
+            let share = entry.region.share(&state);
             if left_out.is_none() {
                 entry.shape.basis(&memory, &input, |coefficient, part, load| {
-                    let value = entry.values[coefficient];
+                    let value = entry.values[coefficient] * share;
                     wrench += load * value;
                     if let Part::Panel(panel) = part {
                         surface_forces[panel] += load.force * value;
@@ -323,7 +327,7 @@ impl ActiveEffects {
                 });
             }
             if let Shape::AddedMass(law) = entry.shape {
-                let k = std::array::from_fn(|axis| entry.values[axis]);
+                let k = std::array::from_fn(|axis| entry.values[axis] * share);
                 *added_mass = Some(law.matrix(&self.body, immersion, state.density, &k));
             }
             loads.push(EffectLoad { effect: entry.effect, wrench, left_out });

@@ -9,13 +9,17 @@ use serde::{Deserialize, Serialize};
 use super::input::BaseDrag;
 use super::law::Numbers;
 use super::library::{Effect, MAX_COEFFICIENTS, Shape};
+use super::region::EffectRegion;
 use super::spec::Kind;
 use super::validity::Validity;
 use crate::frame::Vec3;
 
 /// Newest version of the file's format that this program reads. What no older program would read is written in it, and everything
 /// else as version 1.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
+/// The first format with covariances between effects, and that with effects that act in a region.
+const WITH_BETWEEN: u32 = 2;
+const WITH_REGIONS: u32 = 3;
 
 /// The whole file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -89,6 +93,8 @@ pub struct ActiveEffect {
     pub base_drag: [f64; 3],
     /// Width of the channel in which it was seen [m].
     pub channel_width: Option<f64>,
+    /// Where it acts; since format 3.
+    pub region: EffectRegion,
     /// Names of the coefficients in the order of the covariance.
     pub coefficients: Vec<String>,
     /// Covariance of the coefficients, in the product of their units.
@@ -109,6 +115,8 @@ struct Row {
     base_drag: [f64; 3],
     #[serde(skip_serializing_if = "Option::is_none")]
     channel_width: Option<f64>,
+    #[serde(default, skip_serializing_if = "EffectRegion::is_everywhere")]
+    region: EffectRegion,
     coefficients: Vec<String>,
     covariance: Vec<Vec<f64>>,
     parameters: BTreeMap<String, ParameterValue>,
@@ -130,6 +138,7 @@ impl TryFrom<Row> for ActiveEffect {
             shape,
             base_drag: row.base_drag,
             channel_width: row.channel_width,
+            region: row.region,
             coefficients: row.coefficients,
             covariance: row.covariance,
             parameters: row.parameters,
@@ -147,6 +156,7 @@ impl From<ActiveEffect> for Row {
             shape: effect.shape.to_numbers(),
             base_drag: effect.base_drag,
             channel_width: effect.channel_width,
+            region: effect.region,
             coefficients: effect.coefficients,
             covariance: effect.covariance,
             parameters: effect.parameters,
@@ -236,14 +246,16 @@ pub enum EffectsFileError {
 }
 
 impl EffectsFile {
-    /// A file of effects by themselves, which is of format 1.
+    /// A file of effects by themselves, which is of format 1 where all of them act everywhere.
     pub fn new(vehicle: String, evidence: Evidence, validity: Validity, effects: Vec<ActiveEffect>) -> Self {
-        Self { format: 1, vehicle, evidence, validity, effects, between: Vec::new() }
+        let is_limited = effects.iter().any(|effect| !effect.region.is_everywhere());
+        let format = if is_limited { WITH_REGIONS } else { 1 };
+        Self { format, vehicle, evidence, validity, effects, between: Vec::new() }
     }
 
     /// The same with the covariances between its effects.
     pub fn with_between(self, between: Vec<Between>) -> Self {
-        let format = if between.is_empty() { self.format } else { FORMAT };
+        let format = if between.is_empty() { self.format } else { self.format.max(WITH_BETWEEN) };
         Self { format, between, ..self }
     }
 
@@ -286,6 +298,12 @@ impl EffectsFile {
                 return Err(EffectsFileError::Twice { effect: effect.effect().name() });
             }
             effect.check()?;
+            let limited = !effect.region.is_everywhere();
+            if limited && self.format < WITH_REGIONS {
+                let expected = format!("in a file of format {WITH_REGIONS} or newer");
+                let (effect, field) = (effect.effect().name(), "region".to_owned());
+                return Err(EffectsFileError::Field { effect, field, expected });
+            }
         }
         self.between.iter().try_for_each(|between| self.check_between(between))
     }
@@ -295,7 +313,7 @@ impl EffectsFile {
         let [first, second] = between.effects;
         let of = |name: Effect| self.effects.iter().find(|effect| effect.effect() == name);
         let is_same = |other: &&Between| other.effects == [first, second] || other.effects == [second, first];
-        let once = self.format > 1 && self.between.iter().filter(is_same).count() == 1;
+        let once = self.format >= WITH_BETWEEN && self.between.iter().filter(is_same).count() == 1;
         let sound = match (of(first), of(second)) {
             (Some(a), Some(b)) if first != second && once => {
                 let possible = |i: usize, j: usize, value: f64| {
@@ -363,8 +381,28 @@ impl ActiveEffect {
         must(width, "channel_width", "greater than 0")?;
         let in_channel = !self.shape.needs_channel_width() || self.channel_width.is_some();
         must(in_channel, "channel_width", "there: this effect depends on it")?;
+        self.check_region(&must)?;
         self.check_coefficients(&must)?;
         self.check_parameters(&must)
+    }
+
+    fn check_region(
+        &self,
+        must: &impl Fn(bool, &str, &str) -> Result<(), EffectsFileError>,
+    ) -> Result<(), EffectsFileError> {
+        let remembers = self.effect().spec().has_memory && !self.region.is_everywhere();
+        must(!remembers, "region", "left out: this effect remembers, and has no border in the state")?;
+        for (index, limit) in self.region.limits.iter().enumerate() {
+            let again = self.region.limits[..index].iter().any(|other| other.quantity == limit.quantity);
+            let field = format!("region[{index}]");
+            must(!again, &format!("{field}.quantity"), "each quantity once")?;
+            must(
+                limit.is_sound(),
+                &field,
+                "above and at_most, or one of them, each two finite numbers that rise, above below at_most",
+            )?;
+        }
+        Ok(())
     }
 
     fn check_coefficients(

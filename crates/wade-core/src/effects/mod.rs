@@ -12,7 +12,7 @@
 //!
 //! Reading order: `spec` (what an effect says of itself), `law` (what its file defines), `body` (what an effect needs to
 //! know of a hull), `immersion` (where the water reaches), `input` (a state), then the effects and `library`, their list. `file`
-//! is `effects.toml`, `validity` the box in which they were seen, `active` the request path.
+//! is `effects.toml`, `validity` the box in which they were seen, `region` the part of it in which one acts, `active` the request path.
 
 pub mod form_drag;
 pub mod skin_friction;
@@ -45,6 +45,7 @@ mod immersion;
 mod input;
 mod law;
 mod library;
+mod region;
 mod validity;
 
 pub use active::{ActiveEffects, Answer, Circumstances, EffectLoad, EffectLoads, EffectsSession, LeftOut};
@@ -56,5 +57,6 @@ pub use immersion::{Immersion, WetPanel};
 pub use input::{BaseDrag, DragSpeed, Elsewhere, Input, Memory, Part};
 pub use law::{Numbers, ShapeFault};
 pub use library::{Effect, MAX_COEFFICIENTS, PHYSICS, Shape};
+pub use region::{EffectRegion, RegionLimit, RegionQuantity};
 pub use spec::{Coefficient, EffectSpec, Kind, Parameter, Quantity, Rate};
 pub use validity::{BoxQuantity, OutsideBox, Validity};

@@ -8,7 +8,7 @@ use crate::common::{
 };
 use sha2::{Digest, Sha256};
 use wade_core::bundle::{self, Bundle};
-use wade_core::effects::{Effect, EffectsFile};
+use wade_core::effects::{ActiveEffect, Effect, EffectRegion, EffectsFile, RegionLimit, RegionQuantity};
 use wade_core::model::kernel::Isa;
 
 fn version(folder: &Path) -> u32 {
@@ -184,7 +184,7 @@ fn change(folder: &Path, from: &str, to: &str) {
 #[test]
 fn a_damaged_file_refuses_the_bundle_and_names_the_field() {
     for (from, to, expected) in [
-        ("format = 2", "format = 3", "newer"),
+        ("format = 2", "format = 4", "newer"),
         ("format = 2", "format = 2\ncolour = 3", "colour"),
         ("covariance = [[0.00005", "covariance = [[0.5", "between added_mass and linear_damping"),
         ("covariance = [[0.00005", "covariance = [[nan", "between added_mass and linear_damping"),
@@ -226,6 +226,35 @@ fn a_damaged_file_refuses_the_bundle_and_names_the_field() {
         assert!(error.contains("effects.toml") && error.contains(expected), "{from}: {error}");
         assert!(error.contains("rollback"), "the way out is named: {error}");
         assert_eq!(bundle::read(&husky).expect_err("refused").to_string(), error);
+    }
+}
+
+#[test]
+fn a_region_that_is_none_refuses_the_bundle_and_names_the_field() {
+    let limited = |name: Effect, limits: Vec<RegionLimit>| {
+        let effect = ActiveEffect { region: EffectRegion { limits }, ..effect(name, 0.2) };
+        effects_file("husky", vec![effect]).to_toml()
+    };
+    let depth = |above, at_most| RegionLimit { quantity: RegionQuantity::Depth, above, at_most };
+    let shallow = depth(None, Some([0.14, 0.16]));
+    let drag = Effect::DragCoefficientError;
+    let text = limited(drag, vec![shallow]);
+    let file = EffectsFile::parse(text.as_bytes(), "husky").expect("sound");
+    assert_eq!((file.to_toml(), file.effects[0].region.limits.as_slice()), (text.clone(), &[shallow][..]));
+    assert!(text.starts_with("format = 3\n"), "no older program would know that it acts in a part alone");
+    let everywhere = effects_file("husky", vec![effect(drag, 0.2)]).to_toml();
+    assert!(everywhere.starts_with("format = 1\n") && !everywhere.contains("region"), "{everywhere}");
+    for (text, expected) in [
+        (text.replace("format = 3", "format = 2"), "region must be in a file of format 3"),
+        (text.replace("[0.14, 0.16]", "[0.16, 0.14]"), "region[0] must be above and at_most"),
+        (text.replace("[0.14, 0.16]", "[nan, 0.14]"), "region[0] must be above and at_most"),
+        (text.replace("\"depth\"", "\"heading\""), "heading"),
+        (limited(drag, vec![depth(None, None)]), "region[0] must be above and at_most"),
+        (limited(drag, vec![shallow, shallow]), "region[1].quantity must be each quantity once"),
+        (limited(Effect::WaveMemory, vec![shallow]), "wave_memory: region must be left out"),
+    ] {
+        let error = EffectsFile::parse(text.as_bytes(), "husky").expect_err("refused").to_string();
+        assert!(error.contains(expected), "{error}\n{text}");
     }
 }
 

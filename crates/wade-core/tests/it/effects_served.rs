@@ -7,7 +7,8 @@ use wade_core::condition::Condition;
 use wade_core::effects::channel_blockage::ChannelBlockage;
 use wade_core::effects::current::Current;
 use wade_core::effects::{
-    BaseDrag, Body, Circumstances, Effect, EffectLoad, Immersion, Input, LeftOut, Memory, Shape,
+    ActiveEffect, BaseDrag, Body, Circumstances, Effect, EffectLoad, EffectRegion, Immersion, Input, LeftOut,
+    Memory, RegionLimit, RegionQuantity, Shape,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, up_from_roll_pitch};
@@ -91,6 +92,34 @@ fn an_effect_that_acts_on_surfaces_says_on_which() {
     // the hull as a whole
     let loads = evaluate(&only("warthog", Effect::Squat, 0.3), &busy(), &told());
     assert!(loads.effects.surface_forces.iter().all(|force| *force == Vec3::zeros()));
+}
+
+#[test]
+fn an_effect_of_a_region_is_whole_within_it_and_fades_over_its_border() {
+    let depth = RegionLimit { quantity: RegionQuantity::Depth, above: Some([0.15, 0.19]), at_most: None };
+    let region = EffectRegion { limits: vec![depth] };
+    for name in [Effect::DragCoefficientError, Effect::LinearDamping, Effect::Current, Effect::AddedMass] {
+        let limited = ActiveEffect { region: region.clone(), ..effect(name, 0.3) };
+        let limited = served_with("warthog", effects_file("warthog", vec![limited]));
+        let (whole, bare) = (only("warthog", name, 0.3), ServedVehicle::new(model("warthog"), None));
+        let at =
+            |served: &ServedVehicle, depth: f64| evaluate(served, &Condition { depth, ..busy() }, &told());
+        // below the border nothing, in the middle of it half, from its end on the same bits
+        for (depth, share) in [(0.12, 0.0), (0.15, 0.0), (0.17, 0.5), (0.19, 1.0), (0.25, 1.0)] {
+            let (all, part) = (at(&whole, depth), at(&limited, depth));
+            let expected = load(&all, name).wrench * share;
+            let found = load(&part, name).wrench;
+            assert!(close(&found.force, &expected.force, 1e-12), "{} at {depth}", name.name());
+            assert!(close(&found.moment, &expected.moment, 1e-12), "{} at {depth}", name.name());
+            if share == 1.0 {
+                assert_eq!(part.forces, all.forces, "{} at {depth}", name.name());
+                assert_eq!(part.effects.loads, all.effects.loads, "{} at {depth}", name.name());
+            }
+            let of = |loads: &Loads| loads.effects.added_mass.unwrap_or_default();
+            let matrix = of(&at(&bare, depth)) * (1.0 - share) + of(&all) * share;
+            assert!((of(&part) - matrix).norm() < 1e-9 * (1.0 + matrix.norm()), "{} at {depth}", name.name());
+        }
+    }
 }
 
 #[test]

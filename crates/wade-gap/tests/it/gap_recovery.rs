@@ -6,7 +6,7 @@
 use crate::planted::{
     self, Noise, State, gaussian, motions, planted as plant, pushes, rms, run_with, trials,
 };
-use wade_core::effects::Effect;
+use wade_core::effects::{Effect, RegionQuantity};
 use wade_core::frame::Vec3;
 use wade_core::wrench::Wrench;
 use wade_gap::{Asked, Config, Predicted, Report, Verdict};
@@ -172,13 +172,30 @@ fn a_trial_whose_zero_is_said_to_wander_is_no_gap() {
     assert_eq!(said.verdict, Verdict::NothingMissing, "{} {:?}", said.summary, said.gap.unexplained);
 }
 
+/// A load of the planted laws in water of less than 0.15 m alone.
+fn in_shallow_water(load: impl Fn(&[State]) -> Vec<[f64; 6]>) -> Trials {
+    let shallow = |(load, s): ([f64; 6], &State)| if s.depth < 0.15 { load } else { [0.0; 6] };
+    pushed(|motion| load(motion).into_iter().zip(motion).map(shallow).collect()).0
+}
+
 #[test]
-fn a_load_in_shallow_water_alone_is_described_there_and_not_applied() {
-    let (trials, _) = pushed(|motion| {
-        let shallow = |(load, s): ([f64; 6], &State)| if s.depth < 0.15 { load } else { [0.0; 6] };
-        plant("drag_coefficient_error", motion).into_iter().zip(motion).map(shallow).collect()
-    });
+fn an_effect_in_shallow_water_alone_is_named_with_its_border_and_applied_there() {
+    let trials = in_shallow_water(|motion| plant("drag_coefficient_error", motion));
     let report = run(&trials);
+    assert_eq!(report.verdict, Verdict::Named, "{} {:?}", report.summary, report.gap.unexplained);
+    assert_eq!(names(&report), ["drag_coefficient_error"]);
+    assert!(report.summary.contains("drag coefficient error where depth <="), "{}", report.summary);
+    let file = wade_gap::effects_file(&report, &trials, false).expect("named");
+    let [limit] = file.effects[0].region.limits[..] else { panic!("{:?}", file.effects[0].region) };
+    let [low, high] = limit.at_most.expect("an upper border");
+    assert_eq!((limit.quantity, limit.above), (RegionQuantity::Depth, None));
+    assert!(low <= 0.15 && 0.15 <= high && high - low < 0.1, "{low} to {high}");
+    assert!(report.gap.held_out["all"].closure.expect("a gap") > 0.8, "{}", report.summary);
+}
+
+#[test]
+fn a_zero_in_shallow_water_alone_is_described_there_and_not_named() {
+    let report = run(&in_shallow_water(|motion| plant("sensor_bias", motion)));
     assert_eq!(report.verdict, Verdict::NoCandidateFits, "{} {:?}", report.summary, names(&report));
     let text = report.gap.unexplained.clone().unwrap_or_default();
     assert!(text.contains("where depth <=") && report.effects.is_empty(), "{text}");

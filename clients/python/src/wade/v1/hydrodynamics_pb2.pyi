@@ -472,18 +472,32 @@ class GetVehicleResponse(_message.Message):
     def __init__(self, summary: _Optional[_Union[VehicleSummary, _Mapping]] = ..., length_m: _Optional[float] = ..., width_m: _Optional[float] = ..., height_m: _Optional[float] = ..., z0_m: _Optional[float] = ..., mass_kg: _Optional[float] = ..., center_of_mass_m: _Optional[_Union[Vector3, _Mapping]] = ..., inertia_kgm2: _Optional[_Iterable[float]] = ..., surfaces: _Optional[_Iterable[_Union[Surface, _Mapping]]] = ..., domain: _Optional[_Iterable[_Union[Range, _Mapping]]] = ..., mesh_stl: _Optional[bytes] = ..., face_surface: _Optional[_Iterable[int]] = ..., effects: _Optional[_Iterable[_Union[ActiveEffect, _Mapping]]] = ..., effects_validity: _Optional[_Iterable[_Union[BoxRange, _Mapping]]] = ...) -> None: ...
 
 class ActiveEffect(_message.Message):
-    __slots__ = ("effect", "name", "equation", "parameters", "provisional")
+    __slots__ = ("effect", "name", "equation", "parameters", "provisional", "region")
     EFFECT_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
     EQUATION_FIELD_NUMBER: _ClassVar[int]
     PARAMETERS_FIELD_NUMBER: _ClassVar[int]
     PROVISIONAL_FIELD_NUMBER: _ClassVar[int]
+    REGION_FIELD_NUMBER: _ClassVar[int]
     effect: Effect
     name: str
     equation: str
     parameters: _containers.RepeatedCompositeFieldContainer[EffectParameter]
     provisional: bool
-    def __init__(self, effect: _Optional[_Union[Effect, str]] = ..., name: _Optional[str] = ..., equation: _Optional[str] = ..., parameters: _Optional[_Iterable[_Union[EffectParameter, _Mapping]]] = ..., provisional: bool = ...) -> None: ...
+    region: _containers.RepeatedCompositeFieldContainer[RegionLimit]
+    def __init__(self, effect: _Optional[_Union[Effect, str]] = ..., name: _Optional[str] = ..., equation: _Optional[str] = ..., parameters: _Optional[_Iterable[_Union[EffectParameter, _Mapping]]] = ..., provisional: bool = ..., region: _Optional[_Iterable[_Union[RegionLimit, _Mapping]]] = ...) -> None: ...
+
+class RegionLimit(_message.Message):
+    __slots__ = ("quantity", "unit", "above", "at_most")
+    QUANTITY_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    ABOVE_FIELD_NUMBER: _ClassVar[int]
+    AT_MOST_FIELD_NUMBER: _ClassVar[int]
+    quantity: str
+    unit: str
+    above: _containers.RepeatedScalarFieldContainer[float]
+    at_most: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, quantity: _Optional[str] = ..., unit: _Optional[str] = ..., above: _Optional[_Iterable[float]] = ..., at_most: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class EffectParameter(_message.Message):
     __slots__ = ("name", "value", "std", "unit")
