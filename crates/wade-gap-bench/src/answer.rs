@@ -165,6 +165,10 @@ impl Answer {
         /// Floors that a law may leave, and share of the squared gap: formulas of one effect differ by as much.
         const LEFT: [f64; 2] = [2.0, 0.2];
         let GapReport { held_out, size, floors } = &self.gap;
+        let states_a_name = matches!(self.verdict, Verdict::Named | Verdict::Ambiguous);
+        if states_a_name && self.effects.is_empty() {
+            return Some("something is named, and no effect is stated".to_owned());
+        }
         match self.verdict {
             Verdict::NothingMissing => {
                 let above = size.iter().find(|(_, size)| size.is_above_what_is_expected());
@@ -250,6 +254,7 @@ mod tests {
         let held = |after: f64, closure: f64| {
             serde_json::json!({
                 "verdict": "named",
+                "effects": [{"name": "squat", "kind": "physics"}],
                 "gap": {
                     "held_out": {
                         "fx": {"before": 90.0, "after": after, "noise_floor": 3.0, "closure": closure},
@@ -264,6 +269,9 @@ mod tests {
         assert_eq!(why(&held(39.0, 0.6)), None, "a fifth of the squared gap");
         assert!(why(&held(45.0, 0.5)).unwrap().contains("most of the gap of fx"));
         assert!(why(&held(9.0, -0.1)).unwrap().contains("grows"));
+        for verdict in ["named", "ambiguous"] {
+            assert!(why(&serde_json::json!({"verdict": verdict})).unwrap().contains("no effect is stated"));
+        }
         let size = |expected: f64| {
             let fz = serde_json::json!({"interval": [4.0, 6.0], "expected_at_most": expected});
             serde_json::json!({"verdict": "nothing_missing", "gap": {"size": {"fz": fz}}})

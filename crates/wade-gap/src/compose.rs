@@ -69,6 +69,8 @@ pub(super) enum Disproof {
     Everywhere(f64),
     /// Of what they hold where the set acts.
     WhereItActs(f64),
+    /// None that can be told: the trials do not determine the coefficients of the set.
+    Undetermined,
 }
 
 impl HeldOut {
@@ -86,7 +88,9 @@ impl HeldOut {
         let share = explained_where_acting(&added, all, held, (setting, judge.floors), config);
         let slight = share.filter(|share| *share < HALF_AS_LARGE).map(Disproof::WhereItActs);
         let disproof = small.or_else(|| disproved(&closures, judge.floors));
-        let disproof = disproof.map(Disproof::Everywhere).or(slight);
+        let undetermined = fitted.is_none() && !members.is_empty();
+        let undetermined = undetermined.then_some(Disproof::Undetermined);
+        let disproof = undetermined.or(disproof.map(Disproof::Everywhere)).or(slight);
         Self { fitted, named, closures, disproof, acts: share.is_some() }
     }
 }
@@ -126,7 +130,7 @@ pub(super) fn compose(
     // fault is exact or is none
     let is_for_all = |disproof: &Disproof| match disproof {
         Disproof::Everywhere(share) => found.verdict == Verdict::Named || is_fault || *share < 0.0,
-        Disproof::WhereItActs(_) => true,
+        Disproof::WhereItActs(_) | Disproof::Undetermined => true,
     };
     let disproof = disproof.filter(|disproof| fits && is_for_all(disproof));
     if disproof.is_some() {
@@ -142,7 +146,7 @@ pub(super) fn compose(
     let gap_excess = |trial: usize| excess(all, design, setting, trial);
     let (mut regions, regions_tried) = match found.verdict {
         Verdict::NothingMissing => (Vec::new(), 0),
-        _ => locate::locate(all, &design.trials, gap_excess, found.gated.as_ref(), config),
+        _ => locate::locate(all, &design.trials, gap_excess, found.gated.first(), config),
     };
     for region in &mut regions {
         region.surfaces = of_region(region, &named, all, setting, judge.floors);
@@ -212,7 +216,7 @@ pub(super) fn compose(
         traces,
         trends,
     };
-    report.summary = summary(&report, found.gated.as_ref());
+    report.summary = summary(&report, found.gated.first());
     report
 }
 

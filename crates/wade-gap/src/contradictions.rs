@@ -29,14 +29,8 @@ const KILOMETERS_AN_HOUR: f64 = 3.6;
 /// is good to a third.
 const CONTRADICTS: f64 = 3.0;
 
-/// Refuses channels that the hull does not fit into, trials that repeat others in name alone, and wheels that do not roll with
-/// `rolling_radius` [m] in their unit.
-pub(super) fn check(
-    all: &[Series],
-    manifest: &Manifest,
-    body: &Body,
-    rolling_radius: Option<f64>,
-) -> Result<(), GapError> {
+/// Refuses channels that the hull does not fit into, and wheels that do not roll with `rolling_radius` [m] in their unit.
+pub(super) fn check(all: &[Series], body: &Body, rolling_radius: Option<f64>) -> Result<(), GapError> {
     let narrow = |series: &&Series| series.channel_width.is_some_and(|width| width <= body.width);
     if let Some(series) = all.iter().find(narrow) {
         let channel = series.channel_width.unwrap_or_default();
@@ -55,20 +49,54 @@ pub(super) fn check(
             return Err(GapError::WheelUnit { radius, wheel: body.wheel_radius, suspected });
         }
     }
-    for group in groups(all, manifest) {
-        let Some((first, others)) = group.split_first() else { continue };
-        for other in others {
-            let Some([apart, speed]) = difference(first, other) else { continue };
-            if apart > f64::max(APART * speed, SLOW) {
-                let (trial, other) = (first.name.clone(), other.name.clone());
-                return Err(GapError::NoRepeat { trial, other, apart, speed });
-            }
-        }
-    }
     Ok(())
 }
 
-/// Stated noises that the samples contradict.
+/// A trial that is stated to repeat another one and is another motion.
+#[derive(Debug, Clone, PartialEq)]
+struct NoRepeat {
+    trial: String,
+    other: String,
+    /// Difference of the velocities, and the speed of the faster one, rms [m/s].
+    apart: f64,
+    speed: f64,
+}
+
+impl std::fmt::Display for NoRepeat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { trial, other, apart, speed } = self;
+        write!(
+            f,
+            "{other}.csv does not repeat {trial}.csv as measured.repeats says: at the same time since their start their velocities differ by {apart:.2} m/s, with a speed of {speed:.2} m/s; what they show of the noise is left out. Cut both so that they begin together, or leave the pair out of measured.repeats"
+        )
+    }
+}
+
+/// The trials that repeat others in name alone.
+fn no_repeats(all: &[Series], manifest: &Manifest) -> Vec<NoRepeat> {
+    let of_group = |group: Vec<&Series>| {
+        let (first, others) = group.split_first()?;
+        let of = |other: &&Series| {
+            let [apart, speed] = difference(first, other)?;
+            let (trial, other) = (first.name.clone(), other.name.clone());
+            (apart > f64::max(APART * speed, SLOW)).then_some(NoRepeat { trial, other, apart, speed })
+        };
+        Some(others.iter().filter_map(of).collect::<Vec<_>>())
+    };
+    groups(all, manifest).filter_map(of_group).flatten().collect()
+}
+
+/// The manifest without trials in its repeats that repeat no other.
+pub(super) fn with_true_repeats(all: &[Series], manifest: &Manifest) -> Manifest {
+    let mut manifest = manifest.clone();
+    let others: Vec<String> = no_repeats(all, &manifest).into_iter().map(|no| no.other).collect();
+    let groups = &mut manifest.measured.repeats;
+    groups.iter_mut().for_each(|group| group.retain(|name| !others.contains(name)));
+    groups.retain(|group| group.len() > 1);
+    manifest
+}
+
+/// Trials that repeat no other, and stated noises that the samples contradict.
 pub(super) fn remarks(all: &[Series], manifest: &Manifest, components: &[usize]) -> Vec<String> {
     let of = |&component: &usize| {
         let (name, unit) = (WRENCH[component], if component < 3 { "N" } else { "N m" });
@@ -85,7 +113,8 @@ pub(super) fn remarks(all: &[Series], manifest: &Manifest, components: &[usize])
             "{name}: trials.toml states a sensor_noise of {stated} {unit}, and samples scatter by {seen:.3} {unit} within {SLOWEST_SEEN} s: {said}; state the standard deviation of one sample"
         ))
     };
-    components.iter().filter_map(of).collect()
+    let no_repeats = no_repeats(all, manifest);
+    no_repeats.iter().map(ToString::to_string).chain(components.iter().filter_map(of)).collect()
 }
 
 /// Difference of the velocities of two trials at the same time since their start, and the speed of the faster one, rms [m/s];

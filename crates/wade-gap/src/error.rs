@@ -273,20 +273,6 @@ pub enum GapError {
         /// What is likely, and what to do.
         suspected: String,
     },
-    /// A repeat that is another motion.
-    #[error(
-        "{other}.csv does not repeat {trial}.csv as measured.repeats says: at the same time since their start their velocities differ by {apart:.2} m/s, with a speed of {speed:.2} m/s; cut both so that they begin together, or leave the pair out"
-    )]
-    NoRepeat {
-        /// Name of the trial.
-        trial: String,
-        /// Name of the other.
-        other: String,
-        /// Difference of the velocities, rms [m/s].
-        apart: f64,
-        /// Speed, rms [m/s].
-        speed: f64,
-    },
     /// A channel that stops.
     #[error(
         "column {column} of {place}: {count} samples from t = {from:.3} s on are exactly {value} {unit}, where a standard deviation of {spread:.3} {unit} is expected: the channel stopped; leave those rows or the trial out"

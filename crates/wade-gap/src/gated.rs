@@ -47,8 +47,9 @@ pub(super) struct Gated {
     pub tried: usize,
 }
 
-/// The effect and region that explain most of the gap, where one limit or more is worth it.
-pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
+/// The effect and region that explain most of the gap, where one limit or more is worth it, and those that do so of what may be named
+/// in one, where these are others.
+pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Vec<Gated> {
     let design = judge.design;
     let whole = judge.missing();
     let features: Vec<Vec<Features>> = judge.all.iter().map(of_bins).collect();
@@ -90,20 +91,26 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Option<Gated> {
     let mut found: Vec<(Gated, &Candidate)> = candidates.filter_map(|of| Some((one(of)?, of))).collect();
     let tried = found.iter().map(|(gated, _)| gated.tried).sum();
     found.sort_by(|(a, _), (b, _)| b.share.total_cmp(&a.share).then(a.effect.cmp(&b.effect)));
-    found.retain(|(gated, candidate)| !of_noise(gated, candidate));
-    let most = found.first()?.0.share;
-    // a fault of a sensor or of the drive knows no region, and stands in for a load of the water that explains no less
-    let is_near = |gated: &Gated| has_borders(gated.effect) && gated.share > most - WORTH;
-    let first = found.iter().position(|(gated, _)| is_near(gated)).unwrap_or(0);
-    let (best, candidate) = found.swap_remove(first);
-    if best.limits == OPEN || best.share <= EXPLAINED {
-        return None;
-    }
-    let region = region(design, candidate, &places, &best);
-    Some(Gated { tried, region, ..best })
+    let describes = |of: &(Gated, &Candidate)| !of_noise(&of.0, of.1);
+    let first = found.iter().position(describes);
+    let of_water = found.iter().position(|of| has_borders(of.0.effect) && describes(of));
+    let mut places_of: Vec<usize> = first.into_iter().chain(of_water).collect();
+    places_of.dedup();
+    let is_told = |gated: &Gated| gated.limits != OPEN && gated.share > EXPLAINED;
+    let of = |index: usize| {
+        let (gated, candidate) = &found[index];
+        let region = region(design, candidate, &places, gated);
+        Gated { tried, region, ..gated.clone() }
+    };
+    places_of.into_iter().filter(|&index| is_told(&found[index].0)).map(of).collect()
 }
 
 impl Gated {
+    /// True for a load of the water with borders that are told.
+    pub fn may_be_named(&self) -> bool {
+        self.region.is_some() && has_borders(self.effect)
+    }
+
     /// Adds to the design what may act in the region, each effect of the library in its best form, and gives the one that was found to;
     /// none where the region has no clear border.
     pub fn add_to(

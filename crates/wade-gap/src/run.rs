@@ -9,6 +9,7 @@ use super::contradictions;
 use super::design::{Design, Rows};
 use super::elsewhere::Questions;
 use super::explanations::weigh;
+use super::gated::Gated;
 use super::general::General;
 use super::judge::{Judge, Member};
 use super::measurement::{is_computed, is_inferred};
@@ -62,10 +63,11 @@ pub fn run(
     let (mut all, components) = series(trials, body, predict, config)?;
     let mass = trials.manifest.mass.unwrap_or(body.mass);
     plausible::check(&all, &components, is_inferred(&trials.manifest), mass)?;
-    contradictions::check(&all, &trials.manifest, body, rolling_radius(trials))?;
-    let (naming, held) = hold_out(&all, &trials.manifest.measured.repeats, config);
-    check_kept_back(&all, &naming, &held, &trials.manifest.measured.repeats)?;
-    let floors = floors(&all, &naming, &trials.manifest, &components);
+    contradictions::check(&all, body, rolling_radius(trials))?;
+    let manifest = contradictions::with_true_repeats(&all, &trials.manifest);
+    let (naming, held) = hold_out(&all, &manifest.measured.repeats, config);
+    check_kept_back(&all, &naming, &held, &manifest.measured.repeats)?;
+    let floors = floors(&all, &naming, &manifest, &components);
     let simulated = trials.trials.iter().any(Trial::is_simulated);
     let questions = Questions::new(body, predict);
     let changes = |shape: &Shape, series: &Series| questions.changes(shape, series);
@@ -100,7 +102,7 @@ pub fn run(
         .zip(&colors)
         .filter(|(_, color)| color.is_some())
         .for_each(|(length, _)| *length = 0.0);
-    let noise = row_noise(&all, &naming, &setting.components, (&floors, &trials.manifest), smoothing, colors);
+    let noise = row_noise(&all, &naming, &setting.components, (&floors, &manifest), smoothing, colors);
     let mut design = Design::new(&all, naming, rows, &setting, &forms, noise, config);
     settle(&mut design, &all, &setting, 0);
     let general = General::new(&all, &design, &setting.components);
@@ -116,7 +118,9 @@ pub fn run(
     // where the search ended in nothing, a set that is far more probable than not is taken for its weight: it has passed no gate of
     // the search, and the held-out trials judge it
     let mut for_its_weight = false;
-    let (found, weighed) = loop {
+    // what acts in a region beside the set that the search found
+    let mut in_regions: Option<Vec<Gated>> = None;
+    let (found, weighed, in_region) = loop {
         let asked = members.clone();
         refine(&mut design, &all, &setting, &members);
         through_sensors(&mut design, &mut all, &setting, &members);
@@ -126,6 +130,7 @@ pub fn run(
             members = judge.confirmed(&members);
         }
         let mut found = Found::of(&judge, &members, &library, &general, &gap_structure, for_its_weight);
+        let in_regions = in_regions.get_or_insert_with(|| found.gated.clone());
         let weighed = weigh(&judge, &found, &library);
         let is_disproved = |set: &[Member]| is_disproved(&judge, set, &held);
         let names = |set: &[Member]| judge.sorted_names(set);
@@ -146,15 +151,21 @@ pub fn run(
         for_its_weight = searched.is_some() && !matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
         let Some(next) = next else {
             found.heed(&weighed, |set| names(set) != refuted && !is_disproved(set));
-            break (found, weighed);
+            // a name that the held-out trials disprove leaves the question open
+            let is_open = match found.verdict {
+                Verdict::NoCandidateFits => true,
+                Verdict::Named => is_disproved(&found.members),
+                _ => false,
+            };
+            let in_region = in_regions.iter().find(|gated| is_open && gated.may_be_named());
+            break (found, weighed, in_region.cloned());
         };
         is_tried = true;
         members = next;
         see(&mut design, &mut all, &setting, &[]);
     };
     let candidates = design.candidates.len();
-    let in_region = found.gated.as_ref().filter(|_| found.verdict == Verdict::NoCandidateFits);
-    let limited = in_region.and_then(|gated| {
+    let limited = in_region.as_ref().and_then(|gated| {
         see(&mut design, &mut all, &setting, &[]);
         let member = gated.add_to(&mut design, &all, &setting, &library, config.folds)?;
         refine(&mut design, &all, &setting, std::slice::from_ref(&member));
@@ -164,7 +175,7 @@ pub fn run(
         let weighed = weigh(&judge, &limited, &library);
         let is_shown = |set: &[Member]| is_shown(&judge, set, &held);
         limited.heed(&weighed, is_shown);
-        limited.gated = Some(gated.clone());
+        limited.gated = vec![gated.clone()];
         // with borders that nobody stated an effect imitates many others
         let is_named = limited.verdict == Verdict::Named && limited.is_likely(&weighed);
         (is_named && is_shown(&limited.members)).then_some((limited, weighed))

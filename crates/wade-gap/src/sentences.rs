@@ -65,7 +65,7 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<Disproo
             Unfit::Leaves => format!("; the closest candidate is {names}, but serial correlation remains"),
         };
     }
-    if let Some(gated) = found.gated.as_ref().filter(|_| found.verdict == Verdict::NoCandidateFits) {
+    if let Some(gated) = found.gated.first().filter(|_| found.verdict == Verdict::NoCandidateFits) {
         text += &format!(
             "; where {}, it resembles {}, which explains {:.0} % of it there",
             locate::in_words(&gated.limits),
@@ -75,15 +75,19 @@ pub(super) fn unexplained(judge: &Judge, found: &Found, disproof: Option<Disproo
     }
     if let Some(disproof) = disproof {
         let names = judge.names(&found.members).join(" and ").replace('_', " ");
-        let (share, place) = match disproof {
-            Disproof::Everywhere(share) => (share, ""),
-            Disproof::WhereItActs(share) => (share, ", where it acts"),
+        let of = |share: f64, place: &str| match share > 0.0 {
+            true => format!(
+                "; {names} would explain {:.0} % of the squared gap of the held-out trials{place}",
+                100.0 * share
+            ),
+            false => format!("; {names} would increase the gap of the held-out trials{place}"),
         };
-        text += &if share > 0.0 {
-            let share = 100.0 * share;
-            format!("; {names} would explain {share:.0} % of the squared gap of the held-out trials{place}")
-        } else {
-            format!("; {names} would increase the gap of the held-out trials{place}")
+        text += &match disproof {
+            Disproof::Everywhere(share) => of(share, ""),
+            Disproof::WhereItActs(share) => of(share, ", where it acts"),
+            Disproof::Undetermined => {
+                format!("; the closest is {names}, whose coefficients these trials do not determine")
+            }
         };
     }
     Some(text)

@@ -54,8 +54,9 @@ pub(super) struct Found {
     names: Vec<&'static str>,
     pub alternatives: Vec<Vec<Member>>,
     pub residual: DVector<f64>,
-    /// One effect that explains more within a region than the members do everywhere.
-    pub gated: Option<Gated>,
+    /// Effects that explain more within a region than the members do everywhere: the one that explains most, and that of those that may
+    /// be named.
+    pub gated: Vec<Gated>,
     /// What is left without a name: after the members where they fit, else of the gap as it is.
     pub left: Structure,
     /// What the gap has without a name before anything is taken out.
@@ -113,9 +114,9 @@ impl Found {
         // takes from an effect
         // of what acts in a region nothing is taken any more
         let is_limited = members.iter().any(|m| !design.candidates[m.candidate].region.is_everywhere());
-        let gated = (missing && !is_limited).then(|| gated(judge, library)).flatten();
-        let gated = gated.filter(|gated| gated.share > coverage + WORTH);
-        let imitated = gated.as_ref().is_some_and(|gated| {
+        let mut gated = if missing && !is_limited { gated(judge, library) } else { Vec::new() };
+        gated.retain(|gated| gated.share > coverage + WORTH);
+        let imitated = gated.first().is_some_and(|gated| {
             let same = matches!(members, [one] if judge.effect(one) == gated.effect);
             !same || gated.share > coverage + LIMITED
         });
@@ -162,9 +163,9 @@ impl Found {
         weighed.iter().find(|weighed| weighed.explanation.effects == self.names)
     }
 
-    /// True where the members are far more probable than all other explanations together.
+    /// True where the members are far more probable to act than not, alone or with others.
     pub fn is_likely(&self, weighed: &[Weighed]) -> bool {
-        self.own(weighed).is_some_and(|own| own.explanation.probability >= LIKELY)
+        probability_of_all(&self.names, weighed) >= LIKELY
     }
 
     /// The set of the effects that are more probable than not, where it is none of what was found: a search that adds one effect
