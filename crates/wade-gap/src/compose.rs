@@ -69,7 +69,7 @@ pub(super) enum Disproof {
     Everywhere(f64),
     /// Of what they hold where the set acts.
     WhereItActs(f64),
-    /// None that can be told: the trials do not determine the coefficients of the set.
+    /// No share is known: the trials do not determine the coefficients of the set.
     Undetermined,
 }
 

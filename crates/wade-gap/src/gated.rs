@@ -96,17 +96,17 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Vec<Gated> {
     let of_water = found.iter().position(|of| has_borders(of.0.effect) && describes(of));
     let mut places_of: Vec<usize> = first.into_iter().chain(of_water).collect();
     places_of.dedup();
-    let is_told = |gated: &Gated| gated.limits != OPEN && gated.share > EXPLAINED;
+    let explains = |gated: &Gated| gated.limits != OPEN && gated.share > EXPLAINED;
     let of = |index: usize| {
         let (gated, candidate) = &found[index];
         let region = region(design, candidate, &places, gated);
         Gated { tried, region, ..gated.clone() }
     };
-    places_of.into_iter().filter(|&index| is_told(&found[index].0)).map(of).collect()
+    places_of.into_iter().filter(|&index| explains(&found[index].0)).map(of).collect()
 }
 
 impl Gated {
-    /// True for a load of the water with borders that are told.
+    /// True for a load of the water whose region has clear borders.
     pub fn may_be_named(&self) -> bool {
         self.region.is_some() && has_borders(self.effect)
     }
