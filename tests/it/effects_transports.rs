@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::common::{
-    Numbers, Served, VEHICLES, comparable, copy_of_vehicles, copy_with_every_effect, every_effect,
-    served_with,
+    Numbers, Served, VEHICLES, comparable, copy_of_vehicles, copy_with_every_effect, effect, effects_file,
+    every_effect, served_with,
 };
 use wade_client::{Client, InProcess, Method, Reply};
 use wade_core::bundle;
-use wade_core::effects::{Effect, LeftOut};
+use wade_core::effects::{ActiveEffect, Effect, EffectRegion, LeftOut, RegionLimit, RegionQuantity};
 use wade_core::model::kernel::Isa;
 use wade_wire::State;
 use wade_wire::shm::Wait;
@@ -109,6 +109,38 @@ fn a_session_is_the_same_over_every_transport_that_has_one_and_each_has_its_own(
         }
         assert!(differ, "{name}: the two runs remember different things");
     }
+}
+
+#[test]
+fn a_region_is_stated_and_its_effect_has_the_same_bits_over_every_transport() {
+    let folder = copy_of_vehicles();
+    let limits = vec![
+        RegionLimit { quantity: RegionQuantity::Depth, above: Some([0.1, 0.2]), at_most: None },
+        RegionLimit { quantity: RegionQuantity::Speed, above: None, at_most: Some([1.0, 2.0]) },
+    ];
+    let effect =
+        ActiveEffect { region: EffectRegion { limits }, ..effect(Effect::DragCoefficientError, 0.3) };
+    bundle::apply(&folder.path().join("husky"), effects_file("husky", vec![effect])).expect("applied");
+    let served = Served::with(|config| config.vehicles = folder.path().to_owned());
+    let described = served.tcp("husky", Method::Unary).vehicle().expect("known");
+    let region: Vec<_> = described.effects[0]
+        .region
+        .iter()
+        .map(|limit| (limit.quantity.as_str(), limit.unit.as_str(), &limit.above[..], &limit.at_most[..]))
+        .collect();
+    assert_eq!(region, [("depth", "m", &[0.1, 0.2][..], &[][..]), ("speed", "m/s", &[], &[1.0, 2.0])]);
+    let mut alone = from(folder.path(), "husky");
+    let clients = served.clients("husky").into_iter().filter(|(name, _)| !name.contains("stream"));
+    let mut clients: Vec<(&str, Client)> = clients.collect();
+    let mut forces = Vec::new();
+    for state in run(0.0) {
+        let expected = comparable(alone.evaluate(&state).expect("valid"));
+        for (name, client) in &mut clients {
+            assert_eq!(comparable(client.evaluate(&state).expect("answered")), expected, "{name}");
+        }
+        forces.push(expected.effects[0].force[0].abs());
+    }
+    assert!(forces.iter().any(|force| *force > 0.0), "{forces:?}");
 }
 
 #[test]
