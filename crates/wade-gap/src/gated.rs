@@ -147,8 +147,8 @@ fn has_borders(effect: Effect) -> bool {
 
 /// The borders of a region as intervals: where the likelihood of the rows falls by as much as it does for a normal variable at the
 /// ends of 90 %, and no less than the quantity changes from bin to bin across it, which a mean over a bin cannot tell apart. None where
-/// no state lies on the inner side of the whole interval: what acts at the last value alone, such as at rest, is not seen to act beyond
-/// a border.
+/// no state lies on the inner side of the whole interval, or where two intervals meet: what acts at the last value alone, such as at
+/// rest, is not seen to act beyond a border.
 fn region(
     design: &Design,
     candidate: &Candidate,
@@ -188,8 +188,8 @@ fn region(
     };
     let limits: Vec<(usize, RegionLimit)> =
         LIMITING.iter().filter_map(|own| Some((own.0, limit(own)?))).collect();
-    let all_seen = limits.iter().all(|(feature, limit)| is_seen(limit, *feature));
-    all_seen.then(|| EffectRegion { limits: limits.into_iter().map(|(_, limit)| limit).collect() })
+    let is_clear = limits.iter().all(|(feature, limit)| limit.is_sound() && is_seen(limit, *feature));
+    is_clear.then(|| EffectRegion { limits: limits.into_iter().map(|(_, limit)| limit).collect() })
 }
 
 /// What an effect within limits leaves, row by row, and what it takes off the sum of squares.

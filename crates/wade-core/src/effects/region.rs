@@ -73,8 +73,8 @@ impl RegionLimit {
         above * below
     }
 
-    /// Whether there is a border, and each is two finite numbers of which the first is less.
-    pub(super) fn is_sound(&self) -> bool {
+    /// Whether there is a border, each is two finite numbers of which the first is less, and two do not cross.
+    pub fn is_sound(&self) -> bool {
         let sound = |[from, to]: [f64; 2]| from.is_finite() && to.is_finite() && from < to;
         let apart = match (self.above, self.at_most) {
             (None, None) => false,
