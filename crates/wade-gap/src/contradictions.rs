@@ -89,9 +89,13 @@ fn no_repeats(all: &[Series], manifest: &Manifest) -> Vec<NoRepeat> {
 /// The manifest without trials in its repeats that repeat no other.
 pub(super) fn with_true_repeats(all: &[Series], manifest: &Manifest) -> Manifest {
     let mut manifest = manifest.clone();
-    let others: Vec<String> = no_repeats(all, &manifest).into_iter().map(|no| no.other).collect();
+    let no_repeats = no_repeats(all, &manifest);
     let groups = &mut manifest.measured.repeats;
-    groups.iter_mut().for_each(|group| group.retain(|name| !others.contains(name)));
+    for group in groups.iter_mut() {
+        let of_group = no_repeats.iter().filter(|no| group.contains(&no.trial));
+        let others: Vec<&String> = of_group.map(|no| &no.other).collect();
+        group.retain(|name| !others.contains(&name));
+    }
     groups.retain(|group| group.len() > 1);
     manifest
 }

@@ -292,21 +292,20 @@ impl Design {
 
     /// Adds the columns of more candidates, each a law and where it acts.
     pub fn add(&mut self, all: &[Series], setting: &Setting, laws: &[(Shape, EffectRegion)], folds: usize) {
-        let mut values = std::mem::replace(&mut self.x, DMatrix::zeros(0, 0)).data.into();
-        let columns_of = |this: &mut Self, values: &mut Vec<f64>, (shape, region): &(Shape, EffectRegion)| {
-            let columns = this.candidate_columns(all, setting, (shape, region));
+        let mut values: Vec<f64> = std::mem::replace(&mut self.x, DMatrix::zeros(0, 0)).data.into();
+        for (shape, region) in laws {
+            let columns = self.candidate_columns(all, setting, (shape, region));
             let (effect, region) = (shape.effect(), region.clone());
             let mut candidate = Candidate { effect, shape: *shape, region, columns: Vec::new() };
             for (coefficient, column, scale) in columns {
-                candidate.columns.push((this.scale.len(), coefficient));
-                this.scale.push(scale);
+                candidate.columns.push((self.scale.len(), coefficient));
+                self.scale.push(scale);
                 values.extend(column);
             }
             if !candidate.columns.is_empty() {
-                this.candidates.push(candidate);
+                self.candidates.push(candidate);
             }
-        };
-        laws.iter().for_each(|law| columns_of(self, &mut values, law));
+        }
         self.x = DMatrix::from_vec(self.y.len(), self.scale.len(), values);
         self.sum(folds);
     }

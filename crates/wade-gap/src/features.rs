@@ -9,7 +9,6 @@ use super::series::Series;
 use super::smoothing::{running_mean, white_kept};
 use super::statistics::white_variance;
 use wade_core::effects::RegionQuantity;
-use wade_core::frame::GRAVITY;
 
 /// Names of the features of a place, with units; all the same for a mirrored vehicle.
 pub(super) const FEATURES: [(&str, &str); 9] = [
@@ -46,7 +45,7 @@ pub(super) fn of_bins(series: &Series) -> Vec<Features> {
     let conditions = &series.conditions;
     let columns = [
         mean(&|i| conditions[i].depth),
-        mean(&|i| conditions[i].velocity.norm() / (GRAVITY * conditions[i].depth.max(0.01)).sqrt()),
+        mean(&|i| RegionQuantity::FroudeDepth.of(&conditions[i])),
         mean(&|i| conditions[i].velocity.norm()),
         // the mean before the norm, or noise would pass for acceleration
         {

@@ -56,13 +56,11 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Vec<Gated> {
     let places: Vec<Features> =
         design.rows.rows.iter().step_by(design.rows.width).map(|row| features[row.trial][row.bin]).collect();
     let one = |candidate: &Candidate| {
-        let bins = sums(design, &columns(candidate));
-        let whole_sum = total(bins.iter())?;
-        let ridge = RIDGE * whole_sum.xx.diagonal().max();
-        let mut found = (OPEN, whole_sum.gain(ridge));
+        let Normal { bins, ridge, .. } = &Normal::of(design, candidate);
+        let mut found = (OPEN, total(bins.iter())?.gain(*ridge));
         let mut tried = 0;
         for _ in 0..MOST {
-            let Some(next) = best_limit(&bins, &places, &found.0, ridge, &mut tried) else { break };
+            let Some(next) = best_limit(bins, &places, &found.0, *ridge, &mut tried) else { break };
             if next.1 < found.1 + WORTH * whole {
                 break;
             }
@@ -76,9 +74,7 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Vec<Gated> {
         if lives_on_a_rate(gated.effect) {
             return false;
         }
-        let columns = columns(candidate);
-        let whole = total(sums(design, &columns).iter()).map_or(0.0, |sum| sum.xx.diagonal().max());
-        let (left, _) = left_within(design, &columns, &places, &gated.limits, RIDGE * whole);
+        let (left, _) = Normal::of(design, candidate).left_within(design, &places, &gated.limits);
         let load = &design.y - left;
         !outlasts_noise(design, &load, &design.y)
     };
@@ -92,17 +88,19 @@ pub(super) fn gated(judge: &Judge, library: &[Effect]) -> Vec<Gated> {
     let tried = found.iter().map(|(gated, _)| gated.tried).sum();
     found.sort_by(|(a, _), (b, _)| b.share.total_cmp(&a.share).then(a.effect.cmp(&b.effect)));
     let describes = |of: &(Gated, &Candidate)| !of_noise(&of.0, of.1);
-    let first = found.iter().position(describes);
-    let of_water = found.iter().position(|of| has_borders(of.0.effect) && describes(of));
-    let mut places_of: Vec<usize> = first.into_iter().chain(of_water).collect();
-    places_of.dedup();
+    let mut rest = found.iter();
+    let first = rest.find(|of| describes(of));
+    let is_of_water = |(gated, _): &(Gated, &Candidate)| has_borders(gated.effect);
+    let of_water = match first.is_some_and(is_of_water) {
+        true => None,
+        false => rest.find(|of| is_of_water(of) && describes(of)),
+    };
     let explains = |gated: &Gated| gated.limits != OPEN && gated.share > EXPLAINED;
-    let of = |index: usize| {
-        let (gated, candidate) = &found[index];
+    let of = |(gated, candidate): &(Gated, &Candidate)| {
         let region = region(design, candidate, &places, gated);
         Gated { tried, region, ..gated.clone() }
     };
-    places_of.into_iter().filter(|&index| explains(&found[index].0)).map(of).collect()
+    first.into_iter().chain(of_water).filter(|(gated, _)| explains(gated)).map(of).collect()
 }
 
 impl Gated {
@@ -155,10 +153,8 @@ fn region(
     places: &[Features],
     gated: &Gated,
 ) -> Option<EffectRegion> {
-    let columns = columns(candidate);
-    let bins = sums(design, &columns);
-    let ridge = RIDGE * total(bins.iter()).map_or(0.0, |sum| sum.xx.diagonal().max());
-    let (residual, best) = left_within(design, &columns, places, &gated.limits, ridge);
+    let normal = Normal::of(design, candidate);
+    let (residual, best) = normal.left_within(design, places, &gated.limits);
     let slack = Z90 * Z90 * variance(design, design.empty_loss() - best, memory_of(design, &residual));
     let border = |feature: usize, end: usize| -> Option<[f64; 2]> {
         let at = gated.limits[feature][end];
@@ -167,7 +163,7 @@ fn region(
         }
         let mut open = gated.limits;
         open[feature][end] = OPEN[feature][end];
-        let cuts = gains(&bins, places, &open, feature, ridge);
+        let cuts = gains(&normal.bins, places, &open, feature, normal.ridge);
         let near = cuts.iter().filter(|cut| cut.gain[1 - end] >= best - slack);
         let (low, high) =
             near.fold((at, at), |(low, high), cut| (low.min(cut.between[0]), high.max(cut.between[1])));
@@ -192,25 +188,34 @@ fn region(
     is_clear.then(|| EffectRegion { limits: limits.into_iter().map(|(_, limit)| limit).collect() })
 }
 
-/// What an effect within limits leaves, row by row, and what it takes off the sum of squares.
-fn left_within(
-    design: &Design,
-    columns: &[usize],
-    places: &[Features],
-    limits: &Limits,
+/// Columns of a candidate with their normal equations, bin by bin.
+struct Normal {
+    columns: Vec<usize>,
+    bins: Vec<Sum>,
     ridge: f64,
-) -> (DVector<f64>, f64) {
-    let within: Vec<bool> = places.iter().map(|place| inside(limits, place)).collect();
-    let bins = sums(design, columns);
-    let Some(sum) = total(bins.iter().zip(&within).filter(|(_, within)| **within).map(|(bin, _)| bin)) else {
-        return (design.y.clone(), 0.0);
-    };
-    let beta = sum.solve(ridge);
-    let load = |row: usize| {
-        let of = |(column, beta): (&usize, &f64)| design.x[(row, *column)] * beta;
-        if within[row / design.rows.width] { columns.iter().zip(beta.iter()).map(of).sum() } else { 0.0 }
-    };
-    (DVector::from_fn(design.y.len(), |row, _| design.y[row] - load(row)), sum.gain(ridge))
+}
+
+impl Normal {
+    fn of(design: &Design, candidate: &Candidate) -> Self {
+        let columns = columns(candidate);
+        let bins = sums(design, &columns);
+        let ridge = RIDGE * total(bins.iter()).map_or(0.0, |sum| sum.xx.diagonal().max());
+        Self { columns, bins, ridge }
+    }
+
+    /// What the effect within limits leaves, row by row, and what it takes off the sum of squares.
+    fn left_within(&self, design: &Design, places: &[Features], limits: &Limits) -> (DVector<f64>, f64) {
+        let within: Vec<bool> = places.iter().map(|place| inside(limits, place)).collect();
+        let bins = self.bins.iter().zip(&within).filter(|(_, within)| **within).map(|(bin, _)| bin);
+        let Some(sum) = total(bins) else { return (design.y.clone(), 0.0) };
+        let beta = sum.solve(self.ridge);
+        let load = |row: usize| {
+            let of = |(column, beta): (&usize, &f64)| design.x[(row, *column)] * beta;
+            let is_within = within[row / design.rows.width];
+            if is_within { self.columns.iter().zip(beta.iter()).map(of).sum() } else { 0.0 }
+        };
+        (DVector::from_fn(design.y.len(), |row, _| design.y[row] - load(row)), sum.gain(self.ridge))
+    }
 }
 
 /// The median change of a feature from a bin to the next one of its trial where it crosses a value; 0 where none does.

@@ -204,7 +204,7 @@ fn borders(effect: &NamedEffect, name: &str, kind: &str) -> Vec<Vec<String>> {
             prose(&plain(&format!("acts {side} this {}", quantity.name()))),
             with_unit(0.5 * (low + high), quantity.unit()),
             interval([low, high], number),
-            "<div class=\"text\">no band</div>".into(),
+            prose("no band"),
             percent(effect.share_of_gap),
         ]
     };

@@ -152,13 +152,14 @@ pub fn run(
         let Some(next) = next else {
             found.heed(&weighed, |set| names(set) != refuted && !is_disproved(set));
             // a name that the held-out trials disprove leaves the question open
-            let is_open = match found.verdict {
+            let is_open = || match found.verdict {
                 Verdict::NoCandidateFits => true,
                 Verdict::Named => is_disproved(&found.members),
                 _ => false,
             };
-            let in_region = in_regions.iter().find(|gated| is_open && gated.may_be_named());
-            break (found, weighed, in_region.cloned());
+            let in_region = in_regions.iter().find(|gated| gated.may_be_named());
+            let in_region = in_region.filter(|_| is_open()).cloned();
+            break (found, weighed, in_region);
         };
         is_tried = true;
         members = next;

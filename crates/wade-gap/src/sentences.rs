@@ -175,11 +175,11 @@ pub(super) fn summary(report: &Report, gated: Option<&Gated>) -> String {
 
 fn verdict(report: &Report, gated: Option<&Gated>) -> String {
     let names = |effects: &[NamedEffect]| {
-        let of = |effect: &NamedEffect| match effect.region.is_everywhere() {
-            true => effect.name.replace('_', " "),
-            false => {
-                let place = locate::region_in_words(&effect.region);
-                format!("{} where {place}", effect.name.replace('_', " "))
+        let of = |effect: &NamedEffect| {
+            let name = effect.name.replace('_', " ");
+            match effect.region.is_everywhere() {
+                true => name,
+                false => format!("{name} where {}", locate::region_in_words(&effect.region)),
             }
         };
         effects.iter().map(of).collect::<Vec<_>>().join(" and ")

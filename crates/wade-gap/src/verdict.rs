@@ -41,8 +41,8 @@ const LIMITED: f64 = 0.1;
 /// Share of what lasts that named effects may leave: the law of an effect that is there leaves a few hundredths.
 const MUCH: f64 = 0.15;
 
-/// Probability from which a set that the search passed by is tried and an effect in a region is named, and that of `nothing` below which nothing is not what is said:
-/// nine to one, as the intervals of a report have it, and twenty to one.
+/// Probability from which a set that the search passed by is tried and an effect in a region is named, and that of `nothing` below
+/// which nothing is not what is said: nine to one, as the intervals of a report have it, and twenty to one.
 const LIKELY: f64 = 0.9;
 const UNLIKELY: f64 = 0.05;
 
@@ -111,8 +111,7 @@ impl Found {
         });
         let missing = !members.is_empty() || is_structured(judge, gap_structure);
         // what one effect explains in a region, a sum of others can imitate everywhere; never the other way round, since a limit
-        // takes from an effect
-        // of what acts in a region nothing is taken any more
+        // takes from an effect, and what acts in a region has its limits
         let is_limited = members.iter().any(|m| !design.candidates[m.candidate].region.is_everywhere());
         let mut gated = if missing && !is_limited { gated(judge, library) } else { Vec::new() };
         gated.retain(|gated| gated.share > coverage + WORTH);

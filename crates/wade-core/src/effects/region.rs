@@ -36,7 +36,8 @@ impl RegionQuantity {
                 condition.velocity.norm() / (GRAVITY * condition.depth.max(LEAST_DEPTH)).sqrt()
             }
             Self::Speed => condition.velocity.norm(),
-            Self::Pitch => (-condition.up.x).asin(),
+            // a unit vector may be longer than 1 by its rounding
+            Self::Pitch => (-condition.up.x).clamp(-1.0, 1.0).asin(),
         }
     }
 
@@ -139,6 +140,9 @@ mod tests {
         assert!((of(RegionQuantity::FroudeDepth, &state(0.2, 2.0)) - 1.4281).abs() < 1e-3);
         let nose_down = Condition { up: up_from_roll_pitch(0.1, 0.3), ..state(0.2, 2.0) };
         assert!((of(RegionQuantity::Pitch, &nose_down) - 0.3).abs() < 1e-12);
+        let over = nalgebra::UnitVector3::new_unchecked(Vec3::new(-1.0 - f64::EPSILON, 0.0, 0.0));
+        let upright = Condition { up: over, ..state(0.2, 2.0) };
+        assert!((of(RegionQuantity::Pitch, &upright) - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         for quantity in RegionQuantity::ALL {
             assert_eq!(RegionQuantity::from_name(quantity.name()), Some(quantity));
         }
