@@ -18,8 +18,8 @@ use common::{Row, Subject, Table};
 use wade_core::bundle;
 use wade_core::condition::Condition;
 use wade_core::effects::{
-    ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectsFile, EffectsSession,
-    Elsewhere, Evidence, Kind, ParameterValue, Shape, Validity,
+    ActiveEffect, ActiveEffects, Answer, Circumstances, Effect, EffectLoads, EffectRegion, EffectsFile,
+    EffectsSession, Elsewhere, Evidence, Kind, ParameterValue, Shape, Validity,
 };
 use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, WaterPlane, up_from_roll_pitch};
@@ -198,6 +198,7 @@ fn every_effect(vehicle: &str) -> EffectsFile {
             shape,
             base_drag: [1.0; 3],
             channel_width: Some(4.0),
+            region: EffectRegion::default(),
             coefficients: coefficients.clone().map(|c| c.name.to_owned()).collect(),
             covariance: Vec::new(),
             parameters: coefficients.map(|c| parameter(c.name, 0.1, c.unit)).collect(),
