@@ -116,10 +116,6 @@ pub(super) fn compose(
     library: &[Effect],
 ) -> Report {
     let (design, all, setting, config) = (judge.design, judge.all, judge.setting, judge.config);
-    let size = detect::sizes(all.iter(), judge.floors, &design.error, setting, config);
-    if found.verdict == Verdict::NothingMissing && size.values().any(|size| size.above_floor) {
-        found.verdict = Verdict::NoCandidateFits;
-    }
     // nothing that does not fit is applied or shown as if it did
     let fits = matches!(found.verdict, Verdict::Named | Verdict::Ambiguous);
     let members = if fits { found.members.as_slice() } else { &[] };
@@ -134,9 +130,12 @@ pub(super) fn compose(
     };
     let disproof = disproof.filter(|disproof| fits && is_for_all(disproof));
     if disproof.is_some() {
-        found.verdict = Verdict::NoCandidateFits;
-        found.left = found.of_gap.clone();
+        found.name_nothing(found.unfit);
         HeldOut { named, closures: held_out, .. } = HeldOut::of(judge, &[], &held);
+    }
+    let size = detect::sizes(all.iter(), judge.floors, &design.error, setting, config);
+    if found.verdict == Verdict::NothingMissing && size.values().any(|size| size.above_floor) {
+        found.verdict = Verdict::NoCandidateFits;
     }
     let holds = fits && disproof.is_none();
     let effects = match &fitted {

@@ -53,11 +53,6 @@ impl RowNoise {
         f64::from(u8::from(self.model))
     }
 
-    /// True where the noise is that of a motion, which is louder in a maneuver.
-    pub fn is_colored(&self) -> bool {
-        self.color.iter().any(Option::is_some)
-    }
-
     /// Standard deviation of a bin of a trial.
     pub fn of_bin(&self, trial: usize, component: usize, bin: usize) -> f64 {
         self.bin[component].hypot(self.rough(trial, component).get(bin).copied().unwrap_or_default())

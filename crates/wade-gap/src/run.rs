@@ -154,6 +154,7 @@ pub fn run(
             // a name that the held-out trials disprove leaves the question open
             let is_open = || match found.verdict {
                 Verdict::NoCandidateFits => true,
+                Verdict::NothingMissing => found.unfit.is_some(),
                 Verdict::Named => is_disproved(&found.members),
                 _ => false,
             };

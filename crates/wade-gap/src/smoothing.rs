@@ -32,15 +32,6 @@ pub(super) fn samples_of_bin(series: &Series) -> usize {
     (series.bin_step() / mean_step(&series.t).max(1e-6)).round().max(1.0) as usize
 }
 
-/// Share that the variance of a mean of some samples of white noise keeps after two running means.
-pub(super) fn white_kept(half: usize, samples: usize) -> f64 {
-    let mut weights = vec![0.0; samples + 8 * half];
-    weights[4 * half..4 * half + samples].fill(1.0);
-    running_mean(&mut weights, half);
-    running_mean(&mut weights, half);
-    weights.iter().map(|weight| weight * weight).sum::<f64>() / samples as f64
-}
-
 /// Means of bins of some values that were smoothed by two running means within each stretch without a hole.
 pub(super) fn bins(series: &Series, length: f64, value: impl Fn(usize) -> f64) -> Vec<f64> {
     if length == 0.0 {
@@ -101,22 +92,6 @@ mod tests {
         running_mean(&mut pulse, 5);
         running_mean(&mut pulse, 5);
         assert!((pulse.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn bins_of_white_noise_keep_the_share_of_their_variance_that_is_said() {
-        let mut random = wade_learn::random::Random::new(5);
-        let white: Vec<f64> = (0..200_000).map(|_| 12_f64.sqrt() * (random.unit() - 0.5)).collect();
-        for (half, samples) in [(0, 11), (5, 11), (22, 11), (2, 1)] {
-            let mut values = white.clone();
-            running_mean(&mut values, half);
-            running_mean(&mut values, half);
-            let bins = values.chunks_exact(samples).map(|bin| bin.iter().sum::<f64>() / samples as f64);
-            let squares: Vec<f64> = bins.map(|mean| mean * mean).collect();
-            let kept = squares.iter().sum::<f64>() / squares.len() as f64 * samples as f64;
-            let said = white_kept(half, samples);
-            assert!((kept / said - 1.0).abs() < 0.04, "{half} {samples}: {kept} {said}");
-        }
     }
 
     #[test]

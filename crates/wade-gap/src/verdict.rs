@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::design::Design;
 use super::detect::sizes;
 use super::explanations::{NOTHING, OUTSIDE_LIBRARY, Weighed, more_probable_than_not, probability_of_all};
-use super::features::{energy, without_zeros};
+use super::features::without_zeros;
 use super::gated::{Gated, WORTH, gated};
 use super::general::{General, Structure};
 use super::judge::{Judge, Member};
@@ -16,21 +16,13 @@ use wade_core::effects::Effect;
 
 /// Deviates that structure without a name needs.
 pub(super) const STRUCTURE: f64 = 5.0;
-/// Deviates that energy without a phase needs; with a score a trial it cannot exceed the root of their number, so that
-/// few trials need this share of the root.
-const ENERGY: [f64; 2] = [4.5, 0.8];
-
 /// Deviates in one trial that what lasts needs: one of a hundred trials with noise alone reaches 3.5, and products of
 /// normal numbers have heavier tails than they.
 const LASTS: f64 = 7.0;
 /// What lasts beyond the zero of its trial and is clearly larger than the noise itself needs no more than what one of a hundred
 /// trials reaches by chance: noise that hangs together is no larger than all of the noise. Deviates, and root mean square
 /// in noises of a bin.
-const LOUD: [f64; 2] = [3.5, 1.2];
-/// Noises of a bin beyond which what lasts in all trials together is no noise that hangs together: one that has forgotten itself
-/// after half a second reaches 2.
-const HUGE: f64 = 4.0;
-
+const LARGE: [f64; 2] = [3.5, 1.2];
 /// Least share of the structure that must be explained where a fault of the sensor is named. Laws of the water hold in
 /// outline; a zero, a gain or a turned axis is exact, and where one leaves more it stands in for another thing.
 const EXACT: f64 = 0.9;
@@ -62,8 +54,11 @@ pub(super) struct Found {
     /// What the gap has without a name before anything is taken out.
     pub of_gap: Structure,
     pub loss: f64,
-    /// Whether what the state predicts of the gap is large enough to matter.
-    is_relevant: bool,
+    /// Whether what the evidence holds for missing can matter: what the state predicts of the gap is large enough, or the model
+    /// states an error of which functions of the state see as much as of an effect.
+    matters: bool,
+    /// Whether the gap has structure, whatever explains it.
+    is_structured: bool,
     /// Why members that pass every gate are not named.
     pub unfit: Option<Unfit>,
 }
@@ -109,7 +104,8 @@ impl Found {
             let candidate = &design.candidates[member.candidate];
             is_too_short(&candidate.shape, judge.setting)
         });
-        let missing = !members.is_empty() || is_structured(judge, gap_structure);
+        let is_structured = is_structured(judge, gap_structure);
+        let missing = !members.is_empty() || is_structured;
         // what one effect explains in a region, a sum of others can imitate everywhere; never the other way round, since a limit
         // takes from an effect, and what acts in a region has its limits
         let is_limited = members.iter().any(|m| !design.candidates[m.candidate].region.is_everywhere());
@@ -152,7 +148,8 @@ impl Found {
             left,
             of_gap,
             loss,
-            is_relevant: is_relevant(judge, gap_structure),
+            matters: is_relevant(judge, gap_structure) || design.noise.model,
+            is_structured,
             unfit,
         }
     }
@@ -173,9 +170,7 @@ impl Found {
     pub fn set_to_name(&self, judge: &Judge, weighed: &[Weighed]) -> Option<Vec<Member>> {
         let likely = more_probable_than_not(weighed);
         let is_named = matches!(self.verdict, Verdict::Named | Verdict::Ambiguous);
-        // functions of the state see as much of an error that the model states as of an effect
-        let matters = self.is_relevant || judge.design.noise.model;
-        let is_likely = matters && probability_of_all(&likely, weighed) >= LIKELY;
+        let is_likely = self.matters && probability_of_all(&likely, weighed) >= LIKELY;
         // of several that stand beside each other the first is the one that is far more probable than the others
         let stands_beside =
             !is_likely && self.alternatives.iter().any(|set| judge.sorted_names(set) == likely);
@@ -198,10 +193,12 @@ impl Found {
             explanations.filter(|e| e.effects == [name]).map(|e| e.probability).sum::<f64>()
         };
         let (outside, nothing) = (probability(OUTSIDE_LIBRARY), probability(NOTHING));
-        let is_outside = self.verdict == Verdict::Ambiguous && outside > 0.5;
-        let is_something = self.is_relevant && nothing < UNLIKELY;
-        if is_outside || self.verdict == Verdict::NothingMissing && is_something {
-            return self.name_nothing(is_outside.then_some(Unfit::Unlikely(outside)));
+        self.is_structured |= self.matters && nothing < UNLIKELY;
+        if matches!(self.verdict, Verdict::NothingMissing | Verdict::NoCandidateFits) {
+            return self.name_nothing(self.unfit);
+        }
+        if self.verdict == Verdict::Ambiguous && outside > 0.5 {
+            return self.name_nothing(Some(Unfit::Unlikely(outside)));
         }
         if self.verdict == Verdict::Named && nothing >= UNLIKELY {
             return self.name_nothing(Some(Unfit::Doubtful(nothing)));
@@ -229,9 +226,9 @@ impl Found {
         }
     }
 
-    /// Leaves the gap as it is.
-    fn name_nothing(&mut self, unfit: Option<Unfit>) {
-        self.verdict = Verdict::NoCandidateFits;
+    /// Leaves the gap as it is: what was searched for does not make structure of noise.
+    pub fn name_nothing(&mut self, unfit: Option<Unfit>) {
+        self.verdict = if self.is_structured { Verdict::NoCandidateFits } else { Verdict::NothingMissing };
         self.alternatives.clear();
         self.unfit = unfit;
         self.left = self.of_gap.clone();
@@ -282,10 +279,6 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     let [size, least] = size_and_least(judge, structure);
     // what lasts and is no larger than the rough part of what the model says is none
     let lasts = least.max(design.noise.stated());
-    // a force that comes and goes with no phase of its own shows in its energy alone
-    let unsmoothed = design.unsmoothed(all, setting, &|trial| all[trial].gap.clone());
-    let (deviate, energy) = energy(all, design, &unsmoothed);
-    let bar = f64::min(ENERGY[0], ENERGY[1] * (design.trials.len() as f64).sqrt());
     let kept = lasting(design, &design.y);
     let moving = lasting(design, &without_zeros(design, &design.y));
     // a load that was computed has no noise that hangs together and could pass for a gap
@@ -295,10 +288,9 @@ fn is_structured(judge: &Judge, structure: &Structure) -> bool {
     };
     setting.computed && above()
         || structure.deviate > STRUCTURE && size > least
-        || !design.noise.is_colored() && deviate > bar && energy > 2.0 * lasts.max(0.5)
         || kept.most.deviate > LASTS && kept.most.rms > lasts
-        || moving.most.deviate > LOUD[0] && moving.most.rms > LOUD[1].max(lasts)
-        || moving.together.deviate > LOUD[0] && moving.together.rms > HUGE.max(least)
+        || moving.most.deviate > LARGE[0] && moving.most.rms > LARGE[1].max(lasts)
+        || moving.together.deviate > LASTS && moving.together.rms > lasts
 }
 
 /// Loss that nothing explains: the whole library at once, or the general model, whichever leaves less.

@@ -89,8 +89,7 @@ impl Law for ChannelBlockage {
         let Some(more) = self.excess(input) else { return };
         let (velocity, immersion) = (input.condition.velocity, input.immersion);
         if self.is_in_proportion() {
-            let drag = input.predicted_drag() * more;
-            return emit(0, Part::Hull, input.at(drag, &immersion.center_of_buoyancy));
+            return emit(0, Part::Hull, input.predicted_drag() * more);
         }
         let pressure = input.half_density() * velocity.norm() * more;
         for (index, panel) in input.body.panels.iter().enumerate() {

@@ -5,7 +5,7 @@
 //! 2014; FEMA P-646 takes 2.0). Valid while the flow is subcritical; the local velocity of a turning hull is `rotation`.
 //! [`DragLaw`] has other forms: `|v_i| v_i`, and the model's own drag `D` in proportion, `F_i = C_i / K_i D_i` with its
 //! coefficients `K`, whatever law it follows: what the model answers less what it answers at rest. Where it cannot be asked,
-//! `D` is the part of its force across gravity.
+//! `D` is the part of its force across gravity with its moment beyond that of still water.
 
 use super::input::{Elsewhere, Input, Memory, Part};
 use super::law::{Law, Numbers, ShapeFault, form, unused};
@@ -104,23 +104,53 @@ impl Law for DragCoefficientError {
 }
 
 fn of_the_model(input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-    let drag = match input.elsewhere {
+    let Wrench { force, moment } = match input.elsewhere {
         // what the motion makes of the load, along the body's axes as in the other forms
-        Some(change) => change.force * -1.0,
+        Some(change) => change * -1.0,
         None => input.predicted_drag(),
     };
-    let center = input.immersion.center_of_buoyancy;
     for axis in (0..2).filter(|&axis| input.base_drag[axis] > 1e-3) {
-        let force = Vec3::ith(axis, drag[axis]);
-        let load = match input.elsewhere {
-            Some(Wrench { moment, .. }) => {
-                // a force along x turns about y, one along y about x and z
-                let moment =
-                    if axis == 0 { Vec3::y() * -moment.y } else { Vec3::new(-moment.x, 0.0, -moment.z) };
-                Wrench { force, moment }
-            }
-            None => input.at(force, &center),
-        };
+        // a force along x turns about y, one along y about x and z
+        let moment = if axis == 0 { Vec3::y() * moment.y } else { Vec3::new(moment.x, 0.0, moment.z) };
+        let load = Wrench { force: Vec3::ith(axis, force[axis]), moment };
         emit(axis, Part::Hull, load * input.base_drag[axis].recip());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::effects::{Body, Immersion};
+    use crate::frame::GRAVITY;
+    use crate::vehicle::shipped;
+
+    #[test]
+    fn a_model_that_cannot_be_asked_at_rest_has_the_drag_that_it_has_beyond_archimedes() {
+        let body = Body::of_vehicle(&shipped::husky().unwrap().vehicle().unwrap());
+        let condition = Condition::level(Vec3::new(0.9, -0.3, 0.0), 0.17);
+        let mut immersion = Immersion::default();
+        body.immerse(&condition, &mut immersion);
+        let drag = Wrench { force: Vec3::new(-40.0, 25.0, 0.0), moment: Vec3::new(2.0, -7.0, 11.0) };
+        let lift = Vec3::z() * (condition.density * GRAVITY * immersion.volume);
+        let still = Wrench::from_force_at(lift, &immersion.center_of_buoyancy, &body.center_of_mass);
+        let alone = Input {
+            predicted: drag + still,
+            base_drag: Vec3::new(1.2, 1.6, 1.0),
+            ..Input::of_motion(&body, &condition, &immersion)
+        };
+        let asked = Input { elsewhere: Some(drag * -1.0), ..alone };
+        let law = DragCoefficientError { law: DragLaw::Proportional };
+        let [alone, asked] = [alone, asked].map(|input| {
+            let mut found = [Wrench::default(); 3];
+            law.basis(&Memory::default(), &input, &mut |axis, _, load| found[axis] += load);
+            found
+        });
+        for (alone, asked) in alone.iter().zip(&asked) {
+            let off = *alone + *asked * -1.0;
+            assert!(off.force.norm() < 1e-9 && off.moment.norm() < 1e-9, "{off:?}");
+        }
+        // along y with the whole moment about up
+        assert!((asked[1].moment.z - 11.0 / 1.6).abs() < 1e-9);
     }
 }

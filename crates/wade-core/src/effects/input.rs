@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::immersion::Immersion;
 use crate::condition::Condition;
-use crate::frame::Vec3;
+use crate::frame::{GRAVITY, Vec3};
 use crate::vehicle::PerWheel;
 use crate::wrench::Wrench;
 
@@ -82,10 +82,16 @@ impl Input<'_> {
         Wrench::from_force_at(force, point, &self.body.center_of_mass)
     }
 
-    /// The model's own force across gravity [N], which is its drag.
-    pub(super) fn predicted_drag(&self) -> Vec3 {
+    /// The load of still water on the wet hull, `rho g V` up at the center of buoyancy (Archimedes).
+    pub(super) fn buoyancy(&self) -> Wrench {
+        let weight = self.condition.density * GRAVITY * self.immersion.volume;
+        self.at(self.condition.up.into_inner() * weight, &self.immersion.center_of_buoyancy)
+    }
+
+    /// The model's own drag: its force across gravity, and its moment beyond that of still water.
+    pub(super) fn predicted_drag(&self) -> Wrench {
         let (force, up) = (self.predicted.force, self.condition.up.into_inner());
-        force - up * force.dot(&up)
+        Wrench { force: force - up * force.dot(&up), moment: self.predicted.moment - self.buoyancy().moment }
     }
 
     /// Coefficients on windward wet areas with which the hull carries the model's own drag in this state [-]: those stated,
@@ -101,7 +107,7 @@ impl Input<'_> {
         for (panel, wet) in self.body.panels.iter().zip(&self.immersion.panels) {
             area += panel.windward(&velocity) * wet.fraction;
         }
-        let drag = self.predicted_drag();
+        let drag = self.predicted_drag().force;
         Vec3::from_fn(|axis, _| {
             let k = self.base_drag[axis];
             let per_square = self.half_density() * k * area[axis];
