@@ -136,8 +136,9 @@ pub fn run(
         let names = |set: &[Member]| judge.sorted_names(set);
         let next = match searched.take() {
             Some((searched, verdict)) => {
-                // as open as what was searched for, or not at all
-                let is_open = if for_its_weight { Verdict::Ambiguous } else { verdict };
+                // as open as what was searched for, or not at all, unless that cannot be
+                let is_free = for_its_weight || is_disproved(&searched);
+                let is_open = if is_free { Verdict::Ambiguous } else { verdict };
                 let is_named = found.verdict == Verdict::Named || found.verdict == is_open;
                 let is_whole = is_named && names(&members) == names(&asked);
                 if is_disproved(&members) {

@@ -222,7 +222,12 @@ fn verdict(report: &Report, gated: Option<&Gated>) -> String {
                 .join(", or "),
         ),
         Verdict::NoCandidateFits => {
-            "The gap has structure that no effect of the library explains; nothing is applied.".into()
+            let of = |name: &str| report.explanations.iter().find(|e| e.effects == [name]);
+            match of(OUTSIDE_LIBRARY).is_some_and(|outside| outside.probability > 0.5) {
+                true => "The gap has structure that no effect of the library explains; nothing is applied.",
+                false => "The gap is more than noise, and no explanation of it passes every check; nothing is applied.",
+            }
+            .into()
         }
     }
 }
