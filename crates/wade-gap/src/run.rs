@@ -136,10 +136,14 @@ pub fn run(
         let names = |set: &[Member]| judge.sorted_names(set);
         let next = match searched.take() {
             Some((searched, verdict)) => {
-                // as open as what was searched for, or not at all, unless that cannot be
-                let is_free = for_its_weight || is_disproved(&searched);
-                let is_open = if is_free { Verdict::Ambiguous } else { verdict };
-                let is_named = found.verdict == Verdict::Named || found.verdict == is_open;
+                // no more open than what was searched for, unless that cannot be
+                let may_be_open =
+                    || for_its_weight || verdict == Verdict::Ambiguous || is_disproved(&searched);
+                let is_named = match found.verdict {
+                    Verdict::Named => true,
+                    Verdict::Ambiguous => may_be_open(),
+                    _ => false,
+                };
                 let is_whole = is_named && names(&members) == names(&asked);
                 if is_disproved(&members) {
                     refuted = names(&asked);

@@ -222,8 +222,8 @@ fn verdict(report: &Report, gated: Option<&Gated>) -> String {
                 .join(", or "),
         ),
         Verdict::NoCandidateFits => {
-            let of = |name: &str| report.explanations.iter().find(|e| e.effects == [name]);
-            match of(OUTSIDE_LIBRARY).is_some_and(|outside| outside.probability > 0.5) {
+            let is_outside = |e: &Explanation| e.effects == [OUTSIDE_LIBRARY] && e.probability > 0.5;
+            match report.explanations.iter().any(is_outside) {
                 true => "The gap has structure that no effect of the library explains; nothing is applied.",
                 false => "The gap is more than noise, and no explanation of it passes every check; nothing is applied.",
             }

@@ -16,6 +16,7 @@ use wade_core::effects::Effect;
 
 /// Deviates that structure without a name needs.
 pub(super) const STRUCTURE: f64 = 5.0;
+
 /// Deviates in one trial that what lasts needs: one of a hundred trials with noise alone reaches 3.5, and products of
 /// normal numbers have heavier tails than they.
 const LASTS: f64 = 7.0;
@@ -23,6 +24,7 @@ const LASTS: f64 = 7.0;
 /// trials reaches by chance: noise that hangs together is no larger than all of the noise. Deviates, and root mean square
 /// in noises of a bin.
 const LARGE: [f64; 2] = [3.5, 1.2];
+
 /// Least share of the structure that must be explained where a fault of the sensor is named. Laws of the water hold in
 /// outline; a zero, a gain or a turned axis is exact, and where one leaves more it stands in for another thing.
 const EXACT: f64 = 0.9;

@@ -96,5 +96,5 @@ fn area_of_drag(input: &Input) -> f64 {
     if speed < SLOWEST || input.base_drag.x < 1e-3 {
         return 0.0;
     }
-    input.predicted_drag().force.norm() / (input.half_density() * speed * speed * input.base_drag.x)
+    input.predicted_drag_force().norm() / (input.half_density() * speed * speed * input.base_drag.x)
 }

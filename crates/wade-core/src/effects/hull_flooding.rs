@@ -62,15 +62,15 @@ impl Law for HullFlooding {
     }
 
     fn basis(&self, memory: &Memory, input: &Input, emit: &mut impl FnMut(usize, Part, Wrench)) {
-        let (state, immersion) = (input.condition, input.immersion);
+        let immersion = input.immersion;
         if immersion.depth <= 1e-6 {
             return;
         }
         let share = (memory.inner_level / immersion.depth).min(1.0);
-        let weight = state.density * GRAVITY * immersion.volume * share;
-        let down = state.up.into_inner() * -weight;
-        emit(0, Part::Hull, input.at(down, &immersion.center_of_buoyancy));
-        emit(1, Part::Hull, Wrench { force: Vec3::zeros(), moment: Vec3::x().cross(&down) });
+        // the water inside takes its share of the lift
+        let weight = input.buoyancy() * -share;
+        emit(0, Part::Hull, weight);
+        emit(1, Part::Hull, Wrench { force: Vec3::zeros(), moment: Vec3::x().cross(&weight.force) });
     }
 }
 

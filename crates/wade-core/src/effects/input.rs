@@ -88,10 +88,16 @@ impl Input<'_> {
         self.at(self.condition.up.into_inner() * weight, &self.immersion.center_of_buoyancy)
     }
 
-    /// The model's own drag: its force across gravity, and its moment beyond that of still water.
-    pub(super) fn predicted_drag(&self) -> Wrench {
+    /// The model's own force across gravity [N], which is its drag.
+    pub(super) fn predicted_drag_force(&self) -> Vec3 {
         let (force, up) = (self.predicted.force, self.condition.up.into_inner());
-        Wrench { force: force - up * force.dot(&up), moment: self.predicted.moment - self.buoyancy().moment }
+        force - up * force.dot(&up)
+    }
+
+    /// The model's own drag with its moment, which is what the model has beyond still water.
+    pub(super) fn predicted_drag(&self) -> Wrench {
+        let moment = self.predicted.moment - self.buoyancy().moment;
+        Wrench { force: self.predicted_drag_force(), moment }
     }
 
     /// Coefficients on windward wet areas with which the hull carries the model's own drag in this state [-]: those stated,
@@ -107,7 +113,7 @@ impl Input<'_> {
         for (panel, wet) in self.body.panels.iter().zip(&self.immersion.panels) {
             area += panel.windward(&velocity) * wet.fraction;
         }
-        let drag = self.predicted_drag().force;
+        let drag = self.predicted_drag_force();
         Vec3::from_fn(|axis, _| {
             let k = self.base_drag[axis];
             let per_square = self.half_density() * k * area[axis];
