@@ -201,11 +201,13 @@ fn same_run(first: &Sample, sample: &Sample) -> Result<(), Flaw> {
     Ok(())
 }
 
-fn ranges(sample: &Sample) -> [(&'static str, f64, f64, &'static str); 4] {
+fn ranges(sample: &Sample) -> [(&'static str, f64, f64, &'static str); 5] {
     [
         ("start", sample.start_s, f64::MIN, "finite"),
         ("end", sample.end_s, sample.start_s, "at or after the start"),
-        ("depth", sample.condition.depth, 0.0, "0 or more"),
+        // below zero where a tilted hull is wet only lower down than its origin
+        ("depth", sample.condition.depth, f64::MIN, "finite"),
+        ("bed clearance", sample.condition.bed_clearance.unwrap_or(0.0), 0.0, "0 or more"),
         ("density", sample.condition.density, f64::MIN_POSITIVE, "positive"),
     ]
 }

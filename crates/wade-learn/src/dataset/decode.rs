@@ -97,6 +97,7 @@ impl Partial {
             density: number(&schema::DENSITY)?,
             up: UnitVector3::new_unchecked(vector(&schema::UP)?),
             ground_contact,
+            bed_clearance: table.clearance(row)?,
             ..Condition::level(velocity, number(&schema::DEPTH)?)
         };
         let sample = Sample {
@@ -149,6 +150,10 @@ impl Partial {
             if table.number(column.name, row)? != (column.of)(sample) {
                 return differs(column.name);
             }
+        }
+        let clearance = &schema::BED_CLEARANCE;
+        if table.clearance(row)? != (clearance.of)(sample) {
+            return differs(clearance.name);
         }
         for column in &STATES {
             let expected = (column.of)(sample);

@@ -12,8 +12,8 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 
-use super::file::{FORMAT, FORMAT_KEY, Fault, META_KEY};
-use super::schema::{self, LOADS, SCALARS, SECTION, STATES, SURFACE, TEXTS};
+use super::file::{FORMAT, FORMAT_KEY, Fault, META_KEY, WITHOUT_CLEARANCE};
+use super::schema::{self, BED_CLEARANCE, LOADS, SCALARS, SECTION, STATES, SURFACE, TEXTS};
 use super::{Dataset, Sample, SurfaceLoad};
 
 /// Not the version of the program: the same data has the same bytes, and so the digest that provenances of weights state,
@@ -37,9 +37,12 @@ pub(super) enum Loads {
 
 /// Writes the whole file; the data set has been checked.
 pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset, loads: Loads) -> Result<(), Fault> {
-    let units: BTreeMap<_, _> = schema::units().collect();
+    let clearance = schema::has_clearance(dataset).then_some(BED_CLEARANCE);
+    let added = clearance.iter().map(|column| (column.name, column.unit));
+    let units: BTreeMap<_, _> = schema::units().chain(added).collect();
+    let format = if clearance.is_some() { FORMAT } else { WITHOUT_CLEARANCE };
     let pairs = [
-        (FORMAT_KEY, FORMAT.to_string()),
+        (FORMAT_KEY, format.to_string()),
         (META_KEY, serde_json::to_string(&dataset.meta)?),
         (UNITS_KEY, serde_json::to_string(&units)?),
         (FRAME_KEY, FRAME.to_owned()),
@@ -56,7 +59,7 @@ pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset, loads: Loa
             .set_column_encoding(name.into(), Encoding::BYTE_STREAM_SPLIT);
     }
     let properties = Arc::new(properties.build());
-    let mut writer = SerializedFileWriter::new(to, Arc::new(message()?), properties)?;
+    let mut writer = SerializedFileWriter::new(to, Arc::new(message(clearance.is_some())?), properties)?;
     let mut group = writer.next_row_group()?;
     let text = |text: &str| ByteArray::from(text.as_bytes().to_vec());
     for column in &TEXTS {
@@ -85,6 +88,12 @@ pub(super) fn encode(to: &mut (impl Write + Send), dataset: &Dataset, loads: Loa
             put::<FloatType>(&mut group, &values.collect::<Vec<_>>(), column.nullable.then_some(&there))?;
         }
     }
+    if let Some(column) = clearance {
+        let there: Vec<_> =
+            rows(dataset).map(|(sample, ..)| i16::from((column.of)(sample).is_some())).collect();
+        let values: Vec<_> = rows(dataset).filter_map(|(sample, ..)| (column.of)(sample)).collect();
+        put::<DoubleType>(&mut group, &values, Some(&there))?;
+    }
     group.close()?;
     writer.close()?;
     Ok(())
@@ -111,7 +120,7 @@ fn put<T: DataType>(
 }
 
 /// The schema of the file, in Parquet's own notation.
-fn message() -> Result<parquet::schema::types::Type, ParquetError> {
+fn message(with_clearance: bool) -> Result<parquet::schema::types::Type, ParquetError> {
     let mut text = "message wade {".to_owned();
     let mut add = |kind: &str, name: &str, suffix: &str| {
         text.push_str(&format!(" {kind} {name}{suffix};"));
@@ -124,6 +133,9 @@ fn message() -> Result<parquet::schema::types::Type, ParquetError> {
     for column in &LOADS {
         let kind = if column.nullable { "optional float" } else { "required float" };
         column.names.into_iter().for_each(|name| add(kind, name, ""));
+    }
+    if with_clearance {
+        add("optional double", BED_CLEARANCE.name, "");
     }
     parse_message_type(&(text + " }"))
 }

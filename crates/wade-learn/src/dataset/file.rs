@@ -15,8 +15,11 @@ use super::pages;
 use super::{Dataset, Flaw, Image};
 use crate::files::StagedFile;
 
-/// Format of the files that this program writes, and the newest that it reads.
-pub const FORMAT: u32 = 1;
+/// Newest format of the files that this program reads and writes: with a column for the clearance over the bed.
+pub const FORMAT: u32 = 2;
+
+/// Format of a file without it, which the same data keep, and with it their bytes.
+pub(super) const WITHOUT_CLEARANCE: u32 = 1;
 
 pub(super) const FORMAT_KEY: &str = "wade.format";
 pub(super) const META_KEY: &str = "wade.meta";

@@ -1,6 +1,6 @@
 //! The columns of the file: names, units, and which value each holds. A row is one surface of one sample.
 
-use super::{Sample, SurfaceLoad};
+use super::{Dataset, Sample, SurfaceLoad};
 use wade_core::condition::GroundContact;
 use wade_core::frame::Vec3;
 
@@ -37,6 +37,21 @@ pub(super) const DEPTH: Scalar = Scalar { name: "depth_m", unit: "m", of: |s| s.
 pub(super) const DENSITY: Scalar =
     Scalar { name: "density_kgpm3", unit: "kg/m3", of: |s| s.condition.density };
 pub(super) const SCALARS: [Scalar; 4] = [START, END, DEPTH, DENSITY];
+
+/// A column of double precision that a file has where a sample has a value, with nulls where others have none.
+pub(super) struct OptionalScalar {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub of: fn(&Sample) -> Option<f64>,
+}
+
+pub(super) const BED_CLEARANCE: OptionalScalar =
+    OptionalScalar { name: "bed_clearance_m", unit: "m", of: |s| s.condition.bed_clearance };
+
+/// True of a data set whose file has the column.
+pub(super) fn has_clearance(dataset: &Dataset) -> bool {
+    dataset.samples.iter().any(|sample| (BED_CLEARANCE.of)(sample).is_some())
+}
 
 /// Three columns of double precision.
 pub(super) struct State {
@@ -113,7 +128,7 @@ pub(super) fn contact_from_name(name: &str) -> Option<GroundContact> {
     [GroundContact::Wetted, GroundContact::Dry].into_iter().find(|contact| contact_name(*contact) == name)
 }
 
-/// Every number with its unit, for the file's meta data.
+/// Every number that all files have, with its unit.
 pub(super) fn units() -> impl Iterator<Item = (&'static str, &'static str)> {
     let scalars = SCALARS.into_iter().map(|c| (c.name, c.unit));
     let states = STATES.into_iter().flat_map(|c| c.names.map(|name| (name, c.unit)));

@@ -31,7 +31,12 @@ impl Table {
         let mut columns = HashMap::new();
         for column in names() {
             let index = descriptor.columns().iter().position(|c| c.path().string() == column);
-            let index = index.ok_or(Fault::MissingColumn { column })?;
+            let Some(index) = index else {
+                if column == schema::BED_CLEARANCE.name {
+                    continue;
+                }
+                return Err(Fault::MissingColumn { column });
+            };
             let mut values =
                 if is_text(column) { Column::Text(Vec::new()) } else { Column::Number(Vec::new()) };
             for group in 0..reader.num_row_groups() {
@@ -68,6 +73,14 @@ impl Table {
         }
     }
 
+    /// The clearance over the bed in a row; none where the file has no such column.
+    pub(super) fn clearance(&self, row: usize) -> Result<Option<f64>, Fault> {
+        match self.optional(schema::BED_CLEARANCE.name, row) {
+            Err(Fault::MissingColumn { .. }) => Ok(None),
+            found => found,
+        }
+    }
+
     /// The number in a row; a null is refused.
     pub(super) fn number(&self, column: &'static str, row: usize) -> Result<f64, Fault> {
         self.optional(column, row)?.ok_or(Fault::Null { column, row })
@@ -80,7 +93,8 @@ fn is_text(column: &str) -> bool {
 
 fn names() -> impl Iterator<Item = &'static str> {
     let texts = schema::TEXTS.into_iter().map(|text| text.name);
-    texts.chain([schema::SURFACE, schema::SECTION]).chain(schema::units().map(|(name, _)| name))
+    let numbers = schema::units().map(|(name, _)| name);
+    texts.chain([schema::SURFACE, schema::SECTION]).chain(numbers).chain([schema::BED_CLEARANCE.name])
 }
 
 impl Column {

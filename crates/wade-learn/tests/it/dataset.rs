@@ -95,6 +95,26 @@ fn a_data_set_is_read_as_it_was_written() {
 }
 
 #[test]
+fn a_tilted_hull_over_a_far_bed_is_read_as_it_was_written_and_the_others_keep_their_bytes() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("data.parquet");
+    let format = |path: &PathBuf| {
+        let bytes = fs::read(path).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        let at = text.rfind("wade.format").unwrap();
+        (text.contains("bed_clearance_m"), text[at..].chars().find(char::is_ascii_digit).unwrap())
+    };
+    let mut data = data(2);
+    dataset::write(&path, &data).unwrap();
+    assert_eq!(format(&path), (false, '1'));
+    data.samples[1].condition.depth = -0.02;
+    data.samples[1].condition.bed_clearance = Some(0.3);
+    dataset::write(&path, &data).unwrap();
+    assert_eq!(format(&path), (true, '2'));
+    assert_eq!(dataset::read(&path).unwrap(), rounded(data));
+}
+
+#[test]
 fn nothing_is_written_for_a_bad_data_set_and_what_was_there_stays() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("data.parquet");
@@ -120,6 +140,8 @@ fn nothing_is_written_for_a_bad_data_set_and_what_was_there_stays() {
     assert!(matches!(&flaw, Flaw::Number { quantity, .. } if quantity == "velocity"), "{flaw}");
     let flaw = spoilt(&|data| data.samples[1].condition.density = 0.0);
     assert!(matches!(&flaw, Flaw::Number { quantity, .. } if quantity == "density"), "{flaw}");
+    let flaw = spoilt(&|data| data.samples[1].condition.bed_clearance = Some(-0.1));
+    assert!(matches!(&flaw, Flaw::Number { quantity, .. } if quantity == "bed clearance"), "{flaw}");
     assert!(matches!(spoilt(&|data| data.samples.clear()), Flaw::Empty));
     let flaw = spoilt(&|data| _ = data.samples[0].surfaces.pop());
     assert!(matches!(flaw, Flaw::SurfaceCount { found: 12, expected: 13, .. }), "{flaw}");
@@ -195,7 +217,7 @@ fn a_bad_file_is_refused_with_its_column_and_row() {
         ("missing-row", "case `husky-0001`, section 0, image original: there is no row for surface `right`"),
         ("text-for-number", "column vx_mps is BYTE_ARRAY, which is not a number"),
         ("unknown-image", "column image, row 3: `rotated` is not original, left_right, front_rear or both"),
-        ("newer", "format 2 is newer than 1, the newest that this program reads: update wade"),
+        ("newer", "format 3 is newer than 2, the newest that this program reads: update wade"),
         ("no-meta", "no key `wade.format`"),
     ] {
         let error = dataset::read(&by_pandas(name)).unwrap_err().to_string();
