@@ -32,11 +32,48 @@ use crate::real::{Real, norm};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
-/// What the network's answer is a remainder of: weights that were trained with another base are refused.
-pub const BASE: &str = "archimedes + windward drag of the soaked part, force and moment";
+/// What the network's answer is a remainder of, and with it what it is told of a state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Remainder {
+    /// Archimedes and the simple drag of this module: level or nearly so, the wheels on the bed.
+    OfDrag,
+    /// The physical base ([`crate::physics`]) without waves: any attitude, any height over the bed.
+    OfPhysics,
+}
 
-/// Names of what is told of a state, in order.
-pub const GLOBAL_NAMES: [&str; 11] = [
+impl Remainder {
+    /// Name in the file of the weights: weights with another are refused.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OfDrag => "archimedes + windward drag of the soaked part, force and moment",
+            Self::OfPhysics => "physical base without waves, force and moment",
+        }
+    }
+
+    /// The remainder of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::OfDrag, Self::OfPhysics].into_iter().find(|remainder| remainder.name() == name)
+    }
+
+    /// Names of what its network is told of a state, in order.
+    pub fn global_names(self) -> &'static [&'static str] {
+        match self {
+            Self::OfDrag => &GLOBAL_NAMES[..GLOBAL - 2],
+            Self::OfPhysics => &GLOBAL_NAMES,
+        }
+    }
+
+    /// Coordinates that tell its states apart.
+    pub fn coordinates(self) -> usize {
+        match self {
+            Self::OfDrag => COORDINATES - 1,
+            Self::OfPhysics => COORDINATES,
+        }
+    }
+}
+
+/// Names of what is told of a state, in order; the last two to a remainder of the physical base alone.
+pub const GLOBAL_NAMES: [&str; 13] = [
     "froude_depth",
     "froude_length",
     "depth",
@@ -48,6 +85,8 @@ pub const GLOBAL_NAMES: [&str; 11] = [
     "up_y_squared",
     "width",
     "height",
+    "bed_clearance",
+    "lean_aside",
 ];
 
 /// Names of what is told of a surface in a state, in order.
@@ -83,7 +122,7 @@ pub const STATIC: usize = STATIC_NAMES.len();
 /// Number of answers for a surface.
 pub const OUTPUTS: usize = OUTPUT_NAMES.len();
 /// Coordinates of a state among the cases that were learnt from.
-pub const COORDINATES: usize = 8;
+pub const COORDINATES: usize = 9;
 
 /// Drag coefficient of a box in open-channel flow (Qi, Eames, Johnson, JFM 2014) [-].
 const CD0: f64 = 1.9;
@@ -93,6 +132,9 @@ const SHELTERING: f64 = 0.5;
 const RAMP: f64 = 0.02;
 /// Depth below which Froude numbers no longer grow [m].
 const LEAST_DEPTH: f64 = 1e-3;
+/// Clearance over the bed, in lengths, at which half of what the bed does is thought to be gone: the gap blocks the flow under
+/// the hull while it is a few times lower than the wheels are high.
+const CLEAR: f64 = 0.1;
 /// Reynolds number below which its logarithm is held.
 const LEAST_REYNOLDS: f64 = 1e3;
 
@@ -105,6 +147,7 @@ pub struct Anchor {
     bounds: Bounds,
     /// Depth up to which the coordinates of a state are told apart, the height of the hull [m].
     height: f64,
+    remainder: Remainder,
 }
 
 #[derive(Debug, Clone)]
@@ -277,8 +320,8 @@ impl SurfaceReading {
 }
 
 impl Anchor {
-    /// Prepares a vehicle.
-    pub fn new(vehicle: &Vehicle) -> Self {
+    /// Prepares a vehicle to be read for weights that answer such a remainder.
+    pub fn new(vehicle: &Vehicle, remainder: Remainder) -> Self {
         let count = vehicle.surfaces.len();
         let whole = vehicle.hull.mesh.bounds().unwrap_or(Bounds { min: Vec3::zeros(), max: Vec3::zeros() });
         let surface = |(index, surface): (usize, &crate::vehicle::Surface)| {
@@ -300,6 +343,7 @@ impl Anchor {
             surfaces: vehicle.surfaces.iter().enumerate().map(surface).collect(),
             bounds: whole,
             height: vehicle.dimensions.height,
+            remainder,
         }
     }
 
@@ -329,7 +373,7 @@ impl Anchor {
         out: &mut Reading<T>,
     ) {
         let plane = condition.water_plane(vehicle.z0);
-        let flow = Flow::of(vehicle, condition);
+        let flow = Flow::of(vehicle, condition, self.remainder);
         out.pressure = condition.density * 0.5 * flow.speed * flow.speed;
         out.global = flow.global(vehicle, condition);
         out.coordinates = self.coordinates(&flow, condition);
@@ -354,7 +398,7 @@ impl Anchor {
 
     /// How far loads had set in on each surface in a case of these coordinates: 0 on one that it left dry.
     pub fn onsets(&self, vehicle: &Vehicle, coordinates: &[f64; COORDINATES]) -> impl Iterator<Item = f64> {
-        let [_, _, depth, _, _, x, y, _] = *coordinates;
+        let [_, _, depth, _, _, x, y, ..] = *coordinates;
         let z = (1.0 - x * x - y * y).max(0.0).sqrt();
         // the side to which it leaned is not told: either may have been the lower one
         let planes = [y, -y].map(|y| {
@@ -425,7 +469,10 @@ impl Anchor {
             wet_fraction,
             center,
             hydrostatic,
-            drag: front * -(shelter * pressure * CD0),
+            drag: match self.remainder {
+                Remainder::OfDrag => front * -(shelter * pressure * CD0),
+                Remainder::OfPhysics => Vector3::zeros(),
+            },
             onset,
             unit: pressure * surface.area * reached * onset,
             arm: surface.area.sqrt(),
@@ -436,15 +483,20 @@ impl Anchor {
     }
 
     fn coordinates<T: Real>(&self, flow: &Flow<T>, condition: &Condition<T>) -> [T; COORDINATES] {
+        let aside = |y: T| match self.remainder {
+            Remainder::OfDrag => y.abs(),
+            Remainder::OfPhysics => y,
+        };
         [
             bounded(flow.froude_depth),
             flow.froude_length,
             condition.depth / self.height,
             flow.direction.x,
-            flow.direction.y.abs(),
+            aside(flow.direction.y),
             condition.up.x,
-            condition.up.y.abs(),
+            aside(condition.up.y),
             flow.bed,
+            flow.clearance,
         ]
     }
 }
@@ -467,7 +519,7 @@ struct Surroundings<'a, T: Real> {
     flow: &'a Flow<T>,
 }
 
-/// The motion through the water.
+/// The motion through the water and over the bed.
 struct Flow<T> {
     speed: T,
     direction: Vector3<T>,
@@ -475,21 +527,30 @@ struct Flow<T> {
     froude_length: T,
     /// How much of the velocity through the water the bed sees: 1 driving in still water, 0 parked in a current.
     bed: T,
+    /// Height of the wheels over the bed, of any size, in 0 to 1.
+    clearance: T,
 }
 
 impl<T: Real> Flow<T> {
-    fn of(vehicle: &Vehicle, condition: &Condition<T>) -> Self {
+    fn of(vehicle: &Vehicle, condition: &Condition<T>, remainder: Remainder) -> Self {
         let speed = norm(&condition.velocity);
         let moves = speed.value() > 0.0;
         let ahead = if moves { condition.velocity / speed } else { Vector3::zeros() };
-        let bed = if moves { condition.ground_velocity.dot(&ahead) / speed } else { T::zero() };
-        let depth = condition.depth.max(LEAST_DEPTH.into());
+        let (bed, clearance) = match remainder {
+            Remainder::OfDrag => {
+                let bed = if moves { condition.ground_velocity.dot(&ahead) / speed } else { T::zero() };
+                (bed.clamp(-2.0, 2.0), T::zero())
+            }
+            Remainder::OfPhysics => (condition.bed(), condition.bed_clearance.unwrap_or_else(T::zero)),
+        };
+        let depth = (condition.depth + clearance).max(LEAST_DEPTH.into());
         Self {
             speed,
             direction: ahead,
             froude_depth: speed / (depth * GRAVITY).sqrt(),
             froude_length: speed / (GRAVITY * vehicle.dimensions.length).sqrt(),
-            bed: bed.clamp(-2.0, 2.0),
+            bed,
+            clearance: bounded(clearance / (CLEAR * vehicle.dimensions.length)),
         }
     }
 
@@ -508,6 +569,8 @@ impl<T: Real> Flow<T> {
             condition.up.y * condition.up.y,
             (dimensions.width / dimensions.length).into(),
             (dimensions.height / dimensions.length).into(),
+            self.clearance,
+            self.direction.y * condition.up.y,
         ]
     }
 

@@ -103,6 +103,20 @@ impl<T: Real> Condition<T> {
         }
     }
 
+    /// The state with the part of its motion that weights know, level and without turning, over a bed so far below the
+    /// ground-contact plane [m].
+    pub fn levelled(&self, bed_clearance: T) -> Self {
+        let up = self.up.into_inner();
+        let flat = |v: &Vector3<T>| v - up * up.dot(v);
+        Self {
+            velocity: flat(&self.velocity),
+            ground_velocity: flat(&self.ground_velocity),
+            angular_velocity: Vector3::zeros(),
+            bed_clearance: Some(bed_clearance),
+            ..*self
+        }
+    }
+
     /// Share of the motion through the water that is motion over the bed: 1 driving through still water, 0 parked in a current.
     /// `b = v_ground . v / v^2` between 0 and 1, and a half at rest, smoothly over the slowest `SLOW`.
     pub fn bed(&self) -> T {

@@ -146,4 +146,9 @@ pub enum Fault {
         "the bundle has neither weights nor radiation.safetensors, so nothing can be answered: build it again with `wade vehicle build`, which adds the latter, or train it"
     )]
     NoWeights,
+    /// Weights that are a remainder of the physical base stand on nothing without it.
+    #[error(
+        "the weights are a remainder of the physical base, and radiation.safetensors is missing: restore it, or build the bundle again with `wade vehicle build` and train it"
+    )]
+    NoBase,
 }

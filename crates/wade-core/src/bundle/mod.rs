@@ -225,6 +225,31 @@ impl Files {
     }
 }
 
+impl Bundle {
+    /// The model that answers for it, without its effects.
+    pub fn into_model(self, isa: Isa) -> Result<Model, Fault> {
+        assembled(self.vehicle, self.version, (self.trained, self.radiation), isa)
+    }
+}
+
+fn assembled(
+    vehicle: Vehicle,
+    version: u32,
+    (trained, radiation): (Option<(Weights, Domain)>, Option<Radiation>),
+    isa: Isa,
+) -> Result<Model, Fault> {
+    let base = radiation.map(|radiation| Base::new(&vehicle, radiation));
+    match (trained, base) {
+        (Some((weights, domain)), Some(base)) if weights.takes_base() => {
+            Ok(Model::new(vehicle, version, domain, weights, isa).with_base(base))
+        }
+        (Some((weights, _)), _) if weights.needs_base() => Err(Fault::NoBase),
+        (Some((weights, domain)), _) => Ok(Model::new(vehicle, version, domain, weights, isa)),
+        (None, Some(base)) => Ok(Model::of_physics(vehicle, version, base)),
+        (None, None) => Err(Fault::NoWeights),
+    }
+}
+
 /// What effects name as the base under weights; `None` of what came before the physical base.
 fn base_of(weights: Option<&Weights>, has_radiation: bool) -> Option<&'static str> {
     (has_radiation && weights.is_none_or(Weights::takes_base)).then_some(PHYSICS)
@@ -263,17 +288,11 @@ impl Source {
         let (files, vehicle_file) = Files::read(self)?;
         let vehicle = files.vehicle(&vehicle_file)?;
         let trained = files.trained(&vehicle_file)?;
-        let base = files.radiation()?.map(|radiation| Base::new(&vehicle, radiation));
+        let radiation = files.radiation()?;
         let effects = files.effects(&vehicle.name, trained.as_ref().map(|(weights, _)| weights))?;
         let version = vehicle_file.version;
-        let model = match (trained, base) {
-            (Some((weights, domain)), Some(base)) if weights.takes_base() => {
-                Model::new(vehicle, version, domain, weights, isa).with_base(base)
-            }
-            (Some((weights, domain)), _) => Model::new(vehicle, version, domain, weights, isa),
-            (None, Some(base)) => Model::of_physics(vehicle, version, base),
-            (None, None) => return Err(At::path(&files.directory)(Fault::NoWeights)),
-        };
+        let model =
+            assembled(vehicle, version, (trained, radiation), isa).map_err(At::path(&files.directory))?;
         Ok((model, effects))
     }
 

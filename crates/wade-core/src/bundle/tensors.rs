@@ -6,7 +6,7 @@ use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::anchor;
+use crate::anchor::{self, COORDINATES, GLOBAL, Remainder};
 use crate::condition::GroundContact;
 use crate::features::{GLOBAL_NAMES, SURFACE_NAMES};
 use crate::frame::Vec3;
@@ -74,7 +74,7 @@ pub enum TensorError {
         found: String,
     },
     /// Weights for a remainder of something else.
-    #[error("the weights are a remainder of {found}, not of {expected}: train them again", expected = anchor::BASE)]
+    #[error("the weights are a remainder of {found}, not of {expected}: train them again", expected = [Remainder::OfPhysics, Remainder::OfDrag].map(Remainder::name).join(" or of "))]
     Base {
         /// What the file says.
         found: String,
@@ -104,7 +104,7 @@ struct WeightsMetadata {
     /// Of weights that have a convention baked in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ground_contact: Option<GroundContact>,
-    /// Of weights that answer a remainder: [`anchor::BASE`].
+    /// Of weights that answer a remainder: [`Remainder::name`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     base: Option<String>,
 }
@@ -115,26 +115,11 @@ struct WeightsMetadata {
 enum Kind {
     /// The paper's network as published.
     Paper,
-    /// Hydrostatics, a simple drag, and a learned remainder.
+    /// What is known of the physics, and a learned remainder.
     Anchored,
 }
 
 impl Kind {
-    fn base(self) -> Option<&'static str> {
-        match self {
-            Self::Paper => None,
-            Self::Anchored => Some(anchor::BASE),
-        }
-    }
-
-    fn global_features(self) -> Vec<String> {
-        let names: &[&str] = match self {
-            Self::Paper => &GLOBAL_NAMES,
-            Self::Anchored => &anchor::GLOBAL_NAMES,
-        };
-        names.iter().copied().map(str::to_owned).collect()
-    }
-
     /// The static features, then those that change with the state.
     fn surface_features(self) -> Vec<String> {
         let names = match self {
@@ -212,12 +197,11 @@ impl<'a> File<'a> {
     }
 
     fn array<const N: usize>(&self, name: &'static str) -> Result<[f32; N], TensorError> {
-        let values = self.floats(name, &[Some(N)])?;
-        Ok(std::array::from_fn(|i| values[i]))
+        Ok(array(&self.floats(name, &[Some(N)])?))
     }
 
-    fn deviations<const N: usize>(&self, name: &'static str) -> Result<[f32; N], TensorError> {
-        let values = self.array::<N>(name)?;
+    fn deviations(&self, name: &'static str, count: usize) -> Result<Vec<f32>, TensorError> {
+        let values = self.floats(name, &[Some(count)])?;
         match values.iter().position(|&value| value < LEAST_DEVIATION) {
             Some(index) => Err(TensorError::NotPositive { name, index }),
             None => Ok(values),
@@ -375,29 +359,46 @@ pub fn read_weights(bytes: &[u8]) -> Result<Weights, TensorError> {
     let file = File::new(bytes)?;
     let meta: WeightsMetadata = metadata(bytes)?;
     let kind = meta.kind;
-    let (of_state, of_surface) = (kind.global_features(), kind.surface_features());
+    let remainder = remainder(kind, meta.base.as_deref())?;
+    let (of_state, of_surface) = (global_features(remainder), kind.surface_features());
     if meta.global_features != of_state || meta.surface_features != of_surface {
         let found = [meta.surface_features, meta.global_features].concat().join(" ");
         return Err(TensorError::Features { found });
-    }
-    if meta.base.as_deref() != kind.base() {
-        return Err(TensorError::Base { found: meta.base.unwrap_or_else(|| "an earlier drag".into()) });
     }
     let network = read_network(&file, of_surface.len() + of_state.len(), kind.outputs())?;
     let form = match kind {
         Kind::Paper => Form::Paper(Paper {
             scaling: Scaling {
                 global_mean: file.array("global_mean")?,
-                global_std: file.deviations("global_std")?,
+                global_std: array(&file.deviations("global_std", GLOBAL_NAMES.len())?),
                 target_mean: file.array("target_mean")?,
-                target_std: file.deviations("target_std")?,
+                target_std: array(&file.deviations("target_std", OUTPUTS)?),
             },
             ground_contact: meta.ground_contact.ok_or(TensorError::NoGroundContact)?,
             held_out_rms: file.array::<OUTPUTS>("held_out_rms")?.map(f64::from),
         }),
-        Kind::Anchored => Form::Anchored(Box::new(read_anchored(&file)?)),
+        Kind::Anchored => {
+            let remainder = remainder.expect("anchored weights are a remainder");
+            Form::Anchored(Box::new(read_anchored(&file, remainder)?))
+        }
     };
     Ok(Weights { network, form, provenance: meta.provenance })
+}
+
+/// What weights of a kind whose file states such a base answer a remainder of; nothing of the paper's.
+fn remainder(kind: Kind, base: Option<&str>) -> Result<Option<Remainder>, TensorError> {
+    let known = base.and_then(Remainder::from_name);
+    let fits = match kind {
+        Kind::Paper => base.is_none(),
+        Kind::Anchored => known.is_some(),
+    };
+    let found = || base.unwrap_or("an earlier drag").to_owned();
+    if fits { Ok(known) } else { Err(TensorError::Base { found: found() }) }
+}
+
+fn global_features(remainder: Option<Remainder>) -> Vec<String> {
+    let names = remainder.map_or(&GLOBAL_NAMES[..], Remainder::global_names);
+    names.iter().copied().map(str::to_owned).collect()
 }
 
 fn read_network(file: &File<'_>, inputs: usize, outputs: usize) -> Result<Network, TensorError> {
@@ -415,21 +416,33 @@ fn read_network(file: &File<'_>, inputs: usize, outputs: usize) -> Result<Networ
     })
 }
 
-fn read_anchored(file: &File<'_>) -> Result<Anchored, TensorError> {
-    let cases = file.floats("cases", &[None, Some(anchor::COORDINATES)])?;
-    let cases = cases.as_chunks().0.to_vec();
+fn read_anchored(file: &File<'_>, remainder: Remainder) -> Result<Anchored, TensorError> {
+    let (told, apart) = (remainder.global_names().len(), remainder.coordinates());
+    let cases = file.floats("cases", &[None, Some(apart)])?;
+    let cases: Vec<[f32; COORDINATES]> = cases.chunks_exact(apart).map(|case| filled(case, 0.0)).collect();
     if cases.is_empty() {
         return Err(TensorError::NoCases);
     }
-    let [near] = file.deviations("near")?;
+    let [near] = array(&file.deviations("near", 1)?);
     Ok(Anchored {
-        global_mean: file.array("global_mean")?,
-        global_std: file.deviations("global_std")?,
-        spread: file.deviations("spread")?,
+        remainder,
+        global_mean: filled::<GLOBAL>(&file.floats("global_mean", &[Some(told)])?, 0.0),
+        global_std: filled::<GLOBAL>(&file.deviations("global_std", told)?, 1.0),
+        spread: array(&file.deviations("spread", 3)?),
         cases,
-        coordinate_scale: file.deviations("coordinate_scale")?,
+        coordinate_scale: filled(&file.deviations("coordinate_scale", apart)?, 1.0),
         near,
     })
+}
+
+/// Numbers that a file has, and the same for what is told of remainders of another kind.
+fn filled<const N: usize>(values: &[f32], rest: f32) -> [f32; N] {
+    std::array::from_fn(|i| values.get(i).copied().unwrap_or(rest))
+}
+
+/// As many numbers as a shape that was checked has.
+fn array<const N: usize>(values: &[f32]) -> [f32; N] {
+    std::array::from_fn(|i| values[i])
 }
 
 pub fn write_weights(weights: &Weights) -> Vec<u8> {
@@ -440,7 +453,7 @@ pub fn write_weights(weights: &Weights) -> Vec<u8> {
         .map(|(name, shape, values)| floats(name, shape, values))
         .collect();
     let vector = |name, values: &[f32]| floats(name, vec![values.len()], values);
-    let kind = match &weights.form {
+    let (kind, remainder) = match &weights.form {
         Form::Paper(Paper { scaling, held_out_rms, .. }) => {
             tensors.extend([
                 vector("global_mean", &scaling.global_mean),
@@ -449,27 +462,29 @@ pub fn write_weights(weights: &Weights) -> Vec<u8> {
                 vector("target_std", &scaling.target_std),
                 vector("held_out_rms", &held_out_rms.map(|rms| rms as f32)),
             ]);
-            Kind::Paper
+            (Kind::Paper, None)
         }
         Form::Anchored(form) => {
+            let (told, apart) = (form.remainder.global_names().len(), form.remainder.coordinates());
+            let cases: Vec<f32> = form.cases.iter().flat_map(|case| case[..apart].iter().copied()).collect();
             tensors.extend([
-                vector("global_mean", &form.global_mean),
-                vector("global_std", &form.global_std),
+                vector("global_mean", &form.global_mean[..told]),
+                vector("global_std", &form.global_std[..told]),
                 vector("spread", &form.spread),
-                floats("cases", vec![form.cases.len(), anchor::COORDINATES], form.cases.as_flattened()),
-                vector("coordinate_scale", &form.coordinate_scale),
+                floats("cases", vec![form.cases.len(), apart], &cases),
+                vector("coordinate_scale", &form.coordinate_scale[..apart]),
                 vector("near", &[form.near]),
             ]);
-            Kind::Anchored
+            (Kind::Anchored, Some(form.remainder))
         }
     };
     let meta = WeightsMetadata {
         kind,
-        global_features: kind.global_features(),
+        global_features: global_features(remainder),
         surface_features: kind.surface_features(),
         provenance: weights.provenance.clone(),
         ground_contact: weights.ground_contact(),
-        base: kind.base().map(str::to_owned),
+        base: remainder.map(|remainder| remainder.name().to_owned()),
     };
     write(&tensors, Some(&meta))
 }

@@ -1,14 +1,12 @@
 //! The physical base with what was learned beside it.
 //!
-//! The learned part of a surface is its anchored load less the base's, both of the level part of the motion, and counts as far
-//! as the state is near those that the weights were trained on. Together it may spend power and never give any: where it would give
+//! The learned part of a surface is what the network says is left of the base, or its anchored load less the base's, both of the
+//! level part of the motion, and counts as far as the state is near those that the weights were trained on. Together it may spend power and never give any: where it would give
 //! `P` to a hull whose base takes `P_0`, it is scaled by `k(r)` of `r = P / P_0`, 1 up to a half and `(1 - 1 / 4r) / r` from
 //! there, which is smooth and leaves `k r < 1`.
 
-use nalgebra::Vector3;
-
 use super::{Anchored, Learned, SPREAD, moment_deviation};
-use crate::anchor::{OUTPUTS, Reading, SurfaceReading};
+use crate::anchor::{OUTPUTS, Reading, Remainder, SurfaceReading};
 use crate::condition::Condition;
 use crate::domain::Quantity;
 use crate::forces::{self, Forces, SurfaceForce};
@@ -29,21 +27,11 @@ pub struct Blend<'a> {
     loads: &'a BaseLoads,
     /// Learned part of each surface about the body origin, before it is limited.
     learned: [Wrench; MAX_SURFACES],
+    /// That of the hull as a whole: what the base has of it in steady motion, which the weights answer with the surfaces.
+    learned_hull: Wrench,
     /// How much of the learned part counts, 0 to 1.
     weight: f64,
     learned_deviation: Vec3,
-}
-
-/// The state with the part of its motion that weights know: level, without turning.
-pub fn level<T: Real>(condition: &Condition<T>) -> Condition<T> {
-    let up = condition.up.into_inner();
-    let flat = |v: &Vector3<T>| v - up * up.dot(v);
-    Condition {
-        velocity: flat(&condition.velocity),
-        ground_velocity: flat(&condition.ground_velocity),
-        angular_velocity: Vector3::zeros(),
-        ..*condition
-    }
 }
 
 /// Share of a learned part that is let through, of one whose power is `ratio` of what the base takes.
@@ -51,15 +39,17 @@ fn let_through<T: Real>(ratio: T) -> T {
     if ratio.value() <= 0.5 { T::one() } else { (-(T::from(0.25) / ratio) + 1.0) / ratio }
 }
 
-/// The learned part of a surface about the body origin: the load that the network's answer means less the base's, as far as it
-/// counts.
+/// The learned part of a surface about the body origin: what the network's answer is beside the base.
 pub fn part<T: Real>(
     (known, answer): (&SurfaceReading<T>, &[T; OUTPUTS]),
-    base: &Wrench<T>,
-    share: T,
+    (base, remainder): (&Wrench<T>, Remainder),
 ) -> Wrench<T> {
     let Wrench { force, moment } = known.dynamic_load(answer);
-    (Wrench { force, moment: moment + known.center.cross(&force) } + *base * -T::one()) * share
+    let load = Wrench { force, moment: moment + known.center.cross(&force) };
+    match remainder {
+        Remainder::OfDrag => load + *base * -T::one(),
+        Remainder::OfPhysics => load,
+    }
 }
 
 /// Share of a learned part that is let through beside the drag of the base.
@@ -91,6 +81,7 @@ impl<'a> Blend<'a> {
             condition,
             loads,
             learned: [Wrench::default(); MAX_SURFACES],
+            learned_hull: Wrench::default(),
             weight: 0.0,
             learned_deviation: Vec3::zeros(),
         }
@@ -101,7 +92,7 @@ impl<'a> Blend<'a> {
         &mut self,
         (learned, form, reading): (&Learned, &Anchored, &Reading),
         (wet, outputs): (&[WetSurface], &[[f32; MAX_OUTPUTS]]),
-        level_drag: &[SurfaceDrag],
+        (velocity, level_drag): (&Vec3, &[SurfaceDrag]),
         forces: &mut Forces,
     ) {
         let distance = form.distance(&reading.coordinates);
@@ -113,10 +104,11 @@ impl<'a> Blend<'a> {
             spread += known.unit * Anchored::softplus(output[SPREAD]);
             let answer = std::array::from_fn(|i| f64::from(output[i]));
             let share = trust * learned.coverage[*surface];
-            self.learned[*surface] = part((known, &answer), &base.load, share);
-            let force = known.dynamic_load(&answer).force;
-            doubtful += (force - base.load.force).abs() * Anchored::doubt(distance).min(share);
+            let part = part((known, &answer), (&base.load, form.remainder));
+            self.learned[*surface] = part * share;
+            doubtful += part.force.abs() * Anchored::doubt(distance).min(share);
         }
+        self.learned_hull = self.loads.steady_hull(velocity) * -trust;
         self.learned_deviation = Vec3::from(form.spread.map(f64::from)) * spread + doubtful;
         self.weight = trust;
     }
@@ -124,11 +116,12 @@ impl<'a> Blend<'a> {
     /// Limits the learned part and sums.
     pub fn finish(self, vehicle: &Vehicle, forces: &mut Forces) {
         let Self { condition, loads, .. } = self;
-        let learned = self.learned[..loads.surfaces.len()].iter().fold(Wrench::default(), |sum, l| sum + *l);
+        let learned = &self.learned[..loads.surfaces.len()];
+        let learned = learned.iter().fold(self.learned_hull, |sum, learned| sum + *learned);
         let drag = loads.surfaces.iter().fold(Wrench::default(), |sum, s| sum + s.drag);
         let through = through(condition, &learned, loads);
         let about = &vehicle.center_of_mass;
-        let hull = loads.hull.moved(&Vec3::zeros(), about);
+        let hull = (loads.hull + self.learned_hull * through).moved(&Vec3::zeros(), about);
         let wet: f64 = wet_areas(vehicle, loads).sum();
         for (index, area) in wet_areas(vehicle, loads).enumerate() {
             let surface = &loads.surfaces[index];

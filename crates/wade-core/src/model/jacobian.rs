@@ -7,7 +7,7 @@
 
 use nalgebra::{SMatrix, UnitVector3, Vector3};
 
-use super::blend::{self, part, through};
+use super::blend::{part, through};
 use super::kernel::{DIRECTIONS, FeatureSlopes, SlopeBuffers};
 use super::{Anchored, Form, Learned, Model, WetSurface, Workspace};
 use crate::anchor::{GLOBAL, Reading};
@@ -244,7 +244,7 @@ impl Model {
         let JacobianWorkspace { loads, reading, level_drag, features, slopes } = workspace;
         let Workspace { wet, buffers, .. } = values;
         let directions = Directions::about(&moving.up.map(Real::value));
-        let level = blend::level(&moving.map(|x| directions.level(x)));
+        let level = moving.map(|x| directions.level(x)).levelled(directions.level(loads.bed_clearance));
         loads.wetting_into(|x| directions.level(x), reading.wetting_mut());
         base.drag_dual_into(&level, reading.wetting_mut(), level_drag);
         anchor.read_wet(&self.vehicle, &level, reading);
@@ -256,16 +256,19 @@ impl Model {
         let of_global: [_; GLOBAL] =
             std::array::from_fn(|i| reading.global[i].slope.map(|slope| slope as f32 / form.global_std[i]));
         let trust = Anchored::trust(form.distance_dual(&reading.coordinates));
+        let turning = loads.turning_in(|x| directions.level(x));
         let outputs = buffers.outputs(wet.len());
-        let of_outputs = learned.kernel.slopes((&of_global, features), buffers, slopes);
-        let mut sum = Wrench::default();
+        let told = form.remainder.global_names().len();
+        let of_outputs = learned.kernel.slopes((&of_global[..told], features), buffers, slopes);
+        let mut sum = turning.steady_hull(&level.velocity) * -trust;
         for ((WetSurface { surface, .. }, output), of_output) in wet.iter().zip(outputs).zip(of_outputs) {
             let answer = std::array::from_fn(|i| Level {
                 value: f64::from(output[i]),
                 slope: of_output[i].map(f64::from),
             });
             let share = trust * learned.coverage[*surface];
-            sum += part((&reading.surfaces[*surface], &answer), &level_drag[*surface].load, share);
+            let base = (&level_drag[*surface].load, form.remainder);
+            sum += part((&reading.surfaces[*surface], &answer), base) * share;
         }
         let full = |vector: Vector3<Level>| vector.map(|x| directions.full(x));
         Wrench { force: full(sum.force), moment: full(sum.moment) }

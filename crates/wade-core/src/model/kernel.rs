@@ -27,7 +27,7 @@ pub const MAX_DYNAMIC: usize = 12;
 /// Answers for a surface, at most.
 pub const MAX_OUTPUTS: usize = 8;
 /// Features that change with the state, at most: those of a surface, then those of the state.
-const MAX_CHANGING: usize = MAX_DYNAMIC + 12;
+const MAX_CHANGING: usize = MAX_DYNAMIC + 13;
 /// Dynamic features that are multiplied in one pass over a row.
 const PASS: usize = 3;
 

@@ -97,7 +97,7 @@ impl Learned {
             }
             Form::Anchored(form) => {
                 let kernel = Kernel::new(network, (anchor::STATIC, anchor::DYNAMIC), isa);
-                let anchor = Anchor::new(vehicle);
+                let anchor = Anchor::new(vehicle, form.remainder);
                 let statics = kernel.static_rows(&anchor.static_rows(vehicle));
                 let coverage = form.learnt(&anchor, vehicle);
                 (kernel, statics, Some(anchor), coverage)
@@ -118,7 +118,8 @@ impl Learned {
                 wet.push(WetSurface { surface: index, dynamic: surface.told() });
             }
         }
-        self.kernel.forward(&form.standardize(&reading.global), &self.statics, wet, buffers)
+        let global = &form.standardize(&reading.global)[..form.remainder.global_names().len()];
+        self.kernel.forward(global, &self.statics, wet, buffers)
     }
 }
 
@@ -144,7 +145,7 @@ impl Model {
     pub fn base_name(&self) -> &'static str {
         match (&self.base, self.weights().map(|weights| &weights.form)) {
             (Some(_), _) => PHYSICS,
-            (None, Some(Form::Anchored(_))) => anchor::BASE,
+            (None, Some(Form::Anchored(form))) => form.remainder.name(),
             (None, _) => "none",
         }
     }
@@ -209,14 +210,7 @@ impl Model {
     /// Allocates nothing once `forces` has held this many surfaces. Without the physical base angular rates and accelerations
     /// do not enter; a state with angular rates is then marked as outside the training domain.
     pub fn evaluate(&self, condition: &Condition, workspace: &mut Workspace, forces: &mut Forces) {
-        let motion = Motion {
-            wheel_speeds: &STATED_NONE,
-            time_step: 0.0,
-            implicit_added_mass: false,
-            physics: Physics::Full,
-            waters: None,
-        };
-        self.evaluate_moving(condition, (&motion, None), workspace, forces);
+        self.evaluate_moving(condition, (&Motion::ALONE, None), workspace, forces);
     }
 
     /// The same with the wheels, and with what a session remembers.
@@ -239,13 +233,18 @@ impl Model {
                     && let (Form::Anchored(form), Some(anchor)) = (&learned.weights.form, &learned.anchor)
                 {
                     // learned from hulls that neither rise nor turn
-                    let level = blend::level(condition);
+                    let level = condition.levelled(loads.bed_clearance);
                     base.drag_into(&level, loads, level_drag);
                     // it stands in the same water
                     loads.wetting_into(|x| x, reading.wetting_mut());
                     anchor.read_wet(&self.vehicle, &level, reading);
                     let outputs = learned.answer(form, (reading, wet, buffers));
-                    blend.add((learned, form, reading), (wet, outputs), level_drag, forces);
+                    blend.add(
+                        (learned, form, reading),
+                        (wet, outputs),
+                        (&level.velocity, level_drag),
+                        forces,
+                    );
                 }
                 blend.finish(&self.vehicle, forces);
             }

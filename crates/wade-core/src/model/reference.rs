@@ -1,11 +1,13 @@
 //! The answer by plain loops over whole rows of features: slow, obvious, and what the fast path is tested against.
 
 use super::{Anchored, Form, Learned, Model, Paper};
-use crate::anchor::{self, Anchor, Reading};
+use crate::anchor::{self, Anchor, Reading, Remainder};
 use crate::condition::Condition;
 use crate::features::{self, STATIC};
 use crate::frame::Vec3;
 use crate::geometry::submergence::Submergence;
+use crate::physics::drag::SurfaceDrag;
+use crate::physics::{BaseLoads, Motion};
 use crate::vehicle::Surface;
 
 impl Model {
@@ -44,21 +46,37 @@ impl Model {
     }
 
     fn reference_anchored(&self, (learned, form): (&Learned, &Anchored), condition: &Condition) -> Vec<Vec3> {
-        let anchor = Anchor::new(&self.vehicle);
+        let anchor = Anchor::new(&self.vehicle, form.remainder);
+        let (condition, drag) = self.known_drag(form.remainder, condition);
         let mut reading = Reading::default();
-        anchor.read(&self.vehicle, condition, &mut reading);
+        anchor.read(&self.vehicle, &condition, &mut reading);
         let trust = Anchored::trust(form.distance(&reading.coordinates));
+        let told = form.standardize(&reading.global);
+        let told = &told[..form.remainder.global_names().len()];
         let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&learned.coverage);
-        let force = surfaces.map(|((known, fixed), learnt)| {
+        let force = surfaces.zip(drag).map(|(((known, fixed), learnt), drag)| {
             if known.wet_fraction == 0.0 {
-                return Vec3::zeros();
+                return drag;
             }
             let of_surface = fixed.into_iter().chain(known.told());
-            let row: Vec<f32> = of_surface.chain(form.standardize(&reading.global)).collect();
+            let row: Vec<f32> = of_surface.chain(told.iter().copied()).collect();
             let output = learned.weights.network.forward(&row);
             let answer: [f32; anchor::OUTPUTS] = std::array::from_fn(|i| output[i] * (trust * learnt) as f32);
-            known.hydrostatic.force + known.force(&answer)
+            known.hydrostatic.force + drag + known.force(&answer)
         });
         force.collect()
+    }
+
+    /// The state as weights read it, and the drag of each surface that they do not answer [N].
+    fn known_drag(&self, remainder: Remainder, condition: &Condition) -> (Condition, Vec<Vec3>) {
+        let mut drags = vec![SurfaceDrag::default(); self.vehicle.surfaces.len()];
+        let Some(base) = self.base.as_ref().filter(|_| remainder == Remainder::OfPhysics) else {
+            return (*condition, vec![Vec3::zeros(); drags.len()]);
+        };
+        let mut loads = BaseLoads::default();
+        base.evaluate(condition, &Motion::QUASI_STEADY, None, &mut loads);
+        let level = condition.levelled(loads.bed_clearance);
+        base.drag_into(&level, &loads, &mut drags);
+        (level, drags.into_iter().map(|drag| drag.load.force).collect())
     }
 }

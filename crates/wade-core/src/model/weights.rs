@@ -1,6 +1,6 @@
 //! What is learnt, and how a network's answers become forces.
 
-use crate::anchor::{Anchor, COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS};
+use crate::anchor::{Anchor, COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS, Remainder};
 use crate::condition::GroundContact;
 use crate::model::network::{Network, OUTPUTS, Scaling};
 use crate::real::{Dual, Real};
@@ -47,6 +47,8 @@ const FADES: [f64; 2] = [2.0, 4.0];
 /// What goes with a network that learnt the remainder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchored {
+    /// What the answer is a remainder of.
+    pub remainder: Remainder,
     /// Mean of each global feature over the training cases.
     pub global_mean: [f32; GLOBAL],
     /// Standard deviation of each global feature; 1 where it never varied.
@@ -62,22 +64,37 @@ pub struct Anchored {
 }
 
 impl Anchored {
-    /// Standardised global features.
+    /// Standardised global features, of which the network is told the first [`Remainder::global_names`].
     pub fn standardize(&self, global: &[f64; GLOBAL]) -> [f32; GLOBAL] {
         std::array::from_fn(|i| (global[i] as f32 - self.global_mean[i]) / self.global_std[i])
     }
 
-    /// Distance to the nearest training case, over what is usual among these.
+    /// Distance to the nearest training case or its mirror image, over what is usual among these.
     pub fn distance(&self, coordinates: &[f64; COORDINATES]) -> f64 {
         let here = self.place(coordinates);
-        let nearest = self.cases.iter().map(|case| squared(&here, case)).fold(f32::INFINITY, f32::min);
+        let to = |here: &[f32; COORDINATES]| {
+            self.cases.iter().map(|case| squared(here, case)).fold(f32::INFINITY, f32::min)
+        };
+        let nearest = match self.remainder {
+            // its coordinates have no side
+            Remainder::OfDrag => to(&here),
+            Remainder::OfPhysics => to(&here).min(to(&mirrored(here))),
+        };
         f64::from(nearest.sqrt() / self.near)
     }
 
     /// The same with derivatives: those of the distance to the case that is nearest.
     pub fn distance_dual<const N: usize>(&self, coordinates: &[Dual<N>; COORDINATES]) -> Dual<N> {
         let here = self.place(&coordinates.map(Real::value));
-        let distances = self.cases.iter().map(|case| (squared(&here, case), case));
+        let images = match self.remainder {
+            Remainder::OfDrag => [here; 2],
+            Remainder::OfPhysics => [here, mirrored(here)],
+        };
+        let distances = images.iter().zip([false, true]).flat_map(|(here, image)| {
+            self.cases
+                .iter()
+                .map(move |case| (squared(here, case), if image { mirrored(*case) } else { *case }))
+        });
         let nearest = distances.reduce(|best, next| if next.0 < best.0 { next } else { best });
         let Some((_, nearest)) = nearest else { return f64::INFINITY.into() };
         let sum = (0..COORDINATES).fold(Dual::default(), |sum, axis| {
@@ -125,6 +142,15 @@ impl Anchored {
     }
 }
 
+/// Where the coordinates stand that change their sign in the mirror across y = 0: those of direction and of up along y.
+const ASIDE: [usize; 2] = [4, 6];
+
+/// The place of the mirror image across y = 0.
+fn mirrored(mut place: [f32; COORDINATES]) -> [f32; COORDINATES] {
+    ASIDE.into_iter().for_each(|axis| place[axis] = -place[axis]);
+    place
+}
+
 /// Square of the distance between two places.
 fn squared(here: &[f32; COORDINATES], case: &[f32; COORDINATES]) -> f32 {
     here.iter().zip(case).fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
@@ -145,6 +171,11 @@ impl Weights {
     /// published.
     pub fn takes_base(&self) -> bool {
         matches!(self.form, Form::Anchored(_))
+    }
+
+    /// True of weights that answer nothing without the physical base.
+    pub fn needs_base(&self) -> bool {
+        matches!(&self.form, Form::Anchored(form) if form.remainder == Remainder::OfPhysics)
     }
 
     /// Convention for the contact patches that the weights have baked in; `None` where they serve both.

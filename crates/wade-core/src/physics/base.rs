@@ -118,6 +118,8 @@ pub struct BaseLoads<T = f64> {
     pub hull: Wrench<T>,
     /// Added mass and inertia about the body origin, forces first [kg, kg m, kg m2].
     pub added_mass: Matrix6<T>,
+    /// Of the added mass the part that turns with the hull, which the bed does not add to.
+    far_from_bed: Matrix6<T>,
     /// Derivative of the linear wave load with respect to the velocity, with the sign changed [kg/s, kg m/s, kg m2/s].
     pub damping: Matrix6<f64>,
     /// Clearance over the bed that was used [m].
@@ -145,6 +147,7 @@ impl<T: Real> BaseLoads<T> {
             drags: Vec::with_capacity(surfaces),
             hull: Wrench::default(),
             added_mass: Matrix6::zeros(),
+            far_from_bed: Matrix6::zeros(),
             damping: Matrix6::zeros(),
             bed_clearance: T::zero(),
             bed: T::zero(),
@@ -154,6 +157,18 @@ impl<T: Real> BaseLoads<T> {
 }
 
 impl<T: Real> BaseLoads<T> {
+    /// The load of the hull as a whole in steady motion, about the body origin: the moment of the added mass in an oblique
+    /// stream, `-v x M_A v` (Munk, The aerodynamic forces on airship hulls, NACA report 184, 1924).
+    pub(crate) fn steady_hull(&self, velocity: &Vector3<T>) -> Wrench<T> {
+        let load = -cross_terms(&self.far_from_bed, velocity, &Vector3::zeros());
+        Wrench { force: load.fixed_rows::<3>(0).into_owned(), moment: load.fixed_rows::<3>(3).into_owned() }
+    }
+
+    /// The added mass of which [`Self::steady_hull`] is, in other numbers.
+    pub(crate) fn turning_in<U: Real>(&self, with: impl Fn(T) -> U) -> BaseLoads<U> {
+        BaseLoads { far_from_bed: self.far_from_bed.map(with), ..BaseLoads::with_capacity(0) }
+    }
+
     /// What the water reaches on each surface, in other numbers.
     pub(crate) fn wetting_into<U: Real>(&self, with: impl Fn(T) -> U, out: &mut Vec<Wetting<U>>) {
         out.clear();
@@ -174,6 +189,19 @@ pub struct Motion<'a> {
     pub physics: Physics,
     /// The sea about the hull, of a state that [`Base::in_sea`] gave.
     pub waters: Option<&'a Waters>,
+}
+
+impl Motion<'static> {
+    /// Of a state that stands alone, in calm water.
+    pub const ALONE: Self = Self {
+        wheel_speeds: &STATED_NONE,
+        time_step: 0.0,
+        implicit_added_mass: false,
+        physics: Physics::Full,
+        waters: None,
+    };
+    /// The same without added mass and waves.
+    pub const QUASI_STEADY: Self = Self { physics: Physics::QuasiSteady, ..Self::ALONE };
 }
 
 /// A vehicle prepared for the base.
@@ -320,7 +348,7 @@ impl Base {
         out.bed = condition.bed();
         let immersion = self.ellipsoid.immersion(condition, &plane);
         out.bed_clearance = condition.bed_clearance.unwrap_or_else(|| self.usual_clearance(immersion[0]));
-        (out.hull, out.added_mass, out.damping) = Default::default();
+        (out.hull, out.added_mass, out.far_from_bed, out.damping) = Default::default();
         if motion.physics == Physics::Full {
             // in a session in which no time has passed yet there is nothing to remember
             let memory = memory.filter(|memory| motion.time_step > 0.0 || !memory.is_empty());
@@ -439,7 +467,8 @@ impl Base {
         };
         let entry = growth * place.rate.max(T::zero()) + bed_adds * (bed.closing * closing);
         // what the bed adds resists motion toward it, and turns with nothing
-        let mut load = -(entry * nu) * (density * ENTRY) - cross_terms(&(far_from_bed * density), &v, &omega);
+        out.far_from_bed = far_from_bed * density;
+        let mut load = -(entry * nu) * (density * ENTRY) - cross_terms(&out.far_from_bed, &v, &omega);
         let rate = joined(
             &(condition.acceleration - omega.cross(&condition.velocity)),
             &condition.angular_acceleration,

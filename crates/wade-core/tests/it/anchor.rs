@@ -2,7 +2,7 @@
 //! that jumps when it gets wet, and mirror images of a state that give mirror images of any network's answer.
 
 use nalgebra::UnitVector3;
-use wade_core::anchor::{Anchor, DYNAMIC, GLOBAL, OUTPUTS, Reading, STATIC, SurfaceReading};
+use wade_core::anchor::{Anchor, DYNAMIC, GLOBAL, OUTPUTS, Reading, Remainder, STATIC, SurfaceReading};
 use wade_core::condition::{Condition, GroundContact};
 use wade_core::frame::{Vec3, up_from_roll_pitch};
 use wade_core::vehicle::Vehicle;
@@ -13,8 +13,19 @@ fn vehicle(name: &str) -> Vehicle {
 
 fn read(vehicle: &Vehicle, condition: &Condition) -> Reading {
     let mut reading = Reading::default();
-    Anchor::new(vehicle).read(vehicle, condition, &mut reading);
+    Anchor::new(vehicle, Remainder::OfDrag).read(vehicle, condition, &mut reading);
     reading
+}
+
+/// Both vehicles, read for weights of either kind.
+fn anchors() -> impl Iterator<Item = (&'static str, Vehicle, Anchor)> {
+    crate::common::VEHICLES.into_iter().flat_map(|name| {
+        [Remainder::OfDrag, Remainder::OfPhysics].map(|remainder| {
+            let vehicle = vehicle(name);
+            let anchor = Anchor::new(&vehicle, remainder);
+            (name, vehicle, anchor)
+        })
+    })
 }
 
 fn states() -> Vec<Condition> {
@@ -26,7 +37,8 @@ fn states() -> Vec<Condition> {
         for (x, y) in velocities {
             for depth in depths {
                 let up = up_from_roll_pitch(roll, pitch);
-                states.push(Condition { up, ..Condition::level(Vec3::new(x, y, 0.0), depth) });
+                let level = Condition::level(Vec3::new(x, y, 0.0), depth);
+                states.push(Condition { up, bed_clearance: Some(0.5 * depth), ..level });
             }
         }
     }
@@ -60,9 +72,7 @@ fn a_mirror_image_of_the_state_gets_the_mirror_image_of_any_answer() {
     let reflect = |v: Vec3| Vec3::new(v.x, -v.y, v.z);
     // a moment is an axial vector
     let reflect_moment = |m: Vec3| -reflect(m);
-    for name in crate::common::VEHICLES {
-        let vehicle = vehicle(name);
-        let anchor = Anchor::new(&vehicle);
+    for (name, vehicle, anchor) in anchors() {
         for state in states() {
             let velocity = reflect(state.velocity);
             let up = UnitVector3::new_unchecked(reflect(state.up.into_inner()));
@@ -104,9 +114,7 @@ fn at_rest_the_surfaces_feel_archimedes_and_nothing_else() {
 
 #[test]
 fn a_dry_surface_has_nothing_and_gets_wet_without_a_jump() {
-    for name in crate::common::VEHICLES {
-        let vehicle = vehicle(name);
-        let anchor = Anchor::new(&vehicle);
+    for (name, vehicle, anchor) in anchors() {
         let mut reading = Reading::default();
         let mut before: Option<Vec<f64>> = None;
         for step in 0..4000 {
@@ -136,9 +144,7 @@ fn a_dry_surface_has_nothing_and_gets_wet_without_a_jump() {
 #[test]
 fn no_load_steps_where_the_water_reaches_a_level_face() {
     const NEAR: f64 = 1e-7;
-    for name in crate::common::VEHICLES {
-        let vehicle = vehicle(name);
-        let anchor = Anchor::new(&vehicle);
+    for (name, vehicle, anchor) in anchors() {
         let mesh = &vehicle.hull.mesh;
         let mut levels: Vec<f64> = mesh.vertices.iter().map(|vertex| vertex.z - vehicle.z0).collect();
         levels.sort_by(f64::total_cmp);
@@ -161,7 +167,7 @@ fn no_load_steps_where_the_water_reaches_a_level_face() {
 fn a_force_acts_where_the_water_may_reach_and_has_the_moment_of_the_answer_where_it_can() {
     for name in crate::common::VEHICLES {
         let vehicle = vehicle(name);
-        let fixed = Anchor::new(&vehicle).static_rows(&vehicle);
+        let fixed = Anchor::new(&vehicle, Remainder::OfDrag).static_rows(&vehicle);
         let (mut held, mut moved) = (0, 0);
         for state in states() {
             let reading = read(&vehicle, &state);

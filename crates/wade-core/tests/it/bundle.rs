@@ -148,7 +148,7 @@ fn faults_behind_a_good_checksum_are_named() {
         (
             "network.safetensors",
             Box::new(header("windward drag", "standing drag")),
-            "the weights are a remainder of archimedes + standing drag of the soaked part, force and moment, not of archimedes + windward drag of the soaked part, force and moment: train them again",
+            "the weights are a remainder of archimedes + standing drag of the soaked part, force and moment, not of physical base without waves, force and moment or of archimedes + windward drag of the soaked part, force and moment: train them again",
         ),
         ("vehicle.toml", Box::new(text(|t| t.replacen("format = 1", "format = 2", 1))), "newer"),
         (

@@ -6,6 +6,7 @@ use wade_core::domain::Quantity;
 use wade_core::forces::{Forces, SurfaceForce};
 use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::model::{Model, Weights, Workspace};
+use wade_core::physics::Motion;
 
 fn evaluate(model: &Model, condition: &Condition) -> Forces {
     let mut forces = Forces::default();
@@ -104,4 +105,29 @@ fn a_wheel_that_only_just_touches_the_water_feels_nothing_below_either_conventio
     let condition = Condition { ground_contact: GroundContact::Dry, ..Condition::level(Vec3::zeros(), 1e-9) };
     let forces = evaluate(&model("husky"), &condition);
     assert!(forces.surfaces.iter().all(|load| load.wetted_fraction > 0.0 || load.force == Vec3::zeros()));
+}
+
+/// Steady CFD has the moment of the added mass in an oblique stream in it, and so have weights that learned it.
+#[test]
+fn steady_motion_that_the_weights_know_gets_no_moment_of_the_added_mass_besides() {
+    for vehicle in VEHICLES {
+        let model = model(vehicle);
+        let physics =
+            Model::of_physics(model.vehicle().clone(), 1, model.base().expect("the physical base").clone());
+        // half of the speed that it was trained at, at 40 degrees, in two thirds of the depth
+        let (speed, depth) = (0.5 * model.domain().speed_mps.max, 0.67 * model.domain().depth_m.max);
+        let (sin, cos) = 40.0_f64.to_radians().sin_cos();
+        let state = Condition::level(Vec3::new(speed * cos, speed * sin, 0.0), depth);
+        let moments = |model: &Model| {
+            [&Motion::ALONE, &Motion::QUASI_STEADY].map(|motion| {
+                let mut forces = Forces::default();
+                model.evaluate_moving(&state, (motion, None), &mut Workspace::new(), &mut forces);
+                forces.wrench.moment.z
+            })
+        };
+        let [whole, steady] = moments(&model);
+        let [base, base_steady] = moments(&physics);
+        assert!((base - base_steady).abs() > 0.1 * steady.abs(), "{vehicle}: {base} {base_steady}");
+        assert!((whole - steady).abs() < 1e-9 * steady.abs(), "{vehicle}: {whole} against {steady} N m");
+    }
 }

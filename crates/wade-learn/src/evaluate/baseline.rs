@@ -3,13 +3,15 @@
 
 use nalgebra::{DMatrix, RowVector6};
 
-use super::predict::Prediction;
+use super::predict::{Prediction, served};
 use super::states::State;
-use wade_core::anchor::{Anchor, Reading};
 use wade_core::condition::Condition;
 use wade_core::frame::{GRAVITY, Vec3, WaterPlane};
 use wade_core::geometry::distance::signed_distances;
 use wade_core::geometry::hydrostatics::hydrostatics;
+use wade_core::model::Model;
+use wade_core::physics::Base;
+use wade_core::physics::radiation::Radiation;
 use wade_core::vehicle::Vehicle;
 use wade_core::wrench::Wrench;
 
@@ -124,25 +126,13 @@ impl Baseline {
 /// The name of [`known`] in reports.
 pub const KNOWN: &str = "known physics alone";
 
-/// What the `anchored` model knows before anything is learnt ([`wade_core::anchor`]) says of states.
+/// What the physical base says of states, which the `anchored` model knows before anything is learnt.
 pub fn known(vehicle: &Vehicle, states: &[&State]) -> Vec<Prediction> {
-    let anchor = Anchor::new(vehicle);
-    let mut reading = Reading::default();
-    let about = &vehicle.center_of_mass;
-    let predict = |state: &&State| {
-        anchor.read(vehicle, &state.condition, &mut reading);
-        let sum = reading.surfaces.iter().fold(Wrench::default(), |sum, surface| {
-            let still = surface.hydrostatic.moved(&Vec3::zeros(), about);
-            sum + still + Wrench::from_force_at(surface.drag, &surface.center, about)
-        });
-        Prediction {
-            force: sum.force,
-            moment: Some(sum.moment),
-            surface_errors: Vec::new(),
-            uncertainty: None,
-        }
-    };
-    states.iter().map(predict).collect()
+    let base = Base::new(vehicle, Radiation::estimate(vehicle));
+    let model = Model::of_physics(vehicle.clone(), 0, base);
+    let known =
+        |prediction: Prediction| Prediction { surface_errors: Vec::new(), uncertainty: None, ..prediction };
+    served(&model, states).into_iter().map(known).collect()
 }
 
 fn rest(vehicle: &Vehicle, condition: &Condition) -> Wrench {

@@ -58,6 +58,16 @@ pub enum TrainError {
         /// A case of the other.
         resting: String,
     },
+    /// A vehicle off the bed, of which the paper's network is not told.
+    #[error(
+        "case `{case}` stands {clearance} m off the bed, which is not an input of the paper's network: keep other sets with `wade dataset merge --set`, or train the anchored network"
+    )]
+    OffTheBed {
+        /// The case.
+        case: String,
+        /// Distance of the ground-contact plane from the bed [m].
+        clearance: f64,
+    },
     /// Cases that no regression can be fitted to.
     #[error(
         "vehicle `{vehicle}`: the covariance of its cases is not positive definite: their loads are not finite"

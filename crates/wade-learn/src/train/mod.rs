@@ -97,8 +97,13 @@ fn check_steady(data: &Dataset) -> Result<(), TrainError> {
     }
 }
 
-/// Refuses two kinds of bed for one vehicle, of which the paper's network is not told.
+/// Refuses two kinds of bed for one vehicle, and a bed that is not below the wheels, of which the paper's network is not told.
 fn check_beds(data: &Dataset) -> Result<(), TrainError> {
+    for sample in &data.samples {
+        if let Some(clearance) = sample.condition.bed_clearance.filter(|clearance| *clearance > 0.0) {
+            return Err(TrainError::OffTheBed { case: sample.case.clone(), clearance });
+        }
+    }
     for vehicle in data.meta.vehicles.keys() {
         let (mut moving, mut resting) = (None, None);
         for sample in data.samples.iter().filter(|sample| sample.vehicle == *vehicle) {

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use wade_core::bundle::{BundleError, LibraryError};
+use wade_core::bundle::{BundleError, Fault, LibraryError};
 
 use crate::dataset::DatasetError;
 use crate::dataset::split::SplitError;
@@ -39,6 +39,9 @@ pub enum WorkflowError {
     /// A bundle that was to be judged.
     #[error("{vehicle}: the bundle has no weights")]
     NoWeights { vehicle: String },
+    /// A bundle that cannot answer.
+    #[error("{vehicle}: {source}")]
+    Serve { vehicle: String, source: Fault },
     /// The record that says what was held out.
     #[error("which states were held out is not known: {0}")]
     NotKnown(RecordError),

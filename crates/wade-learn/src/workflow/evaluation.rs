@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use wade_core::bundle::Library;
+use wade_core::bundle::{Bundle, Library};
 use wade_core::model::Model;
 use wade_core::model::kernel::Isa;
 
-use super::training::{Origin, begins};
+use super::training::{Origin, begins, with_weights};
 use super::{DataSource, Event, ModelKind, SplitRule, TrainingData, WorkflowError};
 use crate::evaluate::contest::{Contest, Contestants, enter};
 use crate::evaluate::held_out;
@@ -53,10 +53,9 @@ impl Evaluation<'_> {
         for name in loaded.bundles.keys() {
             let bundle = library.read(name)?;
             let no_weights = || WorkflowError::NoWeights { vehicle: name.clone() };
-            let (weights, domain) = bundle.trained.ok_or_else(no_weights)?;
-            held_out::check_weights(&record, name, &weights)?;
-            let model = Model::new(bundle.vehicle, bundle.version, domain, weights, Isa::available()[0]);
-            models.insert(name.clone(), vec![model]);
+            let (weights, _) = bundle.trained.as_ref().ok_or_else(no_weights)?;
+            held_out::check_weights(&record, name, weights)?;
+            models.insert(name.clone(), vec![model(bundle)?]);
         }
         let rule = if record.split.by_sample { SplitRule::Sample } else { SplitRule::Case };
         let by = rule.by(record.config.held_out_share, record.config.parts);
@@ -128,10 +127,9 @@ impl Evaluation<'_> {
             let config = self.data.settings(*kind, self.settings)?;
             let trained = kind.train(loaded, Run { config: &config, ..run }, origin, hear)?;
             settings.insert(trained.record.variant, trained.record.config);
-            for (name, (weights, domain)) in trained.weights {
-                let vehicle = run.source.vehicles[&name].clone();
-                let model = Model::new(vehicle, 0, domain, weights, Isa::available()[0]);
-                models.entry(name).or_default().push(model);
+            for (name, weights) in trained.weights {
+                let bundle = with_weights(&loaded.bundles[&name], weights);
+                models.entry(name).or_default().push(model(bundle)?);
             }
         }
         Ok(OfKinds { models, settings })
@@ -157,6 +155,12 @@ impl Evaluation<'_> {
         let contestants = Contestants { models, ablations: &ablations };
         Ok(enter(contest, run.source, run.sides.split, &contestants)?)
     }
+}
+
+/// A bundle as it is served.
+fn model(bundle: Bundle) -> Result<Model, WorkflowError> {
+    let vehicle = bundle.vehicle.name.clone();
+    bundle.into_model(Isa::available()[0]).map_err(|source| WorkflowError::Serve { vehicle, source })
 }
 
 fn ablation(

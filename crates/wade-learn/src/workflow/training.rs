@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use wade_core::bundle::{self, Bundle, Library};
 use wade_core::domain::Domain;
 use wade_core::model::Weights;
+use wade_core::physics::radiation::Radiation;
 
 use super::{DataSource, Event, ModelKind, SplitRule, TrainingData, WorkflowError};
 use crate::dataset::split;
@@ -89,6 +90,13 @@ impl Training<'_> {
         }
         Ok(Written { record: trained.record, bundles })
     }
+}
+
+/// A bundle with other weights. Anchored ones stand on the physical base, which bundles of version 0.1 lack.
+pub(super) fn with_weights(bundle: &Bundle, trained: (Weights, Domain)) -> Bundle {
+    let estimate = || Radiation::estimate(&bundle.vehicle);
+    let radiation = Some(bundle.radiation.clone().unwrap_or_else(estimate));
+    Bundle { trained: Some(trained), effects: None, radiation, ..bundle.clone() }
 }
 
 /// A long training is not to end in a place that cannot be written.
@@ -191,7 +199,7 @@ impl TrainingData {
             if bundle.effects.is_some() {
                 hear(Event::EffectsRemoved { vehicle });
             }
-            Ok(Bundle { trained: Some(weights.clone()), effects: None, ..bundle.clone() })
+            Ok(with_weights(bundle, weights.clone()))
         };
         trained.record.vehicles.iter().map(|of_vehicle| of(&of_vehicle.name)).collect()
     }

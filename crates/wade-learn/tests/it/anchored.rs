@@ -157,7 +157,7 @@ fn the_loss_reads_an_answer_as_the_model_does() {
     for state in &states {
         let prepared = &vehicles[state.vehicle];
         let (length, mass) = (prepared.vehicle.dimensions.length, prepared.vehicle.center_of_mass);
-        for (surface, (force, _)) in state.reading.surfaces.iter().zip(&state.loads) {
+        for (surface, (force, _)) in state.prior.reading.surfaces.iter().zip(&state.loads) {
             if surface.wet_fraction == 0.0 {
                 continue;
             }
@@ -197,7 +197,7 @@ fn the_bundle_answers_as_the_trainer_s_own_forward_pass() {
         let mut compared = 0;
         for state in &states {
             let model = &models[names[state.vehicle]];
-            let forces = evaluate(model, &state.condition);
+            let forces = evaluate(model, &state.prior.condition);
             let near = forces.outside.excess[Quantity::Distance as usize - 1] == 0.0;
             let own = trained.net_force(state, &vehicles);
             let scale: f64 = forces.surfaces.iter().map(|load| load.force.norm()).sum();
@@ -205,12 +205,21 @@ fn the_bundle_answers_as_the_trainer_s_own_forward_pass() {
                 compared += 1;
                 assert!((forces.wrench.force - own).norm() < 1e-5 * scale, "{} {own}", forces.wrench.force);
             }
-            for (load, expected) in forces.surfaces.iter().zip(model.reference(&state.condition)) {
+            for (load, expected) in forces.surfaces.iter().zip(model.reference(&state.prior.condition)) {
                 assert!((load.force - expected).norm() < 1e-5 * scale, "{}", isa.name());
             }
         }
         assert!(compared > 5, "{compared}");
     }
+    let name = &trained.vehicles[0].name;
+    let mut bundle = bundle::read(&crate::common::vehicles().join(name)).unwrap();
+    bundle.trained = Some((trained.weights(&trained.vehicles[0], "test".into()), trained.vehicles[0].domain));
+    bundle.radiation = None;
+    let refused = bundle.into_model(Isa::available()[0]).unwrap_err().to_string();
+    assert!(
+        refused.contains("a remainder of the physical base, and radiation.safetensors is missing"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -297,11 +306,13 @@ fn a_network_that_learnt_little_states_how_far_it_is_off() {
     let models = bundles(&lesson.train(&short(), None), Isa::available()[0]);
     let names: Vec<&String> = models.keys().collect();
     let (mut stated, mut missed) = (0.0, 0.0);
-    for state in lesson.states(&lesson.split.held_out).iter().filter(|s| s.condition.velocity.norm() > 0.0) {
-        let forces = evaluate(&models[names[state.vehicle]], &state.condition);
-        let size = state.reading.surfaces.iter().map(|surface| surface.unit).sum::<f64>();
+    for state in
+        lesson.states(&lesson.split.held_out).iter().filter(|s| s.prior.condition.velocity.norm() > 0.0)
+    {
+        let forces = evaluate(&models[names[state.vehicle]], &state.prior.condition);
+        let size = state.prior.reading.surfaces.iter().map(|surface| surface.unit).sum::<f64>();
         stated += forces.uncertainty.abs().sum() / size;
-        missed += (forces.wrench.force - state.hydrostatic() - state.dynamic()).abs().sum() / size;
+        missed += (forces.wrench.force - state.prior.force() - state.remainder()).abs().sum() / size;
     }
     // the mean of |error| is 0.71 to 0.80 of a deviation, and the factors are those of cases that were not known; 0.50 to 0.68 with
     // 20 and 40 cases and three seeds. The loads are a formula, of which the regressions miss next to nothing: what is missed
@@ -355,12 +366,12 @@ fn loads_above_still_water_are_carried_by_wet_surfaces() {
         let carried = state.carried();
         let count = carried.len() as f64;
         let sum: Vec3 = carried.iter().map(|load| load.0).sum();
-        assert!((sum - state.dynamic()).norm() < 1e-9 * count);
-        assert!((state.dynamic() - before.dynamic() - push * count).norm() < 1e-9 * count);
-        for ((force, _), surface) in carried.iter().zip(&state.reading.surfaces) {
+        assert!((sum - state.remainder()).norm() < 1e-9 * count);
+        assert!((state.remainder() - before.remainder() - push * count).norm() < 1e-9 * count);
+        for ((force, _), surface) in carried.iter().zip(&state.prior.reading.surfaces) {
             assert!(surface.wet_fraction > 0.0 || *force == Vec3::zeros());
         }
     }
-    let dry = |state: &Known| state.reading.surfaces.iter().any(|surface| surface.wet_fraction == 0.0);
+    let dry = |state: &Known| state.prior.reading.surfaces.iter().any(|surface| surface.wet_fraction == 0.0);
     assert!(states.iter().filter(|state| dry(state)).count() > 10);
 }

@@ -5,7 +5,7 @@ use nalgebra::UnitVector3;
 use super::known::{Known, Prepared};
 use super::teacher::Teacher;
 use crate::random::Random;
-use wade_core::anchor::{COORDINATES, Reading};
+use wade_core::anchor::COORDINATES;
 use wade_core::condition::Condition;
 use wade_core::frame::Vec3;
 
@@ -35,7 +35,8 @@ impl<'a> Between<'a> {
     pub fn taught(&self, count: usize, outside: usize, random: &mut Random) -> Vec<Known> {
         let mut taught = Vec::with_capacity(self.training.len() * (count + outside + 1));
         for state in self.training {
-            let Some(itself) = self.learn(state, state.condition) else {
+            let here = &state.prior.condition;
+            let Some(itself) = self.learn(state, here) else {
                 taught.push(state.clone());
                 continue;
             };
@@ -43,8 +44,7 @@ impl<'a> Between<'a> {
             let others = self.others(state);
             let lines = [(near(&others), count, BEYOND), (&others[..], outside, FAR_BEYOND)];
             for (ends, count, beyond) in lines {
-                let drawn = (0..count)
-                    .filter_map(|_| self.learn(state, drawn(state.condition, ends, beyond, random)?));
+                let drawn = (0..count).filter_map(|_| self.learn(state, &drawn(here, ends, beyond, random)?));
                 taught.extend(drawn);
             }
         }
@@ -58,26 +58,25 @@ impl<'a> Between<'a> {
         let mut of = |state: &Known| {
             let others = self.others(state);
             let mut one = || {
-                let on_a_line = drawn(state.condition, near(&others), BEYOND, random)?;
-                self.learn(state, drawn(on_a_line, near(&others), BEYOND, random)?)
+                let on_a_line = drawn(&state.prior.condition, near(&others), BEYOND, random)?;
+                self.learn(state, &drawn(&on_a_line, near(&others), BEYOND, random)?)
             };
             (0..count).filter_map(|_| one()).collect()
         };
         self.training.iter().map(&mut of).collect()
     }
 
-    fn learn(&self, state: &Known, condition: Condition) -> Option<Known> {
+    fn learn(&self, state: &Known, condition: &Condition) -> Option<Known> {
         let prepared = &self.vehicles[state.vehicle];
-        let mut reading = Reading::default();
-        prepared.anchor.read(&prepared.vehicle, &condition, &mut reading);
-        let loads = self.teacher.loads(state.vehicle, (&condition, &reading), prepared)?;
-        Some(Known { condition, reading, loads, ..state.clone() })
+        let prior = prepared.prior(condition);
+        let loads = self.teacher.loads(state.vehicle, &prior, prepared)?;
+        Some(Known { prior, loads, ..state.clone() })
     }
 
     /// The other cases of the vehicle, nearest first.
     fn others(&self, state: &Known) -> Vec<&'a Known> {
         let distance = |other: &Known| -> f64 {
-            let (a, b) = (&state.reading.coordinates, &other.reading.coordinates);
+            let (a, b) = (&state.prior.reading.coordinates, &other.prior.reading.coordinates);
             (0..COORDINATES).map(|i| ((a[i] - b[i]) / self.unit[i]).powi(2)).sum()
         };
         let others = self.training.iter().filter(|other| other.vehicle == state.vehicle);
@@ -93,43 +92,59 @@ fn near<'b>(others: &'b [&'b Known]) -> &'b [&'b Known] {
 }
 
 /// A state on the line through one and any of `others`, and up to `beyond` of their distance beyond either.
-fn drawn(from: Condition, others: &[&Known], beyond: f64, random: &mut Random) -> Option<Condition> {
+fn drawn(from: &Condition, others: &[&Known], beyond: f64, random: &mut Random) -> Option<Condition> {
     let other = others.get((random.unit() * others.len() as f64) as usize)?;
     let share = (1.0 + 2.0 * beyond) * random.unit() - beyond;
-    Some(between(&from, &other.condition, share))
+    Some(between(from, &other.prior.condition, share))
 }
 
 /// A state on the line through two, `share` of the way from the first; seen from the side to which each moves.
 fn between(first: &Condition, second: &Condition, share: f64) -> Condition {
     let mix = |a: f64, b: f64| a + share * (b - a);
-    // a depth or speed is extrapolated by at most half of itself
-    let positive = |a: f64, b: f64| mix(a, b).max(0.5 * a.min(b));
-    let polar = |c: &Condition| (c.velocity.xy().norm(), c.velocity.y.abs().atan2(c.velocity.x));
-    let ((speed, heading), (other_speed, other_heading)) = (polar(first), polar(second));
-    let speed = positive(speed, other_speed);
-    let (sin, cos) = mix(heading, other_heading).clamp(0.0, std::f64::consts::PI).sin_cos();
-    let velocity = Vec3::new(speed * cos, speed * sin, mix(first.velocity.z, second.velocity.z));
-    let up = |c: &Condition| {
-        let side = if c.velocity.y < 0.0 { -1.0 } else { 1.0 };
+    // a speed, clearance, density or depth is extrapolated by at most half of itself
+    let bounded = |a: f64, b: f64| mix(a, b).max(a.min(b) - 0.5 * a.min(b).abs());
+    let polar = |c: &Condition| {
+        let [ahead, left] = level_axes(&c.up);
+        let (along, across) = (c.velocity.dot(&ahead), c.velocity.dot(&left));
+        (along.hypot(across), across.abs().atan2(along), across)
+    };
+    let ((speed, heading, across), (other_speed, other_heading, other_across)) =
+        (polar(first), polar(second));
+    let up = |c: &Condition, across: f64| {
+        let side = if across < 0.0 { -1.0 } else { 1.0 };
         Vec3::new(c.up.x, c.up.y * side, c.up.z)
     };
+    let up = UnitVector3::new_normalize(up(first, across).lerp(&up(second, other_across), share));
     let bed = |c: &Condition| {
         let square = c.velocity.norm_squared();
         if square > 0.0 { c.ground_velocity.dot(&c.velocity) / square } else { 0.0 }
     };
+    let [ahead, left] = level_axes(&up);
+    let (sin, cos) = mix(heading, other_heading).clamp(0.0, std::f64::consts::PI).sin_cos();
+    let velocity = (ahead * cos + left * sin) * bounded(speed, other_speed);
+    let clearance = first.bed_clearance.zip(second.bed_clearance).map(|(a, b)| bounded(a, b).max(0.0));
     Condition {
         velocity,
         ground_velocity: velocity * mix(bed(first), bed(second)),
-        depth: positive(first.depth, second.depth),
-        density: positive(first.density, second.density),
-        up: UnitVector3::new_normalize(up(first).lerp(&up(second), share)),
+        depth: bounded(first.depth, second.depth),
+        density: bounded(first.density, second.density),
+        bed_clearance: clearance,
+        up,
         ..*first
     }
+}
+
+/// Ahead and left along the water, in the body frame.
+fn level_axes(up: &UnitVector3<f64>) -> [Vec3; 2] {
+    let x = Vec3::x();
+    let ahead = (x - up.into_inner() * up.x).normalize();
+    [ahead, up.cross(&ahead)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wade_core::frame::up_from_roll_pitch;
 
     #[test]
     fn a_state_lies_on_the_line_and_motion_to_the_right_counts_as_its_image() {
@@ -143,5 +158,29 @@ mod tests {
         let start = between(&first, &second, 0.0).velocity;
         assert!((start - Vec3::new(1.0, 1.0, 0.0)).norm() < 1e-12, "{start}");
         assert_eq!(between(&first, &second, -10.0).depth, 0.05, "no state above the ground");
+    }
+
+    #[test]
+    fn between_tilted_hulls_over_other_beds_the_motion_is_along_the_water() {
+        let at = |roll: f64, pitch: f64, clearance: f64, velocity: Vec3| {
+            let up = up_from_roll_pitch(roll, pitch);
+            let [ahead, left] = level_axes(&up);
+            let velocity = ahead * velocity.x + left * velocity.y;
+            Condition { up, bed_clearance: Some(clearance), ..Condition::level(velocity, -0.02) }
+        };
+        let (first, second) =
+            (at(0.2, -0.3, 0.0, Vec3::new(1.0, 0.5, 0.0)), at(-0.1, 0.2, 0.4, Vec3::new(-0.5, -0.5, 0.0)));
+        for share in [-0.3, 0.0, 0.4, 1.0, 1.3] {
+            let found = between(&first, &second, share);
+            assert!(found.velocity.dot(&found.up).abs() < 1e-12, "{share}: {found:?}");
+            assert!(
+                found.bed_clearance.is_some_and(|clearance| (0.0..0.6).contains(&clearance)),
+                "{found:?}"
+            );
+            assert!((-0.03..=-0.02).contains(&found.depth), "{}", found.depth);
+        }
+        let end = between(&first, &second, 1.0);
+        // the second drifts to its right: seen from there it leans the other way
+        assert!((end.up.y + second.up.y).abs() < 1e-12 && end.velocity.dot(&level_axes(&end.up)[1]) > 0.0);
     }
 }

@@ -69,6 +69,6 @@ impl Ensemble {
 
 /// The net force that a member answers a state with, less the state's own [N]; `None` of a vehicle that it does not know.
 fn apart(member: &Teacher, state: &Known, prepared: &Prepared) -> Option<Vec3> {
-    let loads = member.loads(state.vehicle, (&state.condition, &state.reading), prepared)?;
-    Some(loads.iter().map(|load| load.0).sum::<Vec3>() - state.dynamic())
+    let loads = member.loads(state.vehicle, &state.prior, prepared)?;
+    Some(loads.iter().map(|load| load.0).sum::<Vec3>() - state.remainder())
 }

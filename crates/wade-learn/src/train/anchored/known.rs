@@ -1,18 +1,46 @@
-//! States to learn the remainder from: what is known of each beforehand, and the dynamic load that CFD found.
+//! States to learn the remainder from: what is known of each beforehand, and what CFD found besides.
 
 use std::collections::BTreeMap;
 
 use super::super::TrainError;
 use super::super::label;
 use crate::dataset::{Dataset, Image, flows};
-use wade_core::anchor::{Anchor, Reading, STATIC};
-use wade_core::condition::Condition;
+use wade_core::anchor::{Anchor, Reading, Remainder, STATIC};
+use wade_core::condition::{Condition, GroundContact};
 use wade_core::frame::{GRAVITY, Vec3};
+use wade_core::physics::radiation::Radiation;
+use wade_core::physics::{Base, BaseLoads, Motion};
 use wade_core::vehicle::Vehicle;
 use wade_core::wrench::Wrench;
 
 /// Load on a surface: force [N], and moment about the body origin [N m] where the data set has it.
 pub type Load = (Vec3, Option<Vec3>);
+
+/// What is known of a state before anything is learned.
+#[derive(Debug, Clone)]
+pub struct Prior {
+    /// The state, over the bed that the base finds below it.
+    pub condition: Condition,
+    /// What the network is told.
+    pub reading: Reading,
+    /// Drag that the physical base puts on each surface, about the body origin.
+    pub drag: Vec<Wrench>,
+    /// Water that the hull displaces [m3].
+    pub volume: f64,
+}
+
+impl Prior {
+    /// Net force of the base, hydrostatic and drag [N].
+    pub fn force(&self) -> Vec3 {
+        let hydrostatic: Vec3 = self.reading.surfaces.iter().map(|surface| surface.hydrostatic.force).sum();
+        hydrostatic + self.drag_force()
+    }
+
+    /// Net drag of the base [N].
+    pub fn drag_force(&self) -> Vec3 {
+        self.drag.iter().map(|drag| drag.force).sum()
+    }
+}
 
 /// A vehicle as the anchored network sees it.
 #[derive(Debug, Clone)]
@@ -21,8 +49,9 @@ pub struct Prepared {
     pub name: String,
     /// The vehicle.
     pub vehicle: Vehicle,
-    /// What is known of it.
+    /// What tells the network of its states.
     pub anchor: Anchor,
+    base: Base,
     /// Static features of its surfaces.
     pub fixed: Vec<[f32; STATIC]>,
     /// Where each of its surfaces stands in the data set.
@@ -35,16 +64,37 @@ impl Prepared {
         let prepare = |(name, surfaces): (&String, &Vec<String>)| {
             let unknown = || TrainError::UnknownVehicle { vehicle: name.clone() };
             let vehicle = vehicles.get(name).ok_or_else(unknown)?;
-            let anchor = Anchor::new(vehicle);
+            let anchor = Anchor::new(vehicle, Remainder::OfPhysics);
             Ok(Self {
                 name: name.clone(),
                 fixed: anchor.static_rows(vehicle),
                 anchor,
+                // steady states make no waves, so that any table of them will do
+                base: Base::new(vehicle, Radiation::estimate(vehicle)),
                 order: label::order(vehicle, surfaces)?,
                 vehicle: vehicle.clone(),
             })
         };
         data.meta.vehicles.iter().map(prepare).collect()
+    }
+
+    /// What is known of a state.
+    pub fn prior(&self, condition: &Condition) -> Prior {
+        let mut loads = BaseLoads::default();
+        let wetted = Condition { ground_contact: GroundContact::Wetted, ..*condition };
+        self.base.evaluate(&wetted, &Motion::QUASI_STEADY, None, &mut loads);
+        let lift: Vec3 = loads.surfaces.iter().map(|surface| surface.hydrostatic.force).sum();
+        let condition = condition.levelled(loads.bed_clearance);
+        let mut drags = Vec::new();
+        self.base.drag_into(&condition, &loads, &mut drags);
+        let mut reading = Reading::default();
+        self.anchor.read(&self.vehicle, &condition, &mut reading);
+        Prior {
+            condition,
+            reading,
+            drag: drags.into_iter().map(|drag| drag.load).collect(),
+            volume: lift.norm() / (condition.density * GRAVITY),
+        }
     }
 
     /// Weight of the vehicle in the air [N], the unit in which its loads are judged.
@@ -62,11 +112,9 @@ pub struct Known {
     pub case: String,
     /// Whether it is a mirror image.
     pub image: Image,
-    /// The state.
-    pub condition: Condition,
     /// What is known of it.
-    pub reading: Reading,
-    /// Dynamic load that was found on each surface.
+    pub prior: Prior,
+    /// What was found on each surface besides.
     pub loads: Vec<Load>,
     /// Standard deviation of the net force over the sections, a component each [N].
     pub scatter: Vec3,
@@ -88,21 +136,17 @@ impl Known {
             let first = &data.samples[members[0]];
             let index = vehicles.iter().position(|prepared| prepared.name == first.vehicle)?;
             let prepared = &vehicles[index];
-            let mut reading = Reading::default();
-            prepared.anchor.read(&prepared.vehicle, &first.condition, &mut reading);
-            let (loads, scatter) = mean_loads(data, &members, prepared);
-            let (case, image, condition) = (first.case.clone(), first.image, first.condition);
-            Some(Self { vehicle: index, case, image, condition, reading, loads, scatter })
+            let prior = prepared.prior(&first.condition);
+            let (mut loads, scatter) = mean_loads(data, &members, prepared);
+            for (load, drag) in loads.iter_mut().zip(&prior.drag) {
+                *load = (load.0 - drag.force, load.1.map(|moment| moment - drag.moment));
+            }
+            Some(Self { vehicle: index, case: first.case.clone(), image: first.image, prior, loads, scatter })
         };
         flows.into_iter().filter_map(state).collect()
     }
 
-    /// Net hydrostatic force of the hull [N].
-    pub fn hydrostatic(&self) -> Vec3 {
-        self.reading.surfaces.iter().map(|surface| surface.hydrostatic.force).sum()
-    }
-
-    /// The dynamic load that each surface is to answer: what was found, but what was found on surfaces above still water on
+    /// The load that each surface is to answer: what was found besides the base, but what was found on surfaces above still water on
     /// the wet ones, in proportion to what a coefficient is worth there; of a surface on which loads are setting in, the part
     /// that has not set in.
     ///
@@ -110,12 +154,12 @@ impl Known {
     /// without this the net force would lack them, or be torn between them and the loads of the single surfaces.
     pub fn carried(&self) -> Vec<Load> {
         let mut loads = self.loads.clone();
-        carry(&mut loads, &self.reading);
+        carry(&mut loads, &self.prior.reading);
         loads
     }
 
-    /// Net dynamic force that was found [N].
-    pub fn dynamic(&self) -> Vec3 {
+    /// Net force that was found besides the base [N].
+    pub fn remainder(&self) -> Vec3 {
         self.loads.iter().map(|(force, _)| *force).sum()
     }
 }

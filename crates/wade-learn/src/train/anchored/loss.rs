@@ -52,7 +52,7 @@ impl Default for AnchoredLoss {
 impl AnchoredLoss {
     /// Scale of a state's errors [N].
     pub fn scale(&self, state: &Known, prepared: &Prepared) -> f64 {
-        let load: f64 = state.reading.surfaces.iter().map(|surface| surface.unit).sum();
+        let load: f64 = state.prior.reading.surfaces.iter().map(|surface| surface.unit).sum();
         let weight = prepared.weight();
         weight * (load / weight + self.floor).powf(self.exponent)
     }

@@ -1,4 +1,4 @@
-//! Learning the remainder that the anchored model adds to hydrostatics and a simple drag ([`wade_core::anchor`]).
+//! Learning the remainder that the anchored model adds to the physical base ([`wade_core::anchor::Remainder::OfPhysics`]).
 //!
 //! Reading order: `known` (states and what CFD found), `gaussian` and `teacher` (what the cases say together), `between`
 //! (the states in which it is taught), `loss`, this file (rows, the network, where the training cases lie), `ensemble` and
@@ -10,7 +10,7 @@ mod gaussian;
 pub mod known;
 pub mod loss;
 pub mod spread;
-mod teacher;
+pub mod teacher;
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -30,7 +30,7 @@ use ensemble::Ensemble;
 use known::{Known, Prepared};
 use spread::{Missed, Spread};
 use teacher::Teacher;
-use wade_core::anchor::{COORDINATES, DYNAMIC, GLOBAL, OUTPUTS, STATIC};
+use wade_core::anchor::{COORDINATES, DYNAMIC, GLOBAL, OUTPUTS, Remainder, STATIC};
 use wade_core::frame::Vec3;
 use wade_core::model::network::WIDTH;
 use wade_core::model::{Anchored, Form, SPREAD, Weights};
@@ -91,13 +91,14 @@ pub fn train(run: Run<'_>, progress: &dyn Fn(&Epoch)) -> Result<Trained<Learnt>,
 /// Least unit of each coordinate of a state ([`wade_core::anchor::Reading::coordinates`]): what matters physically also where
 /// the training cases hardly differ. A tenth of a tilt; but whether the bed moves changes the load by a twentieth, so that
 /// a state over the other bed is no stranger.
-const LEAST_UNIT: [f64; COORDINATES] = [0.05, 0.05, 0.05, 0.2, 0.2, 0.1, 0.1, 10.0];
+const LEAST_UNIT: [f64; COORDINATES] = [0.05, 0.05, 0.05, 0.2, 0.2, 0.1, 0.1, 10.0, 0.2];
 
 /// Standardisation, and the unit of each coordinate.
-fn form(training: &[Known]) -> (Anchored, [f64; COORDINATES]) {
-    let (mean, std) = super::task::moments(training.iter().map(|state| state.reading.global));
-    let scale = units(training.iter().map(|state| state.reading.coordinates));
+pub fn form(training: &[Known]) -> (Anchored, [f64; COORDINATES]) {
+    let (mean, std) = super::task::moments(training.iter().map(|state| state.prior.reading.global));
+    let scale = units(training.iter().map(|state| state.prior.reading.coordinates));
     let form = Anchored {
+        remainder: Remainder::OfPhysics,
         global_mean: mean.map(|x| x as f32),
         global_std: std.map(|x| x as f32),
         spread: [0.0; 3],
@@ -112,7 +113,7 @@ fn form(training: &[Known]) -> (Anchored, [f64; COORDINATES]) {
 /// a state in which another was asked is near to nothing that is known of it.
 fn of_vehicle(form: &Anchored, training: &[Known], vehicle: usize, factors: &[f64; 3]) -> Box<Anchored> {
     let places = |of: &dyn Fn(&Known) -> bool| -> Vec<[f32; COORDINATES]> {
-        training.iter().filter(|s| of(s)).map(|state| form.place(&state.reading.coordinates)).collect()
+        training.iter().filter(|s| of(s)).map(|state| form.place(&state.prior.reading.coordinates)).collect()
     };
     let own = places(&|state| state.vehicle == vehicle);
     let cases = if own.is_empty() { places(&|_| true) } else { own };
@@ -173,7 +174,7 @@ fn task(
 /// A row a surface: its static features, those that change, the standardised global ones.
 fn rows(state: &Known, prepared: &Prepared, form: &Anchored, config: &Config) -> Rows {
     let scale = config.anchored.loss.scale(state, prepared);
-    let surfaces = &state.reading.surfaces;
+    let surfaces = &state.prior.reading.surfaces;
     let loads = state.carried();
     let targets = surfaces.iter().zip(&loads);
     Rows {
@@ -185,9 +186,9 @@ fn rows(state: &Known, prepared: &Prepared, form: &Anchored, config: &Config) ->
 }
 
 fn inputs(state: &Known, prepared: &Prepared, form: &Anchored) -> Vec<f32> {
-    let global = form.standardize(&state.reading.global);
+    let global = form.standardize(&state.prior.reading.global);
     let mut inputs = Vec::with_capacity(SIZES.inputs * prepared.fixed.len());
-    for (surface, fixed) in state.reading.surfaces.iter().zip(&prepared.fixed) {
+    for (surface, fixed) in state.prior.reading.surfaces.iter().zip(&prepared.fixed) {
         inputs.extend(fixed.iter().chain(&surface.told()).chain(&global));
     }
     inputs
@@ -198,14 +199,14 @@ fn columns(state: &Known, prepared: &Prepared, form: &Anchored) -> DMatrix<f32> 
     DMatrix::from_vec(SIZES.inputs, prepared.fixed.len(), inputs(state, prepared, form))
 }
 
-/// Net dynamic force [N].
+/// Net force besides the base [N].
 fn predict(layers: &Layers<f32>, state: &Known, prepared: &Prepared, form: &Anchored) -> Vec3 {
     let output = layers.forward(&columns(state, prepared, form)).output;
     let force = |(column, surface): (usize, &wade_core::anchor::SurfaceReading)| {
         let answer: [f32; OUTPUTS] = std::array::from_fn(|i| output[(i, column)]);
         if surface.wet_fraction > 0.0 { surface.force(&answer) } else { Vec3::zeros() }
     };
-    state.reading.surfaces.iter().enumerate().map(force).sum()
+    state.prior.reading.surfaces.iter().enumerate().map(force).sum()
 }
 
 /// What is known of the errors: those of cases, and how large they are expected to be in states between them.
@@ -219,7 +220,8 @@ fn missed(
     let of = |state: &Known, part: usize, is_case: bool, error: Vec3| {
         let activations = layers.forward(&columns(state, &vehicles[state.vehicle], form));
         let hidden = &activations.hidden2;
-        let wet = state.reading.surfaces.iter().enumerate().filter(|(_, surface)| surface.wet_fraction > 0.0);
+        let wet =
+            state.prior.reading.surfaces.iter().enumerate().filter(|(_, surface)| surface.wet_fraction > 0.0);
         let surfaces =
             wet.map(|(column, surface)| (hidden.column(column).iter().copied().collect(), surface.unit));
         Missed { vehicle: state.vehicle, part, is_case, surfaces: surfaces.collect(), error: error.into() }
@@ -231,16 +233,16 @@ fn missed(
         let of_case = ensemble.missed(number, state, prepared).filter(|_| state.image == Image::Original);
         let Some(of_case) = of_case else { continue };
         // states that the network has not seen tell what it loses of what it was taught
-        let lost = fresh.iter().map(|fresh| predict(layers, fresh, prepared, form) - fresh.dynamic());
+        let lost = fresh.iter().map(|fresh| predict(layers, fresh, prepared, form) - fresh.remainder());
         let lost: Vec<(&Known, Vec3)> = fresh.iter().zip(lost).collect();
         // in proportion: one of them may be much faster than the case
         let here = |(fresh, lost): &(&Known, Vec3)| {
-            let share = state.reading.dynamic_load() / fresh.reading.dynamic_load();
+            let share = state.prior.reading.dynamic_load() / fresh.prior.reading.dynamic_load();
             if share.is_finite() { lost * share } else { Vec3::zeros() }
         };
         missed.push(of(state, part, true, of_case + lost.first().map_or_else(Vec3::zeros, here)));
         for (fresh, lost) in lost {
-            let parts = [ensemble.deviation(fresh, prepared), teacher.noise(fresh, prepared), lost];
+            let parts = [ensemble.deviation(fresh, prepared), teacher.noise(fresh), lost];
             let expected = parts.iter().map(|part| part.component_mul(part)).sum::<Vec3>().map(f64::sqrt);
             // the mean magnitude of a Laplace distribution of that deviation
             missed.push(of(fresh, part, false, expected * std::f64::consts::FRAC_1_SQRT_2));
@@ -250,10 +252,10 @@ fn missed(
 }
 
 impl Trained<Learnt> {
-    /// The net force in a state by the trainer's own forward pass, hydrostatics included [N].
+    /// The net force in a state by the trainer's own forward pass, the base included [N].
     pub fn net_force(&self, state: &Known, vehicles: &[Prepared]) -> Vec3 {
         let prepared = &vehicles[state.vehicle];
-        state.hydrostatic() + predict(&self.layers, state, prepared, &self.learnt[&prepared.name])
+        state.prior.force() + predict(&self.layers, state, prepared, &self.learnt[&prepared.name])
     }
 
     /// The weights of a vehicle as they are served.
@@ -270,8 +272,8 @@ impl Trained<Learnt> {
         held_out: &[Known],
     ) -> Result<TrainedVehicle, TrainError> {
         let judged = |state: &Known| {
-            let density = state.condition.density;
-            let truth = (state.hydrostatic() + state.dynamic()) / density;
+            let density = state.prior.condition.density;
+            let truth = (state.prior.force() + state.remainder()) / density;
             let guess = self.net_force(state, vehicles) / density;
             Judged { density, truth: truth.into(), guess: guess.into() }
         };

@@ -6,7 +6,8 @@
 //! which distance, and how much of a case is noise. Measured in five folds: a network on 61 cases of the Warthog missed its Fx
 //! by 120 N in the mean, a regression through 72 by 38 N.
 //!
-//! Its answers are `q W d` (dynamic pressure, width, depth) times functions of the coordinates. All surfaces share the
+//! Its answers are what is left of the base, `q V^(2/3)` (dynamic pressure, displaced volume) times functions of the
+//! coordinates and of the coefficients of the base's own drag, which know how much of the hull meets the flow in an attitude. All surfaces share the
 //! lengths and noise that the net force along each axis asks for, so that the sum over surfaces is what it would say of the
 //! net force. Serving does without it: the network learns its answers, in the cases and in states between these.
 //!
@@ -18,10 +19,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::TrainError;
 use super::gaussian::Regression;
-use super::known::{Known, Load, Prepared};
+use super::known::{Known, Load, Prepared, Prior};
 use crate::dataset::Image;
 use crate::dataset::mirror::Plane;
-use wade_core::anchor::{COORDINATES, Reading};
+use wade_core::anchor::COORDINATES;
 use wade_core::condition::Condition;
 use wade_core::features::direction;
 use wade_core::frame::Vec3;
@@ -29,6 +30,13 @@ use wade_core::frame::Vec3;
 /// Where direction and tilt stand among the coordinates, along x and y.
 const DIRECTION: [usize; 2] = [3, 4];
 const UP: [usize; 2] = [5, 6];
+
+/// Numbers that tell states apart: their coordinates, and the coefficients of the base's drag.
+const PLACE: usize = COORDINATES + 3;
+
+/// Share of the weight by which no load of a case is known better: the CFD's own load at rest differs by as much from Archimedes
+/// on the same mesh.
+const LEAST_SCATTER: f64 = 0.002;
 
 /// Which numbers of a surface's load go with which axis of the force: `[Fx, Fy, Fz, Mx, My, Mz]`.
 const OF_AXIS: [&[usize]; 3] = [&[0], &[1, 5], &[2, 3, 4]];
@@ -47,7 +55,7 @@ struct OfVehicle {
     mirrors: [bool; 2],
     has_moments: bool,
     /// One an axis of the force.
-    axes: Vec<Regression<COORDINATES>>,
+    axes: Vec<Regression<PLACE>>,
 }
 
 impl Teacher {
@@ -59,7 +67,7 @@ impl Teacher {
         like: Option<&Self>,
     ) -> Result<Self, TrainError> {
         let of = |(index, prepared): (usize, &Prepared)| {
-            let moves = |state: &&Known| scale(&state.condition, &state.reading, prepared) > 0.0;
+            let moves = |state: &&Known| scale(&state.prior) > 0.0;
             let of_vehicle = training.clone().filter(|state| state.vehicle == index);
             let (states, images): (Vec<_>, Vec<_>) =
                 of_vehicle.filter(moves).partition(|state| state.image == Image::Original);
@@ -75,22 +83,17 @@ impl Teacher {
         Ok(Self { vehicles })
     }
 
-    /// The dynamic load on each surface in a state; nothing where nothing moves, `None` of a vehicle that was not learnt.
-    pub fn loads(
-        &self,
-        vehicle: usize,
-        (condition, reading): (&Condition, &Reading),
-        prepared: &Prepared,
-    ) -> Option<Vec<Load>> {
-        self.vehicles[vehicle].as_ref().map(|of| of.loads(condition, reading, prepared))
+    /// The load on each surface in a state besides the base; nothing where nothing moves, `None` of a vehicle that was not learnt.
+    pub fn loads(&self, vehicle: usize, prior: &Prior, prepared: &Prepared) -> Option<Vec<Load>> {
+        self.vehicles[vehicle].as_ref().map(|of| of.loads(prior, prepared))
     }
 
     /// Standard deviation of what the net force in a state has for noise, as the cases say it [N]; nothing where nothing moves
     /// and of a vehicle that was not learnt.
-    pub fn noise(&self, state: &Known, prepared: &Prepared) -> Vec3 {
+    pub fn noise(&self, state: &Known) -> Vec3 {
         let axes = self.vehicles[state.vehicle].iter().flat_map(|of| &of.axes);
         let noise = Vec3::from_iterator(axes.map(|axis| axis.noise).chain([0.0; 3]).take(3));
-        noise * scale(&state.condition, &state.reading, prepared)
+        noise * scale(&state.prior)
     }
 }
 
@@ -101,23 +104,22 @@ impl OfVehicle {
         (unit, mirrors): ([f64; COORDINATES], [bool; 2]),
         like: Option<&Self>,
     ) -> Option<Self> {
-        let scale_of = |state: &Known| scale(&state.condition, &state.reading, prepared);
+        let scale_of = |state: &Known| scale(&state.prior);
+        let least = LEAST_SCATTER * prepared.weight();
         let has_moments = states.iter().all(|state| state.loads.iter().all(|load| load.1.is_some()));
         let surfaces = prepared.vehicle.surfaces.len();
         // a row a state: six numbers a surface, without a dimension
         let mut rows = DMatrix::zeros(states.len(), 6 * surfaces);
         for (row, state) in states.iter().enumerate() {
-            let loads = View::of(&state.condition, mirrors).loads(&state.loads, prepared);
+            let loads = View::of(&state.prior.condition, mirrors).loads(&state.loads, prepared);
             for (surface, (force, moment)) in loads.iter().enumerate() {
                 let moment = moment.unwrap_or_default() / prepared.vehicle.dimensions.length;
                 let numbers = force.iter().chain(moment.iter()).enumerate();
                 numbers.for_each(|(i, x)| rows[(row, 6 * surface + i)] = x / scale_of(state));
             }
         }
-        let places: Vec<_> = states
-            .iter()
-            .map(|s| View::of(&s.condition, mirrors).place(&s.condition, &s.reading, &unit))
-            .collect();
+        let places: Vec<_> =
+            states.iter().map(|s| View::of(&s.prior.condition, mirrors).place(&s.prior, &unit)).collect();
         let mut axes = Vec::with_capacity(3);
         for (axis, members) in OF_AXIS.into_iter().enumerate() {
             let columns: Vec<usize> =
@@ -126,17 +128,17 @@ impl OfVehicle {
             // the first of the members is the force itself
             let net = DVector::from_fn(values.ncols(), |i, _| if i % members.len() == 0 { 1.0 } else { 0.0 });
             let leading = &values * &net;
-            let scatter: Vec<f64> = states.iter().map(|s| s.scatter[axis] / scale_of(s)).collect();
+            let scatter: Vec<f64> = states.iter().map(|s| s.scatter[axis].max(least) / scale_of(s)).collect();
             let like = like.map(|other| &other.axes[axis]);
             axes.push(Regression::new(places.clone(), leading.as_slice(), &scatter, &values, like)?);
         }
         Some(Self { unit, mirrors, has_moments, axes })
     }
 
-    fn loads(&self, condition: &Condition, reading: &Reading, prepared: &Prepared) -> Vec<Load> {
-        let scale = scale(condition, reading, prepared);
-        let view = View::of(condition, self.mirrors);
-        let place = view.place(condition, reading, &self.unit);
+    fn loads(&self, prior: &Prior, prepared: &Prepared) -> Vec<Load> {
+        let scale = scale(prior);
+        let view = View::of(&prior.condition, self.mirrors);
+        let place = view.place(prior, &self.unit);
         let mut numbers = vec![[0.0; 6]; prepared.vehicle.surfaces.len()];
         for (regression, members) in self.axes.iter().zip(OF_AXIS) {
             let found = regression.at(&place);
@@ -155,8 +157,8 @@ impl OfVehicle {
 }
 
 /// What a coefficient of one is worth [N].
-fn scale(condition: &Condition, reading: &Reading, prepared: &Prepared) -> f64 {
-    reading.pressure * prepared.vehicle.dimensions.width * condition.depth
+fn scale(prior: &Prior) -> f64 {
+    prior.reading.pressure * prior.volume.powf(2.0 / 3.0)
 }
 
 /// The mirrors in which a state is seen.
@@ -177,20 +179,17 @@ impl View {
         self.0.into_iter().flatten().fold(v, |v, plane| plane.axial(&v))
     }
 
-    /// Coordinates of the state as it is seen.
-    fn place(
-        self,
-        condition: &Condition,
-        reading: &Reading,
-        unit: &[f64; COORDINATES],
-    ) -> [f64; COORDINATES] {
+    /// Where the state lies among others, as it is seen.
+    fn place(self, prior: &Prior, unit: &[f64; COORDINATES]) -> [f64; PLACE] {
+        let Prior { condition, reading, .. } = prior;
         let mut place = reading.coordinates;
         let (ahead, up) = (self.polar(direction(&condition.velocity)), self.polar(*condition.up));
         for axis in [0, 1] {
             place[DIRECTION[axis]] = ahead[axis];
             place[UP[axis]] = up[axis];
         }
-        std::array::from_fn(|i| place[i] / unit[i])
+        let drag = self.polar(prior.drag_force()) / scale(prior).max(f64::MIN_POSITIVE);
+        std::array::from_fn(|i| if i < COORDINATES { place[i] / unit[i] } else { drag[i - COORDINATES] })
     }
 
     /// Loads as they are seen, and those that are seen so as they are.
