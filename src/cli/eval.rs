@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Args;
 use serde_json::json;
+use wade_learn::evaluate::baseline::KNOWN;
 use wade_learn::evaluate::paper;
-use wade_learn::evaluate::report::{Report, VehicleReport};
+use wade_learn::evaluate::report::{ModelReport, Report, VehicleReport};
 use wade_learn::train::report::Record;
 use wade_learn::workflow::{Evaluation, Event, ModelKind};
 
@@ -94,6 +95,30 @@ fn text(report: &Report) -> String {
     text
 }
 
+/// Errors of a model by set and kind of motion, in shares of the dynamic load.
+fn regimes_text(model: &ModelReport) -> String {
+    let percent = |x: f64| format!("{:7.0}", 100.0 * x);
+    let mut text = format!(
+        "  {:30}{:>7}{:>12}{:>10}{:>24}\n",
+        format!("{} [%]", model.name),
+        "cases",
+        "horizontal",
+        "vertical",
+        "moment x y z"
+    );
+    for regime in &model.regimes {
+        let horizontal = regime.horizontal.map_or_else(|| "-".to_owned(), |x| format!("{:.1}", 100.0 * x));
+        let moment = regime.moment.map_or_else(String::new, |moment| moment.map(percent).concat());
+        text.push_str(&format!(
+            "    {:28}{:>7}{horizontal:>12}   {}   {moment}\n",
+            regime.name,
+            regime.cases,
+            percent(regime.vertical)
+        ));
+    }
+    text
+}
+
 fn vehicle_text(vehicle: &VehicleReport) -> String {
     let three = |values: [f64; 3]| values.map(|x| format!("{x:9.2}")).concat();
     let mut text =
@@ -118,6 +143,11 @@ fn vehicle_text(vehicle: &VehicleReport) -> String {
             }
         }
         text.push_str(&format!("  {:30}{}   mean magnitude [N m]\n", "the net moment itself", three(moment)));
+    }
+    // those of the other models are in the report
+    let known = vehicle.models.iter().skip(1).filter(|model| model.name == KNOWN);
+    for model in vehicle.models.iter().take(1).chain(known) {
+        text.push_str(&regimes_text(model));
     }
     for kind in &vehicle.kinds {
         let (mae, share) = (three(kind.mae_n), 100.0 * kind.share);

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::contest::{Contest, Entry, Heat};
 use super::measure::{Calibration, Errors, Flow, mean_magnitude, percentile};
 use super::paper::{self, Paper};
+use super::regimes::{RegimeReport, regimes};
 use super::states::State;
 use super::{EvaluateError, page};
 use crate::dataset::flows;
@@ -105,6 +106,8 @@ pub struct ModelReport {
     pub moment_mae_nm: Option<[f64; 3]>,
     /// Mean absolute error of the force on a surface [N], where the model knows surfaces.
     pub surface_mae_n: Option<[f64; 3]>,
+    /// By set and by kind of motion.
+    pub regimes: Vec<RegimeReport>,
 }
 
 /// Errors on a surface, or on the surfaces of a kind.
@@ -171,7 +174,11 @@ impl VehicleReport {
             samples: heat.states.len(),
             mean_force_n: mean_magnitude(forces.iter()),
             mean_moment_nm: known.map(|moments| mean_magnitude(moments.iter())),
-            models: heat.entries.iter().map(|entry| ModelReport::new(entry, &forces, &moments)).collect(),
+            models: heat
+                .entries
+                .iter()
+                .map(|entry| ModelReport::new(vehicle, (entry, &heat.states), &forces, &moments))
+                .collect(),
             surfaces: groups(vehicle, heat, |surface| vehicle.surfaces[surface].name.clone()),
             kinds: groups(vehicle, heat, |s| vehicle.surfaces[s].kind.name().to_owned()),
             slices: slices(heat, &forces),
@@ -184,7 +191,12 @@ impl VehicleReport {
 }
 
 impl ModelReport {
-    fn new(entry: &Entry, forces: &[Vec3], moments: &[Option<Vec3>]) -> Self {
+    fn new(
+        vehicle: &Vehicle,
+        (entry, states): (&Entry, &[State]),
+        forces: &[Vec3],
+        moments: &[Option<Vec3>],
+    ) -> Self {
         let pairs: Vec<_> = entry.predictions.iter().map(|p| p.force).zip(forces.iter().copied()).collect();
         let moment = |(p, truth): (&super::predict::Prediction, &Option<Vec3>)| Some(p.moment? - (*truth)?);
         let moments: Option<Vec<Vec3>> = entry.predictions.iter().zip(moments).map(moment).collect();
@@ -194,6 +206,7 @@ impl ModelReport {
             force: Errors::of(&pairs),
             moment_mae_nm: moments.map(|errors| mean_magnitude(errors.iter())),
             surface_mae_n: surfaces().next().map(|_| mean_magnitude(surfaces())),
+            regimes: regimes(vehicle, entry, states),
         }
     }
 }

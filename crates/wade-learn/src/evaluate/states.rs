@@ -15,6 +15,8 @@ pub struct State {
     pub vehicle: String,
     /// Name of the case.
     pub case: String,
+    /// The set that it was planned in.
+    pub set: String,
     /// Which image of it.
     pub image: Image,
     /// The state, in the ground-contact convention of the data set.
@@ -66,6 +68,7 @@ pub fn states(source: &Source, numbers: &[usize]) -> Result<Vec<State>, TrainErr
         Ok(State {
             vehicle: (*name).clone(),
             case: sample.case.clone(),
+            set: sample.set.clone(),
             image: sample.image,
             condition: sample.condition,
             features: Sample::new(vehicle, index, sample, &labels),

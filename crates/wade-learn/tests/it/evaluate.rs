@@ -15,6 +15,7 @@ use wade_learn::dataset::split::{By, split};
 use wade_learn::evaluate::baseline::Baseline;
 use wade_learn::evaluate::contest::{Contest, Entry, Heat};
 use wade_learn::evaluate::predict::Prediction;
+use wade_learn::evaluate::regimes::regimes;
 use wade_learn::evaluate::report::{About, Report};
 use wade_learn::evaluate::states::{State, states};
 use wade_learn::evaluate::{EvaluateError, held_out};
@@ -253,4 +254,36 @@ fn what_was_learnt_from_is_no_judge() {
     let (weights, _) = bundles().remove("husky").unwrap().trained.unwrap();
     let error = held_out::check_weights(&record, "husky", &weights).unwrap_err();
     assert!(matches!(error, EvaluateError::OtherWeights { .. }));
+}
+
+#[test]
+fn an_error_of_a_tenth_of_the_dynamic_load_is_a_tenth_in_every_regime() {
+    let vehicle = vehicles().remove("warthog").unwrap();
+    let about = vehicle.center_of_mass;
+    let mut states = planted("warthog", true, |c| {
+        let rest =
+            vehicle.at_rest(c).into_iter().fold(wade_core::wrench::Wrench::default(), |sum, load| sum + load);
+        let (drag, turn) = (Vec3::new(-900.0, 300.0, 200.0), Vec3::new(20.0, -40.0, 60.0));
+        (rest.force + drag, rest.moment + about.cross(&drag) + turn)
+    });
+    for state in states.iter_mut().step_by(2) {
+        state.set = "afloat".to_owned();
+        state.condition.bed_clearance = Some(0.3);
+    }
+    let predictions = states.iter().map(|state| {
+        let moment = state.moment(&about).unwrap() + Vec3::new(2.0, -4.0, 6.0);
+        let force = state.force() + Vec3::new(-90.0, 30.0, 20.0);
+        Prediction { force, moment: Some(moment), surface_errors: Vec::new(), uncertainty: None }
+    });
+    let entry = Entry { name: "planted".to_owned(), predictions: predictions.collect() };
+    let found = regimes(&vehicle, &entry, &states);
+    let names: Vec<&str> = found.iter().map(|regime| regime.name.as_str()).collect();
+    assert!(names.starts_with(&["afloat"]) && names.contains(&"off the bed"), "{names:?}");
+    for regime in &found {
+        assert!(regime.cases > 0 && regime.judged == regime.cases, "{regime:?}");
+        let shares = [regime.horizontal.unwrap(), regime.vertical].into_iter().chain(regime.moment.unwrap());
+        for share in shares {
+            assert!((share - 0.1).abs() < 1e-6, "{regime:?}");
+        }
+    }
 }
