@@ -6,8 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Bytes of all files that git tracks: 14 MB, and 2 kB for each of the 300 cases of the campaign `drive` and the 500 of other hulls.
-const MAX_TREE_BYTES: u64 = 14_000_000 + 800 * 2_000;
+/// Bytes of all files that git tracks: 14.5 MB, of which 5.4 are the campaigns that the shipped weights were trained on, and 2 kB
+/// for each of the 300 cases of the campaign `drive` and the 500 of other hulls.
+const MAX_TREE_BYTES: u64 = 14_500_000 + 800 * 2_000;
 
 /// Files that git tracks and that are there; none outside a checkout, such as a source archive.
 fn tracked() -> Vec<PathBuf> {
