@@ -32,7 +32,7 @@ use crate::real::{Real, norm};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
-/// What the network's answer is a remainder of, and with it what it is told of a state.
+/// What the network's answer is a remainder of, which decides its inputs too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Remainder {
     /// Archimedes and the simple drag of this module: level or nearly so, the wheels on the bed.
@@ -55,7 +55,7 @@ impl Remainder {
         [Self::OfDrag, Self::OfPhysics].into_iter().find(|remainder| remainder.name() == name)
     }
 
-    /// Names of what its network is told of a state, in order.
+    /// Names of its inputs that are the same for all surfaces, in order.
     pub fn global_names(self) -> &'static [&'static str] {
         match self {
             Self::OfDrag => &GLOBAL_NAMES[..GLOBAL - 2],
@@ -72,7 +72,7 @@ impl Remainder {
     }
 }
 
-/// Names of what is told of a state, in order; the last two to a remainder of the physical base alone.
+/// Names of the inputs that are the same for all surfaces, in order; the last two of a remainder of the physical base alone.
 pub const GLOBAL_NAMES: [&str; 13] = [
     "froude_depth",
     "froude_length",

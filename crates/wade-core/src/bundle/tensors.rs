@@ -417,7 +417,7 @@ fn read_network(file: &File<'_>, inputs: usize, outputs: usize) -> Result<Networ
 }
 
 fn read_anchored(file: &File<'_>, remainder: Remainder) -> Result<Anchored, TensorError> {
-    let (told, apart) = (remainder.global_names().len(), remainder.coordinates());
+    let (inputs, apart) = (remainder.global_names().len(), remainder.coordinates());
     let cases = file.floats("cases", &[None, Some(apart)])?;
     let cases: Vec<[f32; COORDINATES]> = cases.chunks_exact(apart).map(|case| filled(case, 0.0)).collect();
     if cases.is_empty() {
@@ -426,8 +426,8 @@ fn read_anchored(file: &File<'_>, remainder: Remainder) -> Result<Anchored, Tens
     let [near] = array(&file.deviations("near", 1)?);
     Ok(Anchored {
         remainder,
-        global_mean: filled::<GLOBAL>(&file.floats("global_mean", &[Some(told)])?, 0.0),
-        global_std: filled::<GLOBAL>(&file.deviations("global_std", told)?, 1.0),
+        global_mean: filled::<GLOBAL>(&file.floats("global_mean", &[Some(inputs)])?, 0.0),
+        global_std: filled::<GLOBAL>(&file.deviations("global_std", inputs)?, 1.0),
         spread: array(&file.deviations("spread", 3)?),
         cases,
         coordinate_scale: filled(&file.deviations("coordinate_scale", apart)?, 1.0),
@@ -435,7 +435,7 @@ fn read_anchored(file: &File<'_>, remainder: Remainder) -> Result<Anchored, Tens
     })
 }
 
-/// Numbers that a file has, and the same for what is told of remainders of another kind.
+/// Numbers that a file has, and `rest` for inputs and coordinates that its remainder does not have.
 fn filled<const N: usize>(values: &[f32], rest: f32) -> [f32; N] {
     std::array::from_fn(|i| values.get(i).copied().unwrap_or(rest))
 }
@@ -465,11 +465,11 @@ pub fn write_weights(weights: &Weights) -> Vec<u8> {
             (Kind::Paper, None)
         }
         Form::Anchored(form) => {
-            let (told, apart) = (form.remainder.global_names().len(), form.remainder.coordinates());
+            let (inputs, apart) = (form.remainder.global_names().len(), form.remainder.coordinates());
             let cases: Vec<f32> = form.cases.iter().flat_map(|case| case[..apart].iter().copied()).collect();
             tensors.extend([
-                vector("global_mean", &form.global_mean[..told]),
-                vector("global_std", &form.global_std[..told]),
+                vector("global_mean", &form.global_mean[..inputs]),
+                vector("global_std", &form.global_std[..inputs]),
                 vector("spread", &form.spread),
                 floats("cases", vec![form.cases.len(), apart], &cases),
                 vector("coordinate_scale", &form.coordinate_scale[..apart]),

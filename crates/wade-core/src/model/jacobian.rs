@@ -258,8 +258,8 @@ impl Model {
         let trust = Anchored::trust(form.distance_dual(&reading.coordinates));
         let turning = loads.turning_in(|x| directions.level(x));
         let outputs = buffers.outputs(wet.len());
-        let told = form.remainder.global_names().len();
-        let of_outputs = learned.kernel.slopes((&of_global[..told], features), buffers, slopes);
+        let inputs = form.remainder.global_names().len();
+        let of_outputs = learned.kernel.slopes((&of_global[..inputs], features), buffers, slopes);
         let mut sum = turning.steady_hull(&level.velocity) * -trust;
         for ((WetSurface { surface, .. }, output), of_output) in wet.iter().zip(outputs).zip(of_outputs) {
             let answer = std::array::from_fn(|i| Level {

@@ -51,15 +51,15 @@ impl Model {
         let mut reading = Reading::default();
         anchor.read(&self.vehicle, &condition, &mut reading);
         let trust = Anchored::trust(form.distance(&reading.coordinates));
-        let told = form.standardize(&reading.global);
-        let told = &told[..form.remainder.global_names().len()];
+        let global = form.standardize(&reading.global);
+        let global = &global[..form.remainder.global_names().len()];
         let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&learned.coverage);
         let force = surfaces.zip(drag).map(|(((known, fixed), learnt), drag)| {
             if known.wet_fraction == 0.0 {
                 return drag;
             }
             let of_surface = fixed.into_iter().chain(known.told());
-            let row: Vec<f32> = of_surface.chain(told.iter().copied()).collect();
+            let row: Vec<f32> = of_surface.chain(global.iter().copied()).collect();
             let output = learned.weights.network.forward(&row);
             let answer: [f32; anchor::OUTPUTS] = std::array::from_fn(|i| output[i] * (trust * learnt) as f32);
             known.hydrostatic.force + drag + known.force(&answer)

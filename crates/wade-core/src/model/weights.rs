@@ -64,7 +64,7 @@ pub struct Anchored {
 }
 
 impl Anchored {
-    /// Standardised global features, of which the network is told the first [`Remainder::global_names`].
+    /// Standardised global features, of which the network takes the first [`Remainder::global_names`].
     pub fn standardize(&self, global: &[f64; GLOBAL]) -> [f32; GLOBAL] {
         std::array::from_fn(|i| (global[i] as f32 - self.global_mean[i]) / self.global_std[i])
     }

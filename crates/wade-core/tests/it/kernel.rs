@@ -131,7 +131,7 @@ fn plain_slopes(network: &Network, row: &[f64], along: &[f64]) -> Vec<f64> {
 
 #[test]
 fn slopes_are_those_of_the_network_on_every_instruction_set() {
-    // what the shipped weights are told of a state
+    // inputs of the shipped weights
     const GLOBAL: usize = anchor::GLOBAL - 2;
     let model = model_on("husky", Isa::available()[0]);
     let (vehicle, network) = (model.vehicle(), &model.weights().expect("weights").network);

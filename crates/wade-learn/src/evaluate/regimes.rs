@@ -44,6 +44,8 @@ struct Case<'a> {
     moment: Option<[Vec3; 2]>,
 }
 
+type IsKind = fn(&State) -> bool;
+
 /// The regimes of an entry's states.
 pub fn regimes(vehicle: &Vehicle, entry: &Entry, states: &[State]) -> Vec<RegimeReport> {
     let sections = flows(states.iter().map(|state| (state.case.as_str(), state.image, &state.condition)));
@@ -56,8 +58,11 @@ pub fn regimes(vehicle: &Vehicle, entry: &Entry, states: &[State]) -> Vec<Regime
     let mut names: Vec<&str> = cases.iter().map(|case| case.state.set.as_str()).collect();
     names.sort_unstable();
     names.dedup();
-    let of_set = names.into_iter().map(|name| (name, cases.iter().filter(|c| c.state.set == name).collect()));
-    let kinds: [(&str, fn(&State) -> bool); 3] = [
+    let of_set = names.into_iter().map(|name| {
+        let cases: Vec<&Case<'_>> = cases.iter().filter(|case| case.state.set == name).collect();
+        report(vehicle, name, &cases)
+    });
+    let kinds: [(&str, IsKind); 3] = [
         ("reverse", |state| {
             let [ahead, ..] = level_axes(state);
             ahead.dot(&state.condition.velocity) < ASTERN * state.condition.velocity.norm()
@@ -65,9 +70,11 @@ pub fn regimes(vehicle: &Vehicle, entry: &Entry, states: &[State]) -> Vec<Regime
         ("tilted", |state| state.condition.up.z < TILTED),
         ("off the bed", |state| state.condition.bed_clearance.is_some_and(|c| c > OFF_THE_BED)),
     ];
-    let of_kind = kinds.map(|(name, is)| (name, cases.iter().filter(|c| is(c.state)).collect()));
-    let all = of_set.chain(of_kind).filter(|(_, cases): &(_, Vec<&Case<'_>>)| !cases.is_empty());
-    all.map(|(name, cases)| report(vehicle, name, &cases)).collect()
+    let of_kind = kinds.map(|(name, is)| {
+        let cases: Vec<&Case<'_>> = cases.iter().filter(|case| is(case.state)).collect();
+        report(vehicle, name, &cases)
+    });
+    of_set.chain(of_kind).filter(|regime| regime.cases > 0).collect()
 }
 
 impl<'a> Case<'a> {

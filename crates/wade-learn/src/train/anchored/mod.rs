@@ -10,7 +10,7 @@ mod gaussian;
 pub mod known;
 pub mod loss;
 pub mod spread;
-pub mod teacher;
+mod teacher;
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -94,7 +94,7 @@ pub fn train(run: Run<'_>, progress: &dyn Fn(&Epoch)) -> Result<Trained<Learnt>,
 const LEAST_UNIT: [f64; COORDINATES] = [0.05, 0.05, 0.05, 0.2, 0.2, 0.1, 0.1, 10.0, 0.2];
 
 /// Standardisation, and the unit of each coordinate.
-pub fn form(training: &[Known]) -> (Anchored, [f64; COORDINATES]) {
+fn form(training: &[Known]) -> (Anchored, [f64; COORDINATES]) {
     let (mean, std) = super::task::moments(training.iter().map(|state| state.prior.reading.global));
     let scale = units(training.iter().map(|state| state.prior.reading.coordinates));
     let form = Anchored {
