@@ -1,5 +1,4 @@
-//! Models that need no network: three fitted to the training states of one vehicle by least squares, and what the `anchored`
-//! model knows before anything is learnt.
+//! Models that need no network: three fitted to the training states of one vehicle by least squares, and the physical base.
 
 use nalgebra::{DMatrix, RowVector6};
 
@@ -126,7 +125,7 @@ impl Baseline {
 /// The name of [`known`] in reports.
 pub const KNOWN: &str = "known physics alone";
 
-/// What the physical base says of states, which the `anchored` model knows before anything is learnt.
+/// What the physical base says of states, which the `anchored` weights are a remainder of.
 pub fn known(vehicle: &Vehicle, states: &[&State]) -> Vec<Prediction> {
     let base = Base::new(vehicle, Radiation::estimate(vehicle));
     let model = Model::of_physics(vehicle.clone(), 0, base);

@@ -58,7 +58,7 @@ pub enum TrainError {
         /// A case of the other.
         resting: String,
     },
-    /// A vehicle off the bed, of which the paper's network is not told.
+    /// A vehicle off the bed, which is no input of the paper's network.
     #[error(
         "case `{case}` stands {clearance} m off the bed, which is not an input of the paper's network: keep other sets with `wade dataset merge --set`, or train the anchored network"
     )]

@@ -97,7 +97,7 @@ fn check_steady(data: &Dataset) -> Result<(), TrainError> {
     }
 }
 
-/// Refuses two kinds of bed for one vehicle, and a bed that is not below the wheels, of which the paper's network is not told.
+/// Refuses two kinds of bed for one vehicle, and a bed that is not below the wheels, which are no inputs of the paper's network.
 fn check_beds(data: &Dataset) -> Result<(), TrainError> {
     for sample in &data.samples {
         if let Some(clearance) = sample.condition.bed_clearance.filter(|clearance| *clearance > 0.0) {

@@ -21,7 +21,7 @@ pub type Load = (Vec3, Option<Vec3>);
 pub struct Prior {
     /// The state, over the bed that the base finds below it.
     pub condition: Condition,
-    /// What the network is told.
+    /// The inputs of the network.
     pub reading: Reading,
     /// Drag that the physical base puts on each surface, about the body origin.
     pub drag: Vec<Wrench>,
