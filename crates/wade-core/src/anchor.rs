@@ -5,7 +5,8 @@
 //!
 //! The model is `F_s = H_s + D_s + q A_s R_s`: the pressure load `H_s` of still water, the drag `D_s`, and a remainder
 //! `R_s` that the network answers, in units of the dynamic pressure `q = rho U^2 / 2` on the area `A_s` that the water may
-//! reach. A surface above still water gets nothing, continuously; a vehicle at rest gets Archimedes.
+//! reach. A surface above still water gets nothing, continuously; a vehicle at rest gets Archimedes. Of a remainder of the
+//! physical base ([`Remainder::OfPhysics`]) `D_s` is left out here: it is the base's, which serving adds.
 //!
 //! `A_s` is the share of the surface's area that its height has below the head of the stream, `U^2 / 2g` above still water:
 //! a fast bow wave climbs a front that stands in the water by a centimeter, and would be a remainder without bound on

@@ -1,7 +1,9 @@
 //! The physical base with what was learned beside it.
 //!
 //! The learned part of a surface is what the network says is left of the base, or its anchored load less the base's, both of the
-//! level part of the motion, and counts as far as the state is near those that the weights were trained on. Together it may spend power and never give any: where it would give
+//! level part of the motion, and counts as far as the state is near those that the weights were trained on. As far as it counts,
+//! the load that the base gives the hull as a whole in steady motion gives way to it: steady CFD, and so the weights, have it in
+//! them. Together it may spend power and never give any: where it would give
 //! `P` to a hull whose base takes `P_0`, it is scaled by `k(r)` of `r = P / P_0`, 1 up to a half and `(1 - 1 / 4r) / r` from
 //! there, which is smooth and leaves `k r < 1`.
 

@@ -86,15 +86,15 @@ impl Anchored {
     /// The same with derivatives: those of the distance to the case that is nearest.
     pub fn distance_dual<const N: usize>(&self, coordinates: &[Dual<N>; COORDINATES]) -> Dual<N> {
         let here = self.place(&coordinates.map(Real::value));
+        // the state and a case are as far apart as the state's mirror image and the case's
         let images = match self.remainder {
-            Remainder::OfDrag => [here; 2],
-            Remainder::OfPhysics => [here, mirrored(here)],
+            Remainder::OfDrag => 1,
+            Remainder::OfPhysics => 2,
         };
-        let distances = images.iter().zip([false, true]).flat_map(|(here, image)| {
-            self.cases
-                .iter()
-                .map(move |case| (squared(here, case), if image { mirrored(*case) } else { *case }))
-        });
+        let as_seen = [|case: &_| *case, |case: &_| mirrored(*case)];
+        let distances = as_seen[..images]
+            .iter()
+            .flat_map(|as_seen| self.cases.iter().map(as_seen).map(|case| (squared(&here, &case), case)));
         let nearest = distances.reduce(|best, next| if next.0 < best.0 { next } else { best });
         let Some((_, nearest)) = nearest else { return f64::INFINITY.into() };
         let sum = (0..COORDINATES).fold(Dual::default(), |sum, axis| {

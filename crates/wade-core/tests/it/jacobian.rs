@@ -121,13 +121,7 @@ fn check(subject: &Subject, motion: Motion<'_>, memory: Option<Memory>, dry_cont
     assert!(worst < 1e-4 && kinks < 0.02, "{name}: {worst:e}, {kinks} at kinks");
 }
 
-const ALONE: Motion<'_> = Motion {
-    wheel_speeds: &STATED_NONE,
-    time_step: 0.0,
-    implicit_added_mass: false,
-    physics: Physics::Full,
-    waters: None,
-};
+const ALONE: Motion<'_> = Motion::ALONE;
 
 #[test]
 fn derivatives_of_the_base_are_those_of_its_loads() {

@@ -15,7 +15,8 @@ use wade_core::forces::Forces;
 use wade_core::frame::Vec3;
 use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::model::kernel::Isa;
-use wade_core::model::{Model, SPREAD, Workspace};
+use wade_core::model::{JacobianWorkspace, Model, SPREAD, Workspace};
+use wade_core::physics::Motion;
 use wade_core::vehicle::Vehicle;
 use wade_learn::dataset::Sample;
 use wade_learn::dataset::split::{By, Split, split};
@@ -220,6 +221,50 @@ fn the_bundle_answers_as_the_trainer_s_own_forward_pass() {
         refused.contains("a remainder of the physical base, and radiation.safetensors is missing"),
         "{refused}"
     );
+}
+
+#[test]
+fn derivatives_of_what_was_trained_are_those_of_its_loads() {
+    const STEP: f64 = 5e-4;
+    let lesson = Lesson::new();
+    let trained = lesson.train(&short(), None);
+    let (mut close, mut all) = (0, 0);
+    for model in bundles(&trained, Isa::available()[0]).values() {
+        let z0 = model.vehicle().z0;
+        let mut random = Random::new(3);
+        for _ in 0..40 {
+            let mut draw = |size: f64| size * (2.0 * random.unit() - 1.0);
+            let up = wade_core::frame::up_from_roll_pitch(draw(0.05), draw(0.05));
+            let (velocity, level) = (Vec3::new(0.6 + draw(0.3), draw(0.4), 0.0), z0 + 0.15 + draw(0.04));
+            let bed_clearance = Some(0.01 + draw(0.01));
+            let state =
+                Condition { up, water_level: Some(level), bed_clearance, ..Condition::level(velocity, 0.0) };
+            let mut forces = Forces::default();
+            let rooms = (&mut Workspace::new(), &mut JacobianWorkspace::new());
+            let asked = (&Motion::ALONE, None);
+            let jacobian = model.evaluate_with_jacobian(&state, asked, rooms, &mut forces).unwrap();
+            let stepped = |column: usize, by: f64| {
+                let mut state = state;
+                match column {
+                    0..3 => {
+                        state.velocity[column] += by;
+                        state.ground_velocity[column] += by;
+                    }
+                    6 => state.water_level = Some(level + by),
+                    _ => state.density += 1e3 * by,
+                }
+                evaluate(model, &state).wrench.column()
+            };
+            for (column, unit) in [(0, 1.0), (1, 1.0), (6, 1.0), (10, 1e3)] {
+                let numeric = (stepped(column, STEP) - stepped(column, -STEP)) / (2.0 * STEP * unit);
+                let found = jacobian.column(column);
+                all += 1;
+                close += usize::from((found - numeric).norm() < 0.02 * numeric.norm());
+            }
+        }
+    }
+    // the rest lies at kinks of the network, which single precision makes wide
+    assert!(close as f64 > 0.9 * f64::from(all), "{close} of {all}");
 }
 
 #[test]

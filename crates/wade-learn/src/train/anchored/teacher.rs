@@ -7,9 +7,9 @@
 //! by 120 N in the mean, a regression through 72 by 38 N.
 //!
 //! Its answers are what is left of the base, `q V^(2/3)` (dynamic pressure, displaced volume) times functions of the
-//! coordinates and of the coefficients of the base's own drag, which know how much of the hull meets the flow in an attitude. All surfaces share the
-//! lengths and noise that the net force along each axis asks for, so that the sum over surfaces is what it would say of the
-//! net force. Serving does without it: the network learns its answers, in the cases and in states between these.
+//! coordinates and of the coefficients of the base's own drag, which know how much of the hull meets the flow in an attitude.
+//! All surfaces share the lengths and noise that the net force along each axis asks for, so that the sum over surfaces is what
+//! it would say of the net force. Serving does without it: the network learns its answers, in the cases and in states between these.
 //!
 //! Of mirror images one is looked at, motion ahead (where the data set has front-rear images) and to the left (where the
 //! hull is symmetric): an image has the noise of its original, and two cases that agree to the last bit would say that
