@@ -6,7 +6,7 @@ use wade_core::effects::Circumstances;
 use wade_core::forces::Forces;
 use wade_core::frame::Vec3;
 use wade_core::model::{COLUMNS, Jacobian, JacobianWorkspace, Model, Workspace};
-use wade_core::physics::{BaseLoads, Memory, Motion, Physics, STATED_NONE};
+use wade_core::physics::{BaseLoads, Memory, Motion, Physics};
 use wade_core::served::{Loads, ServedVehicle, Session};
 use wade_core::vehicle::MAX_SURFACES;
 
