@@ -29,6 +29,15 @@ pub fn up_from_quaternion(world_from_body: &UnitQuaternion<f64>) -> UnitVector3<
     world_from_body.inverse() * Vec3::z_axis()
 }
 
+/// Ahead, left and up of a level frame with the heading of the body, in the body frame; ahead is the body's x where that is
+/// vertical.
+pub fn level_axes(up: &UnitVector3<f64>) -> [Vec3; 3] {
+    let up = up.into_inner();
+    let ahead = Vec3::x() - up * up.x;
+    let ahead = ahead.try_normalize(1e-9).unwrap_or_else(Vec3::x);
+    [ahead, up.cross(&ahead), up]
+}
+
 /// The undisturbed water surface as a plane in the body frame: points with `normal . x <= offset` are under water.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WaterPlane<T: Real = f64> {

@@ -25,14 +25,14 @@ impl<T: Real> Wrench<T> {
     pub fn moved(self, old: &Vector3<T>, new: &Vector3<T>) -> Self {
         Self { force: self.force, moment: self.moment + (old - new).cross(&self.force) }
     }
+
+    /// Of a column, force first.
+    pub fn from_column(column: &Vector6<T>) -> Self {
+        Self { force: column.fixed_rows::<3>(0).into_owned(), moment: column.fixed_rows::<3>(3).into_owned() }
+    }
 }
 
 impl Wrench {
-    /// Of a column, force first.
-    pub fn from_column(column: &Vector6<f64>) -> Self {
-        Self { force: column.fixed_rows::<3>(0).into_owned(), moment: column.fixed_rows::<3>(3).into_owned() }
-    }
-
     /// As a column, force first.
     pub fn column(&self) -> Vector6<f64> {
         let Self { force, moment } = self;

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::immersion::Immersion;
 use crate::condition::Condition;
-use crate::frame::{GRAVITY, Vec3};
+use crate::frame::{GRAVITY, Vec3, level_axes};
 use crate::vehicle::PerWheel;
 use crate::wrench::Wrench;
 
@@ -137,11 +137,7 @@ impl Input<'_> {
 
     /// World vector of a horizontal world direction, in the body frame.
     pub(super) fn body_from_world(&self, east: f64, north: f64) -> Vec3 {
-        let up = self.condition.up.into_inner();
-        // the body's x in the horizontal plane points along the heading
-        let ahead = Vec3::x() - up * up.x;
-        let ahead = ahead.try_normalize(1e-9).unwrap_or_else(Vec3::x);
-        let left = up.cross(&ahead);
+        let [ahead, left, _] = level_axes(&self.condition.up);
         let (sine, cosine) = self.yaw.sin_cos();
         ahead * (cosine * east + sine * north) + left * (cosine * north - sine * east)
     }

@@ -110,7 +110,7 @@ impl<'a> Blend<'a> {
             self.learned[*surface] = part * share;
             doubtful += part.force.abs() * Anchored::doubt(distance).min(share);
         }
-        self.learned_hull = self.loads.steady_hull(velocity) * -trust;
+        self.learned_hull = self.loads.steady_hull(velocity, |x| x) * -trust;
         self.learned_deviation = Vec3::from(form.spread.map(f64::from)) * spread + doubtful;
         self.weight = trust;
     }

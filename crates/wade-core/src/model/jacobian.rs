@@ -256,11 +256,10 @@ impl Model {
         let of_global: [_; GLOBAL] =
             std::array::from_fn(|i| reading.global[i].slope.map(|slope| slope as f32 / form.global_std[i]));
         let trust = Anchored::trust(form.distance_dual(&reading.coordinates));
-        let turning = loads.turning_in(|x| directions.level(x));
         let outputs = buffers.outputs(wet.len());
         let inputs = form.remainder.global_names().len();
         let of_outputs = learned.kernel.slopes((&of_global[..inputs], features), buffers, slopes);
-        let mut sum = turning.steady_hull(&level.velocity) * -trust;
+        let mut sum = loads.steady_hull(&level.velocity, |x| directions.level(x)) * -trust;
         for ((WetSurface { surface, .. }, output), of_output) in wet.iter().zip(outputs).zip(of_outputs) {
             let answer = std::array::from_fn(|i| Level {
                 value: f64::from(output[i]),

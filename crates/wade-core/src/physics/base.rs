@@ -157,16 +157,10 @@ impl<T: Real> BaseLoads<T> {
 }
 
 impl<T: Real> BaseLoads<T> {
-    /// The load of the hull as a whole in steady motion, about the body origin: the moment of the added mass in an oblique
-    /// stream, `-v x M_A v` (Munk, The aerodynamic forces on airship hulls, NACA report 184, 1924).
-    pub(crate) fn steady_hull(&self, velocity: &Vector3<T>) -> Wrench<T> {
-        let load = -cross_terms(&self.far_from_bed, velocity, &Vector3::zeros());
-        Wrench { force: load.fixed_rows::<3>(0).into_owned(), moment: load.fixed_rows::<3>(3).into_owned() }
-    }
-
-    /// The added mass of which [`Self::steady_hull`] is, in other numbers.
-    pub(crate) fn turning_in<U: Real>(&self, with: impl Fn(T) -> U) -> BaseLoads<U> {
-        BaseLoads { far_from_bed: self.far_from_bed.map(with), ..BaseLoads::with_capacity(0) }
+    /// The load of the hull as a whole in steady motion, about the body origin, in other numbers: the moment of the added mass
+    /// in an oblique stream, `-v x M_A v` (Munk, The aerodynamic forces on airship hulls, NACA report 184, 1924).
+    pub(crate) fn steady_hull<U: Real>(&self, velocity: &Vector3<U>, with: impl Fn(T) -> U) -> Wrench<U> {
+        Wrench::from_column(&-cross_terms(&self.far_from_bed.map(with), velocity, &Vector3::zeros()))
     }
 
     /// What the water reaches on each surface, in other numbers.
@@ -503,10 +497,7 @@ impl Base {
             }
         }
         out.added_mass = mass;
-        out.hull = Wrench {
-            force: load.fixed_rows::<3>(0).into_owned(),
-            moment: load.fixed_rows::<3>(3).into_owned(),
-        };
+        out.hull = Wrench::from_column(&load);
     }
 
     fn rows(&self, table: usize) -> &[Node] {

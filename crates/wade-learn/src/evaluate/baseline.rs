@@ -134,7 +134,8 @@ pub fn known(vehicle: &Vehicle, states: &[&State]) -> Vec<Prediction> {
     served(&model, states).into_iter().map(known).collect()
 }
 
-fn rest(vehicle: &Vehicle, condition: &Condition) -> Wrench {
+/// The load of still water about the center of mass.
+pub(super) fn rest(vehicle: &Vehicle, condition: &Condition) -> Wrench {
     let loads = vehicle.at_rest(condition).into_iter();
     loads.fold(Wrench::default(), |sum, load| sum + load).moved(&Vec3::zeros(), &vehicle.center_of_mass)
 }

@@ -3,12 +3,13 @@
 
 use serde::Serialize;
 
+use super::baseline::rest;
 use super::contest::Entry;
-use super::states::State;
-use crate::dataset::{Image, flows};
-use wade_core::frame::{GRAVITY, Vec3};
+use super::states::{State, sections};
+use crate::dataset::Image;
+use crate::signal::median;
+use wade_core::frame::{GRAVITY, Vec3, level_axes};
 use wade_core::vehicle::Vehicle;
-use wade_core::wrench::Wrench;
 
 /// Share of the weight below which a horizontal force is too small for its error to be a share of it.
 const LEAST_FORCE: f64 = 0.02;
@@ -48,7 +49,7 @@ type IsKind = fn(&State) -> bool;
 
 /// The regimes of an entry's states.
 pub fn regimes(vehicle: &Vehicle, entry: &Entry, states: &[State]) -> Vec<RegimeReport> {
-    let sections = flows(states.iter().map(|state| (state.case.as_str(), state.image, &state.condition)));
+    let sections = sections(states);
     let moves = |places: &&Vec<usize>| {
         let state = &states[places[0]];
         state.image == Image::Original && state.condition.velocity.norm() > 0.0
@@ -64,7 +65,7 @@ pub fn regimes(vehicle: &Vehicle, entry: &Entry, states: &[State]) -> Vec<Regime
     });
     let kinds: [(&str, IsKind); 3] = [
         ("reverse", |state| {
-            let [ahead, ..] = level_axes(state);
+            let [ahead, ..] = level_axes(&state.condition.up);
             ahead.dot(&state.condition.velocity) < ASTERN * state.condition.velocity.norm()
         }),
         ("tilted", |state| state.condition.up.z < TILTED),
@@ -81,31 +82,23 @@ impl<'a> Case<'a> {
     fn new(vehicle: &Vehicle, entry: &Entry, states: &'a [State], places: &[usize]) -> Self {
         let state = &states[places[0]];
         let about = &vehicle.center_of_mass;
-        let rest =
-            vehicle.at_rest(&state.condition).into_iter().fold(Wrench::default(), |sum, load| sum + load);
-        let rest = rest.moved(&Vec3::zeros(), about);
-        let mean = |of: &dyn Fn(usize) -> Vec3| {
-            places.iter().map(|&place| of(place)).sum::<Vec3>() / places.len() as f64
-        };
-        let [ahead, left, up] = level_axes(state);
-        let level = |v: Vec3| Vec3::new(v.dot(&ahead), v.dot(&left), v.dot(&up));
+        let rest = rest(vehicle, &state.condition);
+        let sections = places.len() as f64;
+        let mean =
+            |of: &dyn Fn(usize) -> Vec3| places.iter().map(|&place| of(place)).sum::<Vec3>() / sections;
+        let axes = level_axes(&state.condition.up);
+        let level = |v: Vec3| Vec3::from(axes.map(|axis| axis.dot(&v)));
         let found = mean(&|place| states[place].force());
         let said = mean(&|place| entry.predictions[place].force);
         let moment = |place: usize| Some((states[place].moment(about)?, entry.predictions[place].moment?));
-        let has_moments = places.iter().all(|&place| moment(place).is_some());
-        let moment = has_moments.then(|| {
-            let found = mean(&|place| moment(place).map_or_else(Vec3::zeros, |m| m.0));
-            let said = mean(&|place| moment(place).map_or_else(Vec3::zeros, |m| m.1));
+        let moments: Option<Vec<(Vec3, Vec3)>> = places.iter().map(|&place| moment(place)).collect();
+        let moment = moments.map(|moments| {
+            let found = moments.iter().map(|(found, _)| *found).sum::<Vec3>() / sections;
+            let said = moments.iter().map(|(_, said)| *said).sum::<Vec3>() / sections;
             [level(found - rest.moment), level(said - found)]
         });
         Self { state, force: level(found - rest.force), force_error: level(said - found), moment }
     }
-}
-
-fn level_axes(state: &State) -> [Vec3; 3] {
-    let up = state.condition.up.into_inner();
-    let ahead = (Vec3::x() - up * up.x).normalize();
-    [ahead, up.cross(&ahead), up]
 }
 
 fn report(vehicle: &Vehicle, name: &str, cases: &[&Case<'_>]) -> RegimeReport {
@@ -115,11 +108,7 @@ fn report(vehicle: &Vehicle, name: &str, cases: &[&Case<'_>]) -> RegimeReport {
         (force > least).then(|| case.force_error.xy().norm() / force)
     };
     let mut shares: Vec<f64> = cases.iter().filter_map(share).collect();
-    shares.sort_by(f64::total_cmp);
-    let horizontal = (!shares.is_empty()).then(|| {
-        let half = shares.len() / 2;
-        if shares.len() % 2 == 1 { shares[half] } else { 0.5 * (shares[half - 1] + shares[half]) }
-    });
+    let horizontal = median(&mut shares);
     let ratio = |error: f64, size: f64| if size > 0.0 { error / size } else { 0.0 };
     let sum = |of: &dyn Fn(&Case<'_>) -> f64| cases.iter().map(|case| of(case)).sum::<f64>();
     let moments: Option<Vec<[Vec3; 2]>> = cases.iter().map(|case| case.moment).collect();

@@ -8,9 +8,8 @@ use super::contest::{Contest, Entry, Heat};
 use super::measure::{Calibration, Errors, Flow, mean_magnitude, percentile};
 use super::paper::{self, Paper};
 use super::regimes::{RegimeReport, regimes};
-use super::states::State;
+use super::states::{State, sections};
 use super::{EvaluateError, page};
-use crate::dataset::flows;
 use crate::page::PlotError;
 use crate::train::Config;
 use crate::train::fit::Epoch;
@@ -270,11 +269,6 @@ fn slices(heat: &Heat, forces: &[Vec3]) -> Vec<SliceReport> {
 /// Number of cases.
 fn cases(states: &[State]) -> usize {
     states.iter().map(|state| state.case.as_str()).collect::<BTreeSet<_>>().len()
-}
-
-/// Places of the sections of each flow among the states.
-fn sections(states: &[State]) -> Vec<Vec<usize>> {
-    flows(states.iter().map(|state| (state.case.as_str(), state.image, &state.condition)))
 }
 
 fn error(entry: &Entry, states: &[State], place: usize) -> Vec3 {

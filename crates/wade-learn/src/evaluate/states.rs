@@ -1,7 +1,7 @@
 //! The states of a data set with the loads that belong to them.
 
-use crate::dataset::Image;
 use crate::dataset::label::{Label, labels, order};
+use crate::dataset::{Image, flows};
 use crate::train::samples::Sample;
 use crate::train::{Source, TrainError};
 use wade_core::condition::Condition;
@@ -49,6 +49,11 @@ impl State {
         let speed = self.speed();
         if speed > 0.0 { self.condition.velocity.y.abs() / speed } else { 0.0 }
     }
+}
+
+/// Places of the sections of each flow among the states.
+pub(super) fn sections(states: &[State]) -> Vec<Vec<usize>> {
+    flows(states.iter().map(|state| (state.case.as_str(), state.image, &state.condition)))
 }
 
 /// The states of these numbers.

@@ -6,7 +6,7 @@ use super::planar::{NotPlanar, planar_section, speed_squared};
 use super::{Config, ValidateError};
 use crate::trials::{Trial, Trials};
 use wade_core::condition::Condition;
-use wade_core::frame::Vec3;
+use wade_core::frame::{Vec3, level_axes};
 
 /// The answer of whatever is being tested.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,10 +141,7 @@ fn section(
 /// The same motion of a vehicle that stands level. Both tests are of such; a model that knows of tilt would add the part of
 /// the buoyancy along its own x, at low speed more than the drag.
 fn levelled(condition: &Condition) -> Condition {
-    let up = condition.up.into_inner();
-    let ahead = Vec3::x() - up * up.x;
-    let ahead = ahead.try_normalize(f64::EPSILON).unwrap_or_else(Vec3::x);
-    let axes = [ahead, up.cross(&ahead), up];
+    let axes = level_axes(&condition.up);
     let level = |v: &Vec3| Vec3::from(axes.map(|axis| axis.dot(v)));
     Condition {
         velocity: level(&condition.velocity),

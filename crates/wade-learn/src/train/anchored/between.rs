@@ -7,7 +7,7 @@ use super::teacher::Teacher;
 use crate::random::Random;
 use wade_core::anchor::COORDINATES;
 use wade_core::condition::Condition;
-use wade_core::frame::Vec3;
+use wade_core::frame::{Vec3, level_axes};
 
 /// Neighbors among which the other end is drawn.
 const NEIGHBORS: usize = 8;
@@ -104,7 +104,7 @@ fn between(first: &Condition, second: &Condition, share: f64) -> Condition {
     // a speed, clearance, density or depth is extrapolated by at most half of itself
     let bounded = |a: f64, b: f64| mix(a, b).max(a.min(b) - 0.5 * a.min(b).abs());
     let polar = |c: &Condition| {
-        let [ahead, left] = level_axes(&c.up);
+        let [ahead, left, _] = level_axes(&c.up);
         let (along, across) = (c.velocity.dot(&ahead), c.velocity.dot(&left));
         (along.hypot(across), across.abs().atan2(along), across)
     };
@@ -119,7 +119,7 @@ fn between(first: &Condition, second: &Condition, share: f64) -> Condition {
         let square = c.velocity.norm_squared();
         if square > 0.0 { c.ground_velocity.dot(&c.velocity) / square } else { 0.0 }
     };
-    let [ahead, left] = level_axes(&up);
+    let [ahead, left, _] = level_axes(&up);
     let (sin, cos) = mix(heading, other_heading).clamp(0.0, std::f64::consts::PI).sin_cos();
     let velocity = (ahead * cos + left * sin) * bounded(speed, other_speed);
     let clearance = first.bed_clearance.zip(second.bed_clearance).map(|(a, b)| bounded(a, b).max(0.0));
@@ -132,13 +132,6 @@ fn between(first: &Condition, second: &Condition, share: f64) -> Condition {
         up,
         ..*first
     }
-}
-
-/// Ahead and left along the water, in the body frame.
-fn level_axes(up: &UnitVector3<f64>) -> [Vec3; 2] {
-    let x = Vec3::x();
-    let ahead = (x - up.into_inner() * up.x).normalize();
-    [ahead, up.cross(&ahead)]
 }
 
 #[cfg(test)]
@@ -164,7 +157,7 @@ mod tests {
     fn between_tilted_hulls_over_other_beds_the_motion_is_along_the_water() {
         let at = |roll: f64, pitch: f64, clearance: f64, velocity: Vec3| {
             let up = up_from_roll_pitch(roll, pitch);
-            let [ahead, left] = level_axes(&up);
+            let [ahead, left, _] = level_axes(&up);
             let velocity = ahead * velocity.x + left * velocity.y;
             Condition { up, bed_clearance: Some(clearance), ..Condition::level(velocity, -0.02) }
         };
