@@ -116,8 +116,9 @@ pub struct Known {
     pub prior: Prior,
     /// What was found on each surface besides.
     pub loads: Vec<Load>,
-    /// Standard deviation of the net force over the sections, a component each [N].
-    pub scatter: Vec3,
+    /// Standard deviation of the net force over the sections, a component each [N]; `None` of a case of one section, which does not
+    /// say how much it scatters.
+    pub scatter: Option<Vec3>,
 }
 
 impl Known {
@@ -165,7 +166,7 @@ impl Known {
 }
 
 /// Loads averaged over samples, and the standard deviation of their net force.
-fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> (Vec<Load>, Vec3) {
+fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> (Vec<Load>, Option<Vec3>) {
     let mut sums = vec![(Vec3::zeros(), Some(Vec3::zeros())); prepared.order.len()];
     let mut nets = Vec::with_capacity(members.len());
     for &member in members {
@@ -182,7 +183,7 @@ fn mean_loads(data: &Dataset, members: &[usize], prepared: &Prepared) -> (Vec<Lo
     let mean = nets.iter().sum::<Vec3>() / count;
     let variance = nets.iter().map(|net| (net - mean).map(|x| x * x)).sum::<Vec3>() / count;
     let loads = sums.into_iter().map(|(force, moment)| (force / count, moment.map(|m| m / count)));
-    (loads.collect(), variance.map(f64::sqrt))
+    (loads.collect(), (members.len() > 1).then(|| variance.map(f64::sqrt)))
 }
 
 /// See [`Known::carried`].

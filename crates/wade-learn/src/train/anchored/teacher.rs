@@ -18,7 +18,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::TrainError;
-use super::gaussian::Regression;
+use super::gaussian::{LINEAR, Regression};
 use super::known::{Known, Load, Prepared, Prior};
 use crate::dataset::Image;
 use crate::dataset::mirror::Plane;
@@ -31,8 +31,9 @@ use wade_core::frame::Vec3;
 const DIRECTION: [usize; 2] = [3, 4];
 const UP: [usize; 2] = [5, 6];
 
-/// Numbers that tell states apart: their coordinates, and the coefficients of the base's drag.
-const PLACE: usize = COORDINATES + 3;
+/// Numbers that tell states apart: their coordinates, and the coefficients of the base's drag along each axis, in which the mean is
+/// linear: what all states say of them is a correction of the base.
+const PLACE: usize = COORDINATES + LINEAR;
 
 /// Share of the weight by which no load of a case is known better: the CFD's own load at rest differs by as much from Archimedes
 /// on the same mesh.
@@ -128,7 +129,8 @@ impl OfVehicle {
             // the first of the members is the force itself
             let net = DVector::from_fn(values.ncols(), |i, _| if i % members.len() == 0 { 1.0 } else { 0.0 });
             let leading = &values * &net;
-            let scatter: Vec<f64> = states.iter().map(|s| s.scatter[axis].max(least) / scale_of(s)).collect();
+            let of = |s: &&Known| s.scatter.map(|scatter| scatter[axis].max(least) / scale_of(s));
+            let scatter: Vec<Option<f64>> = states.iter().map(of).collect();
             let like = like.map(|other| &other.axes[axis]);
             axes.push(Regression::new(places.clone(), leading.as_slice(), &scatter, &values, like)?);
         }
