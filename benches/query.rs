@@ -25,7 +25,6 @@ use wade_core::forces::Forces;
 use wade_core::frame::{Vec3, WaterPlane, up_from_roll_pitch};
 use wade_core::geometry::hydrostatics::hydrostatics;
 use wade_core::model::kernel::Isa;
-use wade_core::model::network::WIDTH;
 use wade_core::model::{JacobianWorkspace, Model, Workspace};
 use wade_core::physics::base::{BaseLoads, Motion};
 use wade_core::physics::{Physics, STATED_NONE};
@@ -68,7 +67,8 @@ fn all_wet(model: &Model) -> Condition {
 }
 
 fn layer2(model: &Model) -> u64 {
-    (model.vehicle().surfaces.len() * WIDTH * WIDTH) as u64
+    let width = model.weights().map_or(0, |weights| weights.network.width);
+    (model.vehicle().surfaces.len() * width * width) as u64
 }
 
 /// Rounds of twelve independent vector multiply-adds on registers alone: what the core can do at most.

@@ -12,7 +12,7 @@ use crate::features::{GLOBAL_NAMES, SURFACE_NAMES};
 use crate::frame::Vec3;
 use crate::geometry::distance::{GridError, SignedDistanceGrid};
 use crate::geometry::submergence::Samples;
-use crate::model::network::{Network, OUTPUTS, Scaling, WIDTH};
+use crate::model::network::{Network, OUTPUTS, Scaling, WIDTHS};
 use crate::model::{Anchored, Form, Paper, SPREAD, Weights};
 use crate::physics::radiation::{NODES, Node, POLES, Pole, Radiation, RadiationError};
 
@@ -50,6 +50,12 @@ pub enum TensorError {
         name: &'static str,
         /// Index of the number.
         index: usize,
+    },
+    /// Hidden layers of a width that there is no kernel for.
+    #[error("the hidden layers have {found} units, expected one of {WIDTHS:?}")]
+    Width {
+        /// Units of the first one.
+        found: usize,
     },
     /// A number so large that products with it would not stay finite.
     #[error("tensor {name} holds a number beyond {LARGEST} at {index}")]
@@ -404,14 +410,20 @@ fn global_features(remainder: Option<Remainder>) -> Vec<String> {
 fn read_network(file: &File<'_>, inputs: usize, outputs: usize) -> Result<Network, TensorError> {
     let matrix = |name, rows, columns| file.floats(name, &[Some(rows), Some(columns)]);
     let bias = |name, rows| file.floats(name, &[Some(rows)]);
+    let b1 = file.floats("b1", &[None])?;
+    let width = b1.len();
+    if !WIDTHS.contains(&width) {
+        return Err(TensorError::Width { found: width });
+    }
     Ok(Network {
         inputs,
+        width,
         outputs,
-        w1: matrix("w1", WIDTH, inputs)?,
-        b1: bias("b1", WIDTH)?,
-        w2: matrix("w2", WIDTH, WIDTH)?,
-        b2: bias("b2", WIDTH)?,
-        w3: matrix("w3", outputs, WIDTH)?,
+        w1: matrix("w1", width, inputs)?,
+        b1,
+        w2: matrix("w2", width, width)?,
+        b2: bias("b2", width)?,
+        w3: matrix("w3", outputs, width)?,
         b3: bias("b3", outputs)?,
     })
 }

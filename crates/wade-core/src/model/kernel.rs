@@ -19,7 +19,9 @@
 
 mod slopes;
 
-use super::network::{Network, WIDTH};
+use std::ops::Range;
+
+use super::network::{MAX_WIDTH, Network, WIDTHS};
 pub use slopes::{DIRECTIONS, FeatureSlopes, SlopeBuffers};
 
 /// Features of a surface that change with the state, at most.
@@ -28,16 +30,34 @@ pub const MAX_DYNAMIC: usize = 12;
 pub const MAX_OUTPUTS: usize = 8;
 /// Features that change with the state, at most: those of a surface, then those of the state.
 const MAX_CHANGING: usize = MAX_DYNAMIC + 13;
-/// Dynamic features that are multiplied in one pass over a row.
-const PASS: usize = 3;
 
-/// A row of activations, aligned to a cache line.
+/// Units in a cache line.
+const LANES: usize = 16;
+/// Lines of the widest row.
+const MAX_LINES: usize = MAX_WIDTH / LANES;
+
+/// A cache line of activations or weights.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub struct Row([f32; WIDTH]);
+struct Line([f32; LANES]);
 
-impl Row {
-    const ZERO: Self = Self([0.0; WIDTH]);
+impl Line {
+    const ZERO: Self = Self([0.0; LANES]);
+}
+
+/// One number for each unit of a hidden layer.
+type Row<const LINES: usize> = [Line; LINES];
+
+/// Whole rows of stored lines.
+#[inline(always)]
+fn rows<const LINES: usize>(lines: &[Line]) -> &[Row<LINES>] {
+    lines.as_chunks().0
+}
+
+/// Lines of a row of as many numbers as there are lanes in these lines.
+fn lines(values: impl IntoIterator<Item = f32>) -> Vec<Line> {
+    let values: Vec<f32> = values.into_iter().collect();
+    values.as_chunks().0.iter().map(|values| Line(*values)).collect()
 }
 
 /// One wet surface of a query.
@@ -51,7 +71,7 @@ pub struct WetSurface {
 
 /// The part of layer 1 that a vehicle's surfaces contribute whatever the state, a row a surface.
 #[derive(Debug, Clone)]
-pub struct StaticRows(Vec<Row>);
+pub struct StaticRows(Vec<Line>);
 
 /// Rows that a block of layer 2 has at most: enough independent sums to hide the latency of a multiply-add, few enough
 /// that most inputs are dead in all of them. By benches/query.rs on a Zen 4 core: 10.7 us a Husky query with 5, 11.0 with
@@ -62,24 +82,26 @@ const BLOCK_ROWS: usize = 5;
 #[derive(Debug, Clone, Copy)]
 struct Live {
     rows: usize,
-    inputs: [u8; WIDTH],
+    inputs: [u8; MAX_WIDTH],
     count: usize,
 }
 
-// an index of a u8 cannot leave a row
-const _: () = assert!(WIDTH == 256);
+// a u8 counts the units of the widest row
+const _: () = assert!(MAX_WIDTH == 256);
 
 impl Live {
     #[inline(always)]
-    fn of(rows: &[Row]) -> Self {
-        let mut largest = [0.0_f32; WIDTH];
+    fn of<const LINES: usize>(rows: &[Row<LINES>]) -> Self {
+        let mut largest = [Line::ZERO; LINES];
         for row in rows {
-            for (largest, value) in largest.iter_mut().zip(&row.0) {
-                *largest = largest.max(*value);
+            for line in 0..LINES {
+                for lane in 0..LANES {
+                    largest[line].0[lane] = largest[line].0[lane].max(row[line].0[lane]);
+                }
             }
         }
-        let mut live = Self { rows: rows.len(), inputs: [0; WIDTH], count: 0 };
-        for (input, largest) in (0..=u8::MAX).zip(largest) {
+        let mut live = Self { rows: rows.len(), inputs: [0; MAX_WIDTH], count: 0 };
+        for (input, largest) in (0..=u8::MAX).zip(largest.iter().flat_map(|line| line.0)) {
             // without a branch: a dead input's place is written over by the next
             live.inputs[live.count] = input;
             live.count += usize::from(largest > 0.0);
@@ -87,18 +109,19 @@ impl Live {
         live
     }
 
+    /// Inputs that are not zero, each below the width of a row of so many lines.
     #[inline(always)]
-    fn inputs(&self) -> impl Iterator<Item = usize> {
-        self.inputs[..self.count].iter().map(|&input| usize::from(input))
+    fn inputs<const LINES: usize>(&self) -> impl Iterator<Item = usize> {
+        self.inputs[..self.count].iter().map(|&input| usize::from(input) % (LINES * LANES))
     }
 }
 
 /// Working memory of a query, sized once for a number of surfaces.
 #[derive(Debug, Clone)]
 pub struct Buffers {
-    global: Row,
-    h1: Vec<Row>,
-    h2: Vec<Row>,
+    global: Row<MAX_LINES>,
+    h1: Vec<Line>,
+    h2: Vec<Line>,
     /// One entry a block of rows.
     live: Vec<Live>,
     outputs: Vec<[f32; MAX_OUTPUTS]>,
@@ -108,9 +131,9 @@ impl Buffers {
     /// Working memory for vehicles of up to `surfaces` surfaces.
     pub fn new(surfaces: usize) -> Self {
         Self {
-            global: Row::ZERO,
-            h1: vec![Row::ZERO; surfaces],
-            h2: vec![Row::ZERO; surfaces],
+            global: [Line::ZERO; MAX_LINES],
+            h1: vec![Line::ZERO; surfaces * MAX_LINES],
+            h2: vec![Line::ZERO; surfaces * MAX_LINES],
             live: Vec::with_capacity(surfaces.div_ceil(BLOCK_ROWS)),
             outputs: vec![[0.0; MAX_OUTPUTS]; surfaces],
         }
@@ -123,13 +146,13 @@ impl Buffers {
 
     /// Splits rows into the fewest blocks of at most [`BLOCK_ROWS`], as equal as can be, and finds their live inputs.
     #[inline(always)]
-    fn find_live(&mut self, rows: usize) {
+    fn find_live<const LINES: usize>(&mut self, count: usize) {
         self.live.clear();
-        let blocks = rows.div_ceil(BLOCK_ROWS);
+        let blocks = count.div_ceil(BLOCK_ROWS);
         let mut start = 0;
         for left in (1..=blocks).rev() {
-            let end = start + (rows - start).div_ceil(left);
-            self.live.push(Live::of(&self.h1[start..end]));
+            let end = start + (count - start).div_ceil(left);
+            self.live.push(Live::of::<LINES>(&rows(&self.h1)[start..end]));
             start = end;
         }
     }
@@ -197,17 +220,18 @@ impl Isa {
 #[derive(Debug, Clone)]
 pub struct Kernel {
     isa: Isa,
-    w1_global: Vec<Row>,
-    /// In passes: a network with fewer features has zeros in the last.
-    w1_dynamic: Vec<[Row; PASS]>,
-    w1_static: Vec<Row>,
+    /// Cache lines of a row.
+    lines: usize,
+    w1_global: Vec<Line>,
+    w1_dynamic: Vec<Line>,
+    w1_static: Vec<Line>,
     /// Of each unit of layer 1 the weights of the dynamic features and of the global ones.
     w1_units: Vec<[f32; MAX_CHANGING]>,
-    b1: Row,
+    b1: Vec<Line>,
     /// Tiles of columns, each with one stretch of `tile_width` weights an input: `[tile][input][column]`.
-    w2: Vec<Row>,
-    b2: Row,
-    w3: Vec<Row>,
+    w2: Vec<Line>,
+    b2: Vec<Line>,
+    w3: Vec<Line>,
     b3: Vec<f32>,
 }
 
@@ -216,7 +240,8 @@ impl Kernel {
     /// surface's `fixed` features, then the `dynamic` ones, then the global ones.
     ///
     /// # Panics
-    /// When the network has no dynamic features, or more of them or of outputs than there is room for.
+    /// When the network has no dynamic features, more of them or of outputs than there is room for, or a width that is not one
+    /// of [`WIDTHS`](super::network::WIDTHS).
     pub fn new(network: &Network, (fixed, dynamic): (usize, usize), isa: Isa) -> Self {
         assert!(
             (1..=MAX_DYNAMIC).contains(&dynamic)
@@ -224,9 +249,10 @@ impl Kernel {
                 && network.outputs <= MAX_OUTPUTS,
             "the buffers have room for it"
         );
-        let column =
-            |input: usize| Row(std::array::from_fn(|unit| network.w1[unit * network.inputs + input]));
-        let row = |values: &[f32]| Row(std::array::from_fn(|i| values[i]));
+        assert!(WIDTHS.contains(&network.width), "there is a kernel for the width");
+        let width = network.width;
+        let column = |input: usize| (0..width).map(move |unit| network.w1[unit * network.inputs + input]);
+        let columns = |inputs: Range<usize>| lines(inputs.flat_map(column));
         let unit = |unit: usize| {
             let mut changing = [0.0; MAX_CHANGING];
             let weights = &network.w1[unit * network.inputs..][..network.inputs];
@@ -235,20 +261,17 @@ impl Kernel {
                 .copy_from_slice(&weights[fixed + dynamic..]);
             changing
         };
-        let pass = |first: usize| {
-            let column = |i| if first + i < dynamic { column(fixed + first + i) } else { Row::ZERO };
-            std::array::from_fn(column)
-        };
         Self {
             isa,
-            w1_static: (0..fixed).map(column).collect(),
-            w1_units: (0..WIDTH).map(unit).collect(),
-            w1_dynamic: (0..dynamic).step_by(PASS).map(pass).collect(),
-            w1_global: (fixed + dynamic..network.inputs).map(column).collect(),
-            b1: row(&network.b1),
-            w2: pack(&network.w2, isa.tile_width()),
-            b2: row(&network.b2),
-            w3: network.w3.chunks_exact(WIDTH).map(row).collect(),
+            lines: width / LANES,
+            w1_static: columns(0..fixed),
+            w1_units: (0..width).map(unit).collect(),
+            w1_dynamic: columns(fixed..fixed + dynamic),
+            w1_global: columns(fixed + dynamic..network.inputs),
+            b1: lines(network.b1.iter().copied()),
+            w2: pack(&network.w2, width, isa.tile_width()),
+            b2: lines(network.b2.iter().copied()),
+            w3: lines(network.w3.iter().copied()),
             b3: network.b3.clone(),
         }
     }
@@ -260,12 +283,13 @@ impl Kernel {
 
     /// What the static features of a vehicle's surfaces contribute to layer 1.
     pub fn static_rows<const STATIC: usize>(&self, features: &[[f32; STATIC]]) -> StaticRows {
-        let row = |features: &[f32; STATIC]| {
-            Row(std::array::from_fn(|unit| {
-                features.iter().zip(&self.w1_static).fold(0.0, |sum, (x, weights)| sum + x * weights.0[unit])
-            }))
+        let of_line = |features: &[f32; STATIC], line: usize| {
+            let weights = self.w1_static.iter().skip(line).step_by(self.lines);
+            features.iter().zip(weights).fold(Line::ZERO, |sum, (x, weights)| {
+                Line(std::array::from_fn(|lane| sum.0[lane] + x * weights.0[lane]))
+            })
         };
-        StaticRows(features.iter().map(row).collect())
+        StaticRows(features.iter().flat_map(|x| (0..self.lines).map(move |line| of_line(x, line))).collect())
     }
 
     /// What the network answers for the wet surfaces, in their order; only as many of the numbers as it has outputs
@@ -279,116 +303,143 @@ impl Kernel {
         wet: &[WetSurface],
         buffers: &'b mut Buffers,
     ) -> &'b [[f32; MAX_OUTPUTS]] {
-        match self.isa.0 {
-            // SAFETY: `Isa` exists only where `Isa::available` found the CPU features.
-            #[cfg(target_arch = "x86_64")]
-            Kind::Avx512 => unsafe { self.forward_avx512(global, statics, wet, buffers) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 => unsafe { self.forward_avx2(global, statics, wet, buffers) },
-            #[cfg(target_arch = "aarch64")]
-            Kind::Neon => self.forward_plain::<true>(global, statics, wet, buffers),
-            Kind::Portable => self.forward_plain::<false>(global, statics, wet, buffers),
+        match self.lines {
+            2 => self.forward_wide::<2>(global, statics, wet, buffers),
+            4 => self.forward_wide::<4>(global, statics, wet, buffers),
+            8 => self.forward_wide::<8>(global, statics, wet, buffers),
+            16 => self.forward_wide::<16>(global, statics, wet, buffers),
+            _ => unreachable!("`new` takes only widths that there is a kernel for"),
         }
         buffers.outputs(wet.len())
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
-    fn forward_avx512(
+    #[inline(always)]
+    fn forward_wide<const LINES: usize>(
         &self,
         global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &mut Buffers,
     ) {
-        self.layer1::<true>(global, statics, wet, buffers);
-        buffers.find_live(wet.len());
+        match self.isa.0 {
+            // SAFETY: `Isa` exists only where `Isa::available` found the CPU features.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => unsafe { self.forward_avx512::<LINES>(global, statics, wet, buffers) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2 => unsafe { self.forward_avx2::<LINES>(global, statics, wet, buffers) },
+            #[cfg(target_arch = "aarch64")]
+            Kind::Neon => self.forward_plain::<true, LINES>(global, statics, wet, buffers),
+            Kind::Portable => self.forward_plain::<false, LINES>(global, statics, wet, buffers),
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn forward_avx512<const LINES: usize>(
+        &self,
+        global: &[f32],
+        statics: &StaticRows,
+        wet: &[WetSurface],
+        buffers: &mut Buffers,
+    ) {
+        self.layer1::<true, LINES>(global, statics, wet, buffers);
+        buffers.find_live::<LINES>(wet.len());
         let Buffers { h1, h2, live, .. } = buffers;
+        let (h1, h2, bias) = (rows(h1), h2.as_chunks_mut().0, &rows(&self.b2)[0]);
         // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
-        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width()).enumerate() {
+        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width() * LINES).enumerate() {
             for_row_blocks!(h1, h2, live, |a, block, out| {
-                x86::tile_avx512(a, block, weights, &self.b2, tile, out);
+                x86::tile_avx512(a, block, weights, bias, tile, out);
             });
         }
-        self.layer3::<true>(wet.len(), buffers);
+        self.layer3::<true, LINES>(wet.len(), buffers);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
-    fn forward_avx2(&self, global: &[f32], statics: &StaticRows, wet: &[WetSurface], buffers: &mut Buffers) {
-        self.layer1::<true>(global, statics, wet, buffers);
-        buffers.find_live(wet.len());
-        let Buffers { h1, h2, live, .. } = buffers;
-        // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
-        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width()).enumerate() {
-            for_row_blocks!(h1, h2, live, |a, block, out| {
-                x86::tile_avx2(a, block, weights, &self.b2, tile, out);
-            });
-        }
-        self.layer3::<true>(wet.len(), buffers);
-    }
-
-    fn forward_plain<const FUSED: bool>(
+    fn forward_avx2<const LINES: usize>(
         &self,
         global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &mut Buffers,
     ) {
-        self.layer1::<FUSED>(global, statics, wet, buffers);
-        buffers.find_live(wet.len());
+        self.layer1::<true, LINES>(global, statics, wet, buffers);
+        buffers.find_live::<LINES>(wet.len());
         let Buffers { h1, h2, live, .. } = buffers;
+        let (h1, h2, bias) = (rows(h1), h2.as_chunks_mut().0, &rows(&self.b2)[0]);
         // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
-        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width()).enumerate() {
+        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width() * LINES).enumerate() {
             for_row_blocks!(h1, h2, live, |a, block, out| {
-                tile_plain::<FUSED, _>(a, block, weights, &self.b2, tile, out);
+                x86::tile_avx2(a, block, weights, bias, tile, out);
             });
         }
-        self.layer3::<FUSED>(wet.len(), buffers);
+        self.layer3::<true, LINES>(wet.len(), buffers);
     }
 
-    #[inline(always)]
-    fn layer1<const FUSED: bool>(
+    fn forward_plain<const FUSED: bool, const LINES: usize>(
         &self,
         global: &[f32],
         statics: &StaticRows,
         wet: &[WetSurface],
         buffers: &mut Buffers,
     ) {
-        let sum = &mut buffers.global.0;
-        *sum = self.b1.0;
-        for (value, weights) in global.iter().zip(&self.w1_global) {
-            for unit in 0..WIDTH {
-                sum[unit] = multiply_add::<FUSED>(*value, weights.0[unit], sum[unit]);
+        self.layer1::<FUSED, LINES>(global, statics, wet, buffers);
+        buffers.find_live::<LINES>(wet.len());
+        let Buffers { h1, h2, live, .. } = buffers;
+        let (h1, h2, bias) = (rows(h1), h2.as_chunks_mut().0, &rows(&self.b2)[0]);
+        // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
+        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width() * LINES).enumerate() {
+            for_row_blocks!(h1, h2, live, |a, block, out| {
+                tile_plain::<FUSED, _, _>(a, block, weights, bias, tile, out);
+            });
+        }
+        self.layer3::<FUSED, LINES>(wet.len(), buffers);
+    }
+
+    #[inline(always)]
+    fn layer1<const FUSED: bool, const LINES: usize>(
+        &self,
+        global: &[f32],
+        statics: &StaticRows,
+        wet: &[WetSurface],
+        buffers: &mut Buffers,
+    ) {
+        let sum = &mut buffers.global.as_chunks_mut::<LINES>().0[0];
+        *sum = rows(&self.b1)[0];
+        for (value, weights) in global.iter().zip(rows::<LINES>(&self.w1_global)) {
+            for line in 0..LINES {
+                for lane in 0..LANES {
+                    let sum = &mut sum[line].0[lane];
+                    *sum = multiply_add::<FUSED>(*value, weights[line].0[lane], *sum);
+                }
             }
         }
-        for (row, surface) in buffers.h1.iter_mut().zip(wet) {
-            let fixed = &statics.0[surface.surface].0;
-            let mut passes = self.w1_dynamic.iter().zip(surface.dynamic.as_chunks().0);
-            let last = self.w1_dynamic.len() - 1;
-            if let Some((weights, features)) = passes.next() {
-                let floor = if last == 0 { 0.0 } else { f32::NEG_INFINITY };
-                for unit in 0..WIDTH {
-                    let value = sum[unit] + fixed[unit];
-                    row.0[unit] = add_pass::<FUSED>(value, features, weights, unit).max(floor);
+        let (fixed, told) = (rows::<LINES>(&statics.0), rows::<LINES>(&self.w1_dynamic));
+        for (row, surface) in buffers.h1.as_chunks_mut::<LINES>().0.iter_mut().zip(wet) {
+            let fixed = &fixed[surface.surface];
+            for line in 0..LINES {
+                let mut units = [0.0; LANES];
+                for lane in 0..LANES {
+                    units[lane] = sum[line].0[lane] + fixed[line].0[lane];
                 }
-            }
-            for (index, (weights, features)) in passes.enumerate() {
-                let floor = if index + 1 == last { 0.0 } else { f32::NEG_INFINITY };
-                for unit in 0..WIDTH {
-                    let value = row.0[unit];
-                    row.0[unit] = add_pass::<FUSED>(value, features, weights, unit).max(floor);
+                for (value, weights) in surface.dynamic.iter().zip(told) {
+                    for lane in 0..LANES {
+                        units[lane] = multiply_add::<FUSED>(*value, weights[line].0[lane], units[lane]);
+                    }
                 }
+                row[line] = Line(units.map(|unit| unit.max(0.0)));
             }
         }
     }
 
     #[inline(always)]
-    fn layer3<const FUSED: bool>(&self, rows: usize, buffers: &mut Buffers) {
-        for (row, out) in buffers.h2[..rows].iter().zip(&mut buffers.outputs) {
-            for ((out, weights), bias) in out.iter_mut().zip(&self.w3).zip(&self.b3) {
-                *out = bias + dot::<FUSED>(&row.0, &weights.0);
+    fn layer3<const FUSED: bool, const LINES: usize>(&self, count: usize, buffers: &mut Buffers) {
+        let Buffers { h2, outputs, .. } = buffers;
+        for (row, out) in rows::<LINES>(h2)[..count].iter().zip(outputs) {
+            for ((out, weights), bias) in out.iter_mut().zip(rows(&self.w3)).zip(&self.b3) {
+                *out = bias + dot::<FUSED, LINES>(row, weights);
             }
         }
     }
@@ -407,7 +458,7 @@ macro_rules! for_row_blocks {
     (@match $block:ident, $h1:ident, $h2:ident, |$a:ident, $out:ident| $body:expr, $($n:literal)*) => {
         match $block.rows {
             $($n => {
-                if let (Ok($a), Ok($out)) = (<&[Row; $n]>::try_from($h1), <&mut [Row; $n]>::try_from($h2)) {
+                if let (Ok($a), Ok($out)) = (<&[Row<LINES>; $n]>::try_from($h1), <&mut [Row<LINES>; $n]>::try_from($h2)) {
                     $body
                 }
             })*
@@ -418,14 +469,13 @@ macro_rules! for_row_blocks {
 use for_row_blocks;
 
 /// Packs row-major `[outputs, inputs]` weights as `[tile][input][column]`.
-fn pack(weights: &[f32], tile_width: usize) -> Vec<Row> {
-    let mut packed = vec![Row::ZERO; WIDTH];
-    for (i, slot) in packed.iter_mut().flat_map(|row| &mut row.0).enumerate() {
-        let (tile, within) = (i / (WIDTH * tile_width), i % (WIDTH * tile_width));
+fn pack(weights: &[f32], width: usize, tile_width: usize) -> Vec<Line> {
+    let place = |i: usize| {
+        let (tile, within) = (i / (width * tile_width), i % (width * tile_width));
         let (input, column) = (within / tile_width, within % tile_width);
-        *slot = weights[(tile * tile_width + column) * WIDTH + input];
-    }
-    packed
+        weights[(tile * tile_width + column) * width + input]
+    };
+    lines((0..width * width).map(place))
 }
 
 #[inline(always)]
@@ -433,25 +483,13 @@ fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// What the features of a pass add to a unit.
-#[inline(always)]
-fn add_pass<const FUSED: bool>(
-    value: f32,
-    features: &[f32; PASS],
-    weights: &[Row; PASS],
-    unit: usize,
-) -> f32 {
-    let [(d0, w0), (d1, w1), (d2, w2)] = [0, 1, 2].map(|i| (features[i], weights[i].0[unit]));
-    multiply_add::<FUSED>(d2, w2, multiply_add::<FUSED>(d1, w1, multiply_add::<FUSED>(d0, w0, value)))
-}
-
 /// Dot product in sixteen interleaved sums, so that it vectorises, added up in a fixed order.
 #[inline(always)]
-fn dot<const FUSED: bool>(a: &[f32; WIDTH], b: &[f32; WIDTH]) -> f32 {
-    let mut sums = [0.0; 16];
-    for start in (0..WIDTH).step_by(16) {
-        for lane in 0..16 {
-            sums[lane] = multiply_add::<FUSED>(a[start + lane], b[start + lane], sums[lane]);
+fn dot<const FUSED: bool, const LINES: usize>(a: &Row<LINES>, b: &Row<LINES>) -> f32 {
+    let mut sums = [0.0; LANES];
+    for line in 0..LINES {
+        for lane in 0..LANES {
+            sums[lane] = multiply_add::<FUSED>(a[line].0[lane], b[line].0[lane], sums[lane]);
         }
     }
     for half in [8, 4, 2, 1] {
@@ -462,30 +500,25 @@ fn dot<const FUSED: bool>(a: &[f32; WIDTH], b: &[f32; WIDTH]) -> f32 {
     sums[0]
 }
 
-/// A tile of `R` rows by 16 columns of layer 2 with its bias and ReLU.
+/// A tile of `R` rows by a line of columns of layer 2 with its bias and ReLU.
 #[inline(always)]
-fn tile_plain<const FUSED: bool, const R: usize>(
-    h1: &[Row; R],
+fn tile_plain<const FUSED: bool, const R: usize, const LINES: usize>(
+    h1: &[Row<LINES>; R],
     live: &Live,
-    weights: &[Row],
-    bias: &Row,
+    weights: &[Line],
+    bias: &Row<LINES>,
     tile: usize,
-    h2: &mut [Row; R],
+    h2: &mut [Row<LINES>; R],
 ) {
-    const COLUMNS: usize = 16;
-    let start = tile * COLUMNS;
     for (row, out) in h1.iter().zip(h2) {
-        let mut sums = [0.0; COLUMNS];
-        sums.copy_from_slice(&bias.0[start..start + COLUMNS]);
-        for input in live.inputs() {
-            let columns = &weights[input / COLUMNS].0.as_chunks::<COLUMNS>().0[input % COLUMNS];
-            for lane in 0..COLUMNS {
-                sums[lane] = multiply_add::<FUSED>(row.0[input], columns[lane], sums[lane]);
+        let mut sums = bias[tile].0;
+        for input in live.inputs::<LINES>() {
+            let (value, columns) = (row[input / LANES].0[input % LANES], &weights[input].0);
+            for lane in 0..LANES {
+                sums[lane] = multiply_add::<FUSED>(value, columns[lane], sums[lane]);
             }
         }
-        for lane in 0..COLUMNS {
-            out.0[start + lane] = sums[lane].max(0.0);
-        }
+        out[tile] = Line(sums.map(|sum| sum.max(0.0)));
     }
 }
 
@@ -496,45 +529,46 @@ mod x86 {
         _mm512_fmadd_ps, _mm512_load_ps, _mm512_max_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_store_ps,
     };
 
-    use super::{Live, Row, WIDTH};
+    use super::{LANES, Line, Live, Row};
 
     /// Defines a tile of `R` rows by two vectors of columns: `2 R` sums stay in registers over all inputs.
     macro_rules! tile {
         ($name:ident, $features:literal, $lanes:literal, $load:ident, $store:ident, $set:ident, $zero:ident, $fma:ident,
          $max:ident) => {
             #[target_feature(enable = $features)]
-            pub(super) fn $name<const R: usize>(
-                h1: &[Row; R],
+            pub(super) fn $name<const R: usize, const LINES: usize>(
+                h1: &[Row<LINES>; R],
                 live: &Live,
-                weights: &[Row],
-                bias: &Row,
+                weights: &[Line],
+                bias: &Row<LINES>,
                 tile: usize,
-                h2: &mut [Row; R],
+                h2: &mut [Row<LINES>; R],
             ) {
                 const COLUMNS: usize = 2 * $lanes;
-                let start = tile * COLUMNS;
-                assert!(weights.len() * WIDTH == WIDTH * COLUMNS && start + COLUMNS <= WIDTH);
+                // of a row, the lines of this tile's columns
+                let start = tile * COLUMNS / LANES;
+                assert!(weights.len() == LINES * COLUMNS && start + COLUMNS / LANES <= LINES);
                 let weights = weights.as_ptr().cast::<f32>();
-                let bias = bias.0[start..].as_ptr();
-                // SAFETY: the assertion keeps both loads inside `bias`; a row is aligned to 64 bytes and `start` is a
-                // multiple of COLUMNS, so both addresses are aligned to a vector.
+                let bias = bias[start..].as_ptr().cast::<f32>();
+                // SAFETY: the assertion keeps both loads inside `bias`; a line is aligned to 64 bytes and COLUMNS is a multiple
+                // of its lanes, so both addresses are aligned to a vector.
                 let bias = unsafe { [$load(bias), $load(bias.add($lanes))] };
                 let mut sums = [bias; R];
-                for input in live.inputs() {
-                    // SAFETY: `input` came from a u8 and is below WIDTH; the assertion makes `weights` WIDTH stretches of
-                    // COLUMNS values, each aligned to a vector.
+                for input in live.inputs::<LINES>() {
+                    // SAFETY: `input` is below the width of a row; the assertion makes `weights` as many stretches of COLUMNS
+                    // values, each aligned to a vector.
                     let (w0, w1) = unsafe {
                         let at = weights.add(input * COLUMNS);
                         ($load(at), $load(at.add($lanes)))
                     };
                     for r in 0..R {
-                        let value = $set(h1[r].0[input]);
+                        let value = $set(h1[r][input / LANES].0[input % LANES]);
                         sums[r][0] = $fma(value, w0, sums[r][0]);
                         sums[r][1] = $fma(value, w1, sums[r][1]);
                     }
                 }
                 for r in 0..R {
-                    let out = h2[r].0[start..start + COLUMNS].as_mut_ptr();
+                    let out = h2[r][start..start + COLUMNS / LANES].as_mut_ptr().cast::<f32>();
                     // SAFETY: the slice holds COLUMNS values and is aligned as `bias` is.
                     unsafe {
                         $store(out, $max(sums[r][0], $zero()));

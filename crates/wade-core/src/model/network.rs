@@ -1,10 +1,12 @@
-//! Three dense layers with ReLU and hidden layers of 256, 27-256-256-3 in the paper, as plain loops: the reference that
-//! the kernel is tested against, and the form in which weights are stored and trained.
+//! Three dense layers with ReLU, 27-256-256-3 in the paper, as plain loops: the reference that the kernel is tested against, and
+//! the form in which weights are stored and trained.
 
 use crate::features::GLOBAL;
 
-/// Width of both hidden layers.
-pub const WIDTH: usize = 256;
+/// Width of both hidden layers of the paper's network, and the most that there may be.
+pub const MAX_WIDTH: usize = 256;
+/// Widths of the hidden layers that there is a kernel for.
+pub const WIDTHS: [usize; 4] = [32, 64, 128, MAX_WIDTH];
 /// Components of a force.
 pub const OUTPUTS: usize = 3;
 
@@ -38,17 +40,19 @@ impl Scaling {
 pub struct Network {
     /// Numbers in a row of inputs.
     pub inputs: usize,
+    /// Units of each of the two hidden layers, one of [`WIDTHS`].
+    pub width: usize,
     /// Numbers out.
     pub outputs: usize,
-    /// `[WIDTH, inputs]`
+    /// `[width, inputs]`
     pub w1: Vec<f32>,
-    /// `[WIDTH]`
+    /// `[width]`
     pub b1: Vec<f32>,
-    /// `[WIDTH, WIDTH]`
+    /// `[width, width]`
     pub w2: Vec<f32>,
-    /// `[WIDTH]`
+    /// `[width]`
     pub b2: Vec<f32>,
-    /// `[outputs, WIDTH]`
+    /// `[outputs, width]`
     pub w3: Vec<f32>,
     /// `[outputs]`
     pub b3: Vec<f32>,
@@ -58,11 +62,11 @@ impl Network {
     /// Name, shape and values of each tensor, in the order in which they are stored.
     pub fn tensors(&self) -> [(&'static str, Vec<usize>, &Vec<f32>); 6] {
         [
-            ("w1", vec![WIDTH, self.inputs], &self.w1),
-            ("b1", vec![WIDTH], &self.b1),
-            ("w2", vec![WIDTH, WIDTH], &self.w2),
-            ("b2", vec![WIDTH], &self.b2),
-            ("w3", vec![self.outputs, WIDTH], &self.w3),
+            ("w1", vec![self.width, self.inputs], &self.w1),
+            ("b1", vec![self.width], &self.b1),
+            ("w2", vec![self.width, self.width], &self.w2),
+            ("b2", vec![self.width], &self.b2),
+            ("w3", vec![self.outputs, self.width], &self.w3),
             ("b3", vec![self.outputs], &self.b3),
         ]
     }

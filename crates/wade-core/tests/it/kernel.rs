@@ -9,7 +9,7 @@ use wade_core::frame::{GRAVITY, Vec3};
 use wade_core::model::kernel::{
     Buffers, DIRECTIONS, FeatureSlopes, Isa, Kernel, MAX_DYNAMIC, SlopeBuffers, WetSurface,
 };
-use wade_core::model::network::Network;
+use wade_core::model::network::{Network, WIDTHS};
 use wade_core::model::{Form, Model, Weights, Workspace};
 
 /// Size of the terms that a surface's force is a sum of, by which its rounding is measured [N].
@@ -129,23 +129,52 @@ fn plain_slopes(network: &Network, row: &[f64], along: &[f64]) -> Vec<f64> {
     unreachable!("the last layer has the outputs")
 }
 
+/// A network of another width, with units of this one in turn.
+fn of_width(network: &Network, width: usize) -> Network {
+    let units: Vec<usize> = (0..width).map(|unit| unit % network.width).collect();
+    let rows = |weights: &[f32], inputs: usize| -> Vec<f32> {
+        units.iter().flat_map(|unit| weights[unit * inputs..][..inputs].to_vec()).collect()
+    };
+    let columns = |weights: &[f32]| -> Vec<f32> {
+        weights
+            .chunks_exact(network.width)
+            .flat_map(|row| units.iter().map(|unit| row[*unit]).collect::<Vec<_>>())
+            .collect()
+    };
+    Network {
+        inputs: network.inputs,
+        width,
+        outputs: network.outputs,
+        w1: rows(&network.w1, network.inputs),
+        b1: rows(&network.b1, 1),
+        w2: rows(&columns(&network.w2), width),
+        b2: rows(&network.b2, 1),
+        w3: columns(&network.w3),
+        b3: network.b3.clone(),
+    }
+}
+
 #[test]
-fn slopes_are_those_of_the_network_on_every_instruction_set() {
-    // inputs of the shipped weights
-    const GLOBAL: usize = anchor::GLOBAL - 2;
+fn answers_and_slopes_are_those_of_the_network_at_every_width_on_every_instruction_set() {
     let model = model_on("husky", Isa::available()[0]);
-    let (vehicle, network) = (model.vehicle(), &model.weights().expect("weights").network);
-    for isa in Isa::available() {
+    let trained = &model.weights().expect("weights").network;
+    let global = trained.inputs - anchor::STATIC - anchor::DYNAMIC;
+    let kinds =
+        WIDTHS.into_iter().flat_map(|width| Isa::available().into_iter().map(move |isa| (width, isa)));
+    for (width, isa) in kinds {
+        let network = &of_width(trained, width);
         let kernel = Kernel::new(network, (anchor::STATIC, anchor::DYNAMIC), isa);
-        let count = vehicle.surfaces.len();
+        let count = model.vehicle().surfaces.len();
         let mut numbers = Numbers::new(29);
         let fixed: Vec<[f32; anchor::STATIC]> =
             (0..count).map(|_| [(); anchor::STATIC].map(|()| numbers.between(-1.0, 1.0))).collect();
         let statics = kernel.static_rows(&fixed);
         let (mut buffers, mut slopes) = (Buffers::new(count), SlopeBuffers::new(count));
         for _ in 0..20 {
-            let global = [(); GLOBAL].map(|()| numbers.between(-2.0, 2.0));
-            let of_global = [(); GLOBAL].map(|()| [(); DIRECTIONS].map(|()| numbers.between(-2.0, 2.0)));
+            let inputs = 0..global;
+            let of_state: Vec<f32> = inputs.clone().map(|_| numbers.between(-2.0, 2.0)).collect();
+            let of_state_slopes: Vec<[f32; DIRECTIONS]> =
+                inputs.map(|_| [(); DIRECTIONS].map(|()| numbers.between(-2.0, 2.0))).collect();
             let wet: Vec<WetSurface> = (0..count)
                 .map(|surface| WetSurface {
                     surface,
@@ -155,27 +184,32 @@ fn slopes_are_those_of_the_network_on_every_instruction_set() {
             let mut of_surface =
                 || [(); MAX_DYNAMIC].map(|()| [(); DIRECTIONS].map(|()| numbers.between(-1.0, 1.0)));
             let of_wet: Vec<FeatureSlopes> = wet.iter().map(|_| of_surface()).collect();
-            kernel.forward(&global, &statics, &wet, &mut buffers);
-            let found = kernel.slopes((&of_global, &of_wet), &buffers, &mut slopes);
-            for ((surface, of_surface), found) in wet.iter().zip(&of_wet).zip(found) {
+            let answers = kernel.forward(&of_state, &statics, &wet, &mut buffers).to_vec();
+            let found = kernel.slopes((&of_state_slopes, &of_wet), &buffers, &mut slopes);
+            for (((surface, of_surface), found), answer) in wet.iter().zip(&of_wet).zip(found).zip(answers) {
                 let fixed = fixed[surface.surface];
                 let joined =
-                    |fixed: [f32; anchor::STATIC], dynamic: [f32; MAX_DYNAMIC], global: [f32; GLOBAL]| {
-                        let all = fixed.into_iter().chain(dynamic).chain(global);
-                        all.map(f64::from).collect::<Vec<_>>()
+                    |fixed: [f32; anchor::STATIC], dynamic: [f32; MAX_DYNAMIC], global: &[f32]| -> Vec<f32> {
+                        fixed.into_iter().chain(dynamic).chain(global.iter().copied()).collect()
                     };
-                let row = joined(fixed, surface.dynamic, global);
+                let row = joined(fixed, surface.dynamic, &of_state);
+                let expected = network.forward(&row);
+                let size = expected.iter().map(|x| x.abs()).fold(1.0, f32::max);
+                for (found, expected) in answer.iter().zip(&expected) {
+                    let error = (found - expected).abs();
+                    assert!(error <= 1e-4 * size, "{width} {}: {found} against {expected}", isa.name());
+                }
+                let in_double = |row: Vec<f32>| -> Vec<f64> { row.into_iter().map(f64::from).collect() };
+                let row = in_double(row);
                 for k in 0..DIRECTIONS {
-                    let along = joined(
-                        [0.0; anchor::STATIC],
-                        of_surface.map(|slope| slope[k]),
-                        of_global.map(|slope| slope[k]),
-                    );
+                    let of_state: Vec<f32> = of_state_slopes.iter().map(|slope| slope[k]).collect();
+                    let of_surface = of_surface.map(|slope| slope[k]);
+                    let along = in_double(joined([0.0; anchor::STATIC], of_surface, &of_state));
                     let expected = plain_slopes(network, &row, &along);
                     let size = expected.iter().map(|x| x.abs()).fold(0.0, f64::max);
                     for (found, expected) in found.iter().map(|slope| slope[k]).zip(&expected) {
                         let error = (f64::from(found) - expected).abs();
-                        assert!(error <= 1e-4 * size, "{}: {found} against {expected}", isa.name());
+                        assert!(error <= 1e-4 * size, "{width} {}: {found} against {expected}", isa.name());
                     }
                 }
             }

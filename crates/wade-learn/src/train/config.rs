@@ -9,6 +9,7 @@ use super::anchored::loss::AnchoredLoss;
 use super::loss::LossConfig;
 use crate::dataset::split::MOST_PARTS;
 use crate::parameter_table::ParameterTable;
+use wade_core::model::network::WIDTHS;
 
 /// How to train; the defaults are the source paper's where it states them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,6 +56,8 @@ pub struct Config {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AnchoredConfig {
+    /// Units of each hidden layer, one of [`WIDTHS`].
+    pub width: usize,
     /// States between the cases in which the network is taught, for each case.
     pub between: usize,
     /// States on lines through any two cases and beyond, for each case.
@@ -65,7 +68,7 @@ pub struct AnchoredConfig {
 
 impl Default for AnchoredConfig {
     fn default() -> Self {
-        Self { between: 40, outside: 8, loss: AnchoredLoss::default() }
+        Self { width: 64, between: 40, outside: 8, loss: AnchoredLoss::default() }
     }
 }
 
@@ -180,6 +183,11 @@ impl Config {
         if self.least_learning_rate >= self.learning_rate {
             let (key, value) = ("least_learning_rate", self.least_learning_rate);
             return Err(TrainError::Config { key, value, expected: "below learning_rate" });
+        }
+        let width = self.anchored.width;
+        if !WIDTHS.contains(&width) {
+            let (key, value) = ("anchored.width", width as f64);
+            return Err(TrainError::Config { key, value, expected: "32, 64, 128 or 256" });
         }
         let shares = [
             ("held_out_share", self.held_out_share),

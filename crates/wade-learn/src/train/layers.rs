@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, RealField};
 
 use crate::random::Random;
 use wade_core::features::INPUTS;
-use wade_core::model::network::{Network, OUTPUTS, WIDTH};
+use wade_core::model::network::{MAX_WIDTH, Network, OUTPUTS};
 
 /// Inputs, width of both hidden layers, and outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub struct Sizes {
 
 impl Sizes {
     /// The paper's network.
-    pub const PAPER: Self = Self { inputs: INPUTS, width: WIDTH, outputs: OUTPUTS };
+    pub const PAPER: Self = Self { inputs: INPUTS, width: MAX_WIDTH, outputs: OUTPUTS };
 
     /// Rows and columns of the six tensors in storage (a bias has one column).
     fn shapes(self) -> [(usize, usize); 6] {
@@ -149,15 +149,11 @@ impl<T: Real> Layers<T> {
 }
 
 impl Layers<f32> {
-    /// The network as it is served.
-    ///
-    /// # Panics
-    /// When the hidden layers are not as wide as those of a `Network`.
+    /// The network as it is served, where there is a kernel for its width.
     pub fn network(&self) -> Network {
         let Sizes { inputs, width, outputs } = self.sizes;
-        assert_eq!(width, WIDTH, "only layers of the served width make a network");
         let [w1, b1, w2, b2, w3, b3] = self.sizes.ranges().map(|range| self.parameters[range].to_vec());
-        Network { inputs, outputs, w1, b1, w2, b2, w3, b3 }
+        Network { inputs, width, outputs, w1, b1, w2, b2, w3, b3 }
     }
 
     /// Replaces the weights and the bias of one output.

@@ -8,7 +8,7 @@ use super::layers::Sizes;
 use super::loss::{Batch, Counts, LossConfig, TargetScale, loss};
 use super::samples::{Sample, SurfaceRow, sum};
 use wade_core::features::{GLOBAL, INPUTS};
-use wade_core::model::network::{OUTPUTS, Scaling, WIDTH};
+use wade_core::model::network::{MAX_WIDTH, OUTPUTS, Scaling};
 use wade_core::vehicle::SurfaceKind;
 
 /// The first of the three reference lengths, which are the last of the global features.
@@ -112,7 +112,7 @@ impl Variant {
             Self::NoDimensions => INPUTS - (GLOBAL - DIMENSIONS),
             Self::GlobalOnly => GLOBAL,
         };
-        Sizes { inputs, width: WIDTH, outputs: OUTPUTS }
+        Sizes { inputs, width: MAX_WIDTH, outputs: OUTPUTS }
     }
 
     /// The sample as this variant sees it: with merged surfaces, or with the net force on a single one.

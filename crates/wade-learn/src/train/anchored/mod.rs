@@ -32,14 +32,13 @@ use spread::{Missed, Spread};
 use teacher::Teacher;
 use wade_core::anchor::{COORDINATES, DYNAMIC, GLOBAL, OUTPUTS, Remainder, STATIC};
 use wade_core::frame::Vec3;
-use wade_core::model::network::WIDTH;
 use wade_core::model::{Anchored, Form, SPREAD, Weights};
 
 /// Name in files and reports.
 pub const NAME: &str = "anchored";
 
-/// Layers of the network: one more answer than the force and its place, for how far these may be off.
-pub const SIZES: Sizes = Sizes { inputs: STATIC + DYNAMIC + GLOBAL, width: WIDTH, outputs: SPREAD + 1 };
+/// Numbers in a row of the network's inputs.
+const INPUTS: usize = STATIC + DYNAMIC + GLOBAL;
 
 /// Share of the training cases that keep at most the usual distance to their nearest neighbor.
 const USUAL: f64 = 0.95;
@@ -161,14 +160,15 @@ fn task(
     };
     let (training, validation) = (rows(training), rows(held_out));
     let same = |input: &usize| {
-        let mut values =
-            training.iter().flat_map(|rows| rows.inputs.iter().skip(*input).step_by(SIZES.inputs));
+        let mut values = training.iter().flat_map(|rows| rows.inputs.iter().skip(*input).step_by(INPUTS));
         let first = values.next();
         values.all(|value| Some(value) == first)
     };
-    let constant = (0..SIZES.inputs).filter(same).collect();
+    let constant = (0..INPUTS).filter(same).collect();
     let objective = Objective::Anchored(config.anchored.loss);
-    Ok(Task { sizes: SIZES, training, validation, objective, constant })
+    // one more answer than the force and its place, for how far these may be off
+    let sizes = Sizes { inputs: INPUTS, width: config.anchored.width, outputs: SPREAD + 1 };
+    Ok(Task { sizes, training, validation, objective, constant })
 }
 
 /// A row a surface: its static features, those that change, the standardised global ones.
@@ -187,7 +187,7 @@ fn rows(state: &Known, prepared: &Prepared, form: &Anchored, config: &Config) ->
 
 fn inputs(state: &Known, prepared: &Prepared, form: &Anchored) -> Vec<f32> {
     let global = form.standardize(&state.prior.reading.global);
-    let mut inputs = Vec::with_capacity(SIZES.inputs * prepared.fixed.len());
+    let mut inputs = Vec::with_capacity(INPUTS * prepared.fixed.len());
     for (surface, fixed) in state.prior.reading.surfaces.iter().zip(&prepared.fixed) {
         inputs.extend(fixed.iter().chain(&surface.told()).chain(&global));
     }
@@ -196,7 +196,7 @@ fn inputs(state: &Known, prepared: &Prepared, form: &Anchored) -> Vec<f32> {
 
 /// A column of inputs a surface.
 fn columns(state: &Known, prepared: &Prepared, form: &Anchored) -> DMatrix<f32> {
-    DMatrix::from_vec(SIZES.inputs, prepared.fixed.len(), inputs(state, prepared, form))
+    DMatrix::from_vec(INPUTS, prepared.fixed.len(), inputs(state, prepared, form))
 }
 
 /// Net force besides the base [N].
