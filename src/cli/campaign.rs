@@ -293,7 +293,8 @@ struct Collect {
     /// Where the cases were computed [default: `work` in the folder of the campaign]
     #[arg(long, value_name = "DIR")]
     work: Option<PathBuf>,
-    /// Also write what was collected as a data set, which `wade train` and `wade dataset` read
+    /// Also write what was collected as a data set for `wade train`, with the depth and the speed of the water ahead of the
+    /// vehicle: measured, or by the balance of momentum in the channel (sections.parquet has those of the plan)
     #[arg(long, value_name = "FILE")]
     dataset: Option<PathBuf>,
 }
@@ -307,7 +308,10 @@ impl Collect {
         let all = collected.cases.len();
         println!("{}: {all} of {} cases, {new} of them new", self.campaign.display(), plan.cases.len());
         if let Some(path) = &self.dataset {
-            dataset::write_compact(path, &collect::dataset(&self.campaign, &plan, &collected)?)?;
+            dataset::write_compact(
+                path,
+                &collect::dataset_ahead(&self.campaign, &plan, &vehicle, &collected)?,
+            )?;
         }
         Ok(ExitCode::SUCCESS)
     }

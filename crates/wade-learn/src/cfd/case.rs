@@ -29,7 +29,7 @@ const UNSTEADY_STEP_S: f64 = 0.01;
 const C_MU: f64 = 0.09;
 
 /// Distance of the gauges from the front of the vehicle, in its lengths, and their places across the channel over its width.
-const GAUGES_AHEAD: f64 = 1.2;
+pub const GAUGES_AHEAD: f64 = 1.2;
 const GAUGES_ACROSS: [f64; 5] = [-0.44, -0.22, 0.0, 0.22, 0.44];
 /// Places across the channel at which its depth is taken.
 const CROSSINGS: usize = 50;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::backwater;
 use super::means::{Means, SURFACES_FILE};
 use super::plan::{Bed, CAMPAIGN_FILE, Case, Ground, Plan, Set, as_set};
 use super::run::{RunError, Work};
@@ -272,6 +273,9 @@ pub fn state_hash(case: &Case) -> String {
 /// Why a campaign could not be collected.
 #[derive(Debug, thiserror::Error)]
 pub enum CollectError {
+    /// A bundle with other surfaces than the data set.
+    #[error(transparent)]
+    Surfaces(#[from] dataset::label::OtherSurfaces),
     /// A file that cannot be read or written.
     #[error("{path}: {source}")]
     Io {
@@ -399,6 +403,20 @@ pub fn dataset(folder: &Path, plan: &Plan, collected: &Collected) -> Result<Data
     }
     let means = Means::read(folder)?.ok_or_else(|| CollectError::Nothing { path: folder.to_owned() })?;
     means.dataset(folder, plan, &collected.cases)
+}
+
+/// The same in the flow ahead of the vehicle, also where no gauge measured it.
+pub fn dataset_ahead(
+    folder: &Path,
+    plan: &Plan,
+    vehicle: &Vehicle,
+    collected: &Collected,
+) -> Result<Dataset, CollectError> {
+    let mut data = dataset(folder, plan, collected)?;
+    if plan.campaign.settings.flow_time.is_none() {
+        backwater::state_ahead(&mut data, plan, vehicle)?;
+    }
+    Ok(data)
 }
 
 /// Adds the outcomes of `work` to the data set and the summaries in `folder`; gives the number of new cases.

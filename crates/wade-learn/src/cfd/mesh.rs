@@ -29,6 +29,14 @@ impl Default for MeshSettings {
     }
 }
 
+impl MeshSettings {
+    /// Length, width and height of the channel of a vehicle of this length, larger by a factor [m].
+    pub fn channel(&self, length: f64, scale: f64) -> Vec3 {
+        // the paper's 10 x 6 x 3 m for the Warthog; its 6 x 5 x 1.5 m for the Husky is set in the Husky's campaign
+        self.channel_m.map_or(Vec3::new(6.56, 3.94, 1.97) * length, Vec3::from) * scale
+    }
+}
+
 /// Clearance over the vehicle's length above which the water under the hull gets cells of its own, and how much of it stays
 /// as fine as the water around the hull.
 const DEEP: [f64; 2] = [0.4, 0.25];
@@ -95,9 +103,7 @@ impl Channel {
         speed: f64,
         [cell_scale, channel_scale]: [f64; 2],
     ) -> Self {
-        // the paper's 10 x 6 x 3 m for the Warthog; its 6 x 5 x 1.5 m for the Husky is set in the Husky's campaign
-        let size =
-            settings.channel_m.map_or(Vec3::new(6.56, 3.94, 1.97) * length, Vec3::from) * channel_scale;
+        let size = settings.channel(length, channel_scale);
         let cell = length / settings.cells_per_length * cell_scale;
         let hull = placement.bounds;
         // the same air above a hull that does not stand at the foot
