@@ -193,6 +193,8 @@ pub struct Reading<T = f64> {
     pub global: [T; GLOBAL],
     /// Where the state lies among the cases that were learnt from.
     pub coordinates: [T; COORDINATES],
+    /// Component of up along body z, which the coordinates do not tell: an overturned hull has those of an upright one.
+    pub upright: T,
     /// One entry a surface, in the vehicle's order.
     pub surfaces: Vec<SurfaceReading<T>>,
     wetting: Vec<Wetting<T>>,
@@ -256,6 +258,7 @@ impl<T: Real> Reading<T> {
             pressure: T::zero(),
             global: [T::zero(); GLOBAL],
             coordinates: [T::zero(); COORDINATES],
+            upright: T::zero(),
         }
     }
 
@@ -378,6 +381,7 @@ impl Anchor {
         out.pressure = condition.density * 0.5 * flow.speed * flow.speed;
         out.global = flow.global(vehicle, condition);
         out.coordinates = self.coordinates(&flow, condition);
+        out.upright = condition.up.z;
         out.surfaces.clear();
         let surroundings = Surroundings { vehicle, condition, flow: &flow };
         for (index, (surface, wetting)) in self.surfaces.iter().zip(&out.wetting).enumerate() {
@@ -446,7 +450,12 @@ impl Anchor {
         let pressure = condition.density * 0.5 * flow.speed * flow.speed;
         let head = flow.speed * flow.speed / (2.0 * GRAVITY);
         let reached = ((level + head - min.z) / (max.z - min.z).max(RAMP)).clamp(0.0, 1.0);
-        let onset = ramp(level - min.z);
+        // of a hull that is tilted the water meets another point first than the lowest in the body frame; of an upright plate the
+        // soaked part is twice as high as its middle is deep
+        let onset = ramp(match self.remainder {
+            Remainder::OfDrag => level - min.z,
+            Remainder::OfPhysics => plane.depth_below(&center) * 2.0,
+        });
         let facing = ahead.dot(&surface.normal.map(T::from));
         let off_track = (center.x * ahead.y - center.y * ahead.x).abs();
         let dynamic = [

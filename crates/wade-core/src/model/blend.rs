@@ -97,7 +97,7 @@ impl<'a> Blend<'a> {
         (velocity, level_drag): (&Vec3, &[SurfaceDrag]),
         forces: &mut Forces,
     ) {
-        let distance = form.distance(&reading.coordinates);
+        let distance = form.distance(reading);
         forces.outside.excess[Quantity::Distance as usize - 1] = (distance - 1.0).max(0.0);
         let trust = Anchored::trust(distance);
         let (mut spread, mut doubtful) = (0.0, Vec3::zeros());

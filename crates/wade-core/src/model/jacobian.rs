@@ -255,7 +255,7 @@ impl Model {
         );
         let of_global: [_; GLOBAL] =
             std::array::from_fn(|i| reading.global[i].slope.map(|slope| slope as f32 / form.global_std[i]));
-        let trust = Anchored::trust(form.distance_dual(&reading.coordinates));
+        let trust = Anchored::trust(form.distance_dual(reading));
         let outputs = buffers.outputs(wet.len());
         let inputs = form.remainder.global_names().len();
         let of_outputs = learned.kernel.slopes((&of_global[..inputs], features), buffers, slopes);

@@ -301,7 +301,7 @@ impl Model {
     ) {
         let Workspace { buffers, wet, reading, .. } = workspace;
         anchor.read(&self.vehicle, condition, reading);
-        let distance = form.distance(&reading.coordinates);
+        let distance = form.distance(reading);
         forces.outside.excess[Quantity::Distance as usize - 1] = (distance - 1.0).max(0.0);
         let trust = Anchored::trust(distance);
         forces.surfaces.clear();

@@ -50,7 +50,7 @@ impl Model {
         let (condition, drag) = self.known_drag(form.remainder, condition);
         let mut reading = Reading::default();
         anchor.read(&self.vehicle, &condition, &mut reading);
-        let trust = Anchored::trust(form.distance(&reading.coordinates));
+        let trust = Anchored::trust(form.distance(&reading));
         let global = form.standardize(&reading.global);
         let global = &global[..form.remainder.global_names().len()];
         let surfaces = reading.surfaces.iter().zip(anchor.static_rows(&self.vehicle)).zip(&learned.coverage);

@@ -1,6 +1,6 @@
 //! What is learnt, and how a network's answers become forces.
 
-use crate::anchor::{Anchor, COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS, Remainder};
+use crate::anchor::{Anchor, COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS, Reading, Remainder};
 use crate::condition::GroundContact;
 use crate::model::network::{Network, OUTPUTS, Scaling};
 use crate::real::{Dual, Real};
@@ -69,9 +69,10 @@ impl Anchored {
         std::array::from_fn(|i| (global[i] as f32 - self.global_mean[i]) / self.global_std[i])
     }
 
-    /// Distance to the nearest training case or its mirror image, over what is usual among these.
-    pub fn distance(&self, coordinates: &[f64; COORDINATES]) -> f64 {
-        let here = self.place(coordinates);
+    /// Distance to the nearest training case or its mirror image, over what is usual among these; so far that nothing counts where
+    /// the hull is tilted by a right angle or more.
+    pub fn distance(&self, reading: &Reading) -> f64 {
+        let here = self.place(&reading.coordinates);
         let to = |here: &[f32; COORDINATES]| {
             self.cases.iter().map(|case| squared(here, case)).fold(f32::INFINITY, f32::min)
         };
@@ -80,11 +81,12 @@ impl Anchored {
             Remainder::OfDrag => to(&here),
             Remainder::OfPhysics => to(&here).min(to(&mirrored(here))),
         };
-        f64::from(nearest.sqrt() / self.near)
+        f64::from(nearest.sqrt() / self.near) + overturned(reading.upright)
     }
 
     /// The same with derivatives: those of the distance to the case that is nearest.
-    pub fn distance_dual<const N: usize>(&self, coordinates: &[Dual<N>; COORDINATES]) -> Dual<N> {
+    pub fn distance_dual<const N: usize>(&self, reading: &Reading<Dual<N>>) -> Dual<N> {
+        let coordinates = &reading.coordinates;
         let here = self.place(&coordinates.map(Real::value));
         // the state and a case are as far apart as the state's mirror image and the case's
         let images = match self.remainder {
@@ -102,7 +104,7 @@ impl Anchored {
             let gap = coordinates[axis] / unit - f64::from(nearest[axis]);
             sum + gap * gap
         });
-        sum.sqrt() / f64::from(self.near)
+        sum.sqrt() / f64::from(self.near) + overturned(reading.upright)
     }
 
     /// How far loads had set in on each surface of a vehicle in the case that wetted it most: what was dry in all has nothing
@@ -124,8 +126,7 @@ impl Anchored {
 
     /// How much of the learnt part counts at a distance: all of it up to 2, nothing from 4, smooth between.
     pub fn trust<T: Real>(distance: T) -> T {
-        let x = ((-distance + FADES[1]) / (FADES[1] - FADES[0])).clamp(0.0, 1.0);
-        x * x * (-(x * 2.0) + 3.0)
+        smooth((-distance + FADES[1]) / (FADES[1] - FADES[0]))
     }
 
     /// How much of the learnt part may be wrong because the state is a stranger: none as near to a case as is usual, all of it
@@ -140,6 +141,17 @@ impl Anchored {
         let x = f64::from(output);
         x.max(0.0) + (-x.abs()).exp().ln_1p()
     }
+}
+
+/// 0 up to 0, 1 from 1, with no kink between.
+fn smooth<T: Real>(x: T) -> T {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (-(x * 2.0) + 3.0)
+}
+
+/// What is added to the distance of a hull whose up has such a component along body z: nothing up to a tilt of 60 degrees.
+fn overturned<T: Real>(upright: T) -> T {
+    smooth((-upright + 0.5) / 0.5) * FADES[1]
 }
 
 /// Where the coordinates stand that change their sign in the mirror across y = 0: those of direction and of up along y.

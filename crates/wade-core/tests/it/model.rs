@@ -1,6 +1,7 @@
 //! Promise: the net wrench is the sum of the surfaces, dry surfaces are exactly zero, and the conventions hold.
 
 use crate::common::{Numbers, VEHICLES, model};
+use nalgebra::UnitVector3;
 use wade_core::condition::{Condition, GroundContact};
 use wade_core::domain::Quantity;
 use wade_core::forces::{Forces, SurfaceForce};
@@ -105,6 +106,32 @@ fn a_wheel_that_only_just_touches_the_water_feels_nothing_below_either_conventio
     let condition = Condition { ground_contact: GroundContact::Dry, ..Condition::level(Vec3::zeros(), 1e-9) };
     let forces = evaluate(&model("husky"), &condition);
     assert!(forces.surfaces.iter().all(|load| load.wetted_fraction > 0.0 || load.force == Vec3::zeros()));
+}
+
+/// Overturned, a hull has the coordinates of one that stands upright in the same water.
+#[test]
+fn weights_say_nothing_of_a_hull_that_lies_on_its_roof() {
+    for vehicle in VEHICLES {
+        let model = model(vehicle);
+        let base =
+            Model::of_physics(model.vehicle().clone(), 1, model.base().expect("the physical base").clone());
+        let height = model.vehicle().dimensions.height;
+        for (up, counts) in [(1.0, true), (-1.0, false)] {
+            let level = Condition::level(Vec3::new(0.4 * model.domain().speed_mps.max, 0.0, 0.0), 0.0);
+            let water_level = Some(model.vehicle().z0 + height * if up > 0.0 { 0.4 } else { 0.6 });
+            let state = Condition {
+                up: UnitVector3::new_normalize(Vec3::z() * up),
+                water_level: water_level.map(|level| level * up),
+                ..level
+            };
+            let [with, without] = [&model, &base].map(|model| evaluate(model, &state).wrench.force);
+            assert_eq!(
+                (with - without).norm() > 1e-3 * without.norm(),
+                counts,
+                "{vehicle} {up}: {with} {without}"
+            );
+        }
+    }
 }
 
 /// Steady CFD has the moment of the added mass in an oblique stream in it, and so have weights that learned it.
