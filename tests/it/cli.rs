@@ -102,7 +102,7 @@ fn a_query_prints_the_names_that_scripts_rely_on() {
 }
 
 #[test]
-fn a_current_and_its_opposite_velocity_are_the_same_to_the_water() {
+fn over_the_same_bed_a_current_and_its_opposite_velocity_are_the_same() {
     let parked = [
         "query",
         "--vehicle",
@@ -116,7 +116,10 @@ fn a_current_and_its_opposite_velocity_are_the_same_to_the_water() {
         "--json",
     ];
     let driving = ["query", "--vehicle", "husky", "--velocity", "0.5,0,0", "--depth", "0.1", "--json"];
-    assert_eq!(json(&parked)["wrench"], json(&driving)["wrench"]);
+    for bed in ["parked", "driving"] {
+        let over = |state: &[&'static str]| json(&[state, &["--bed", bed]].concat())["wrench"].clone();
+        assert_eq!(over(&parked), over(&driving));
+    }
 }
 
 #[test]

@@ -9,8 +9,8 @@
 //! of the bed per width from the gauges to the outlet, where it moves other than the water: `Cf rho w^2 / 2` over the distance,
 //! with `Cf = 0.074 Re^(-1/5)` of a plate (Schlichting, Boundary-Layer Theory, 7th edition, equation 21.11).
 //!
-//! Nothing here is fitted. For 28 cases of `drive` whose planned flow is that of a case of `paper`, the depth is off by 0.8 % (Husky) and
-//! 2.0 % (Warthog) of the measured one, root mean square, where the plan's is off by 7.7 and 16.4 %.
+//! Nothing here is fitted. In 28 cases of `drive` whose planned flow is that of a case of `paper`, the depth is off by 0.8 % (Husky) and
+//! 1.9 % (Warthog) of the measured one, root mean square, where the plan's is off by 7.7 and 16.4 %.
 //!
 //! A stream that is supercritical as planned carries no news upstream, and keeps the planned flow.
 

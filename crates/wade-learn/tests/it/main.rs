@@ -6,6 +6,7 @@
 mod common;
 
 mod anchored;
+mod backwater;
 mod dataset;
 mod dataset_import;
 mod evaluate;
