@@ -25,7 +25,8 @@ fn rms(errors: &[f64]) -> f64 {
 #[test]
 fn the_depth_ahead_is_what_gauges_measured_when_the_plan_was_computed_again() {
     let campaigns = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../campaigns");
-    for (vehicle, most) in [(shipped::husky(), 0.02), (shipped::warthog(), 0.03)] {
+    for (shipped, most) in [(shipped::husky(), 0.02), (shipped::warthog(), 0.03)] {
+        let vehicle = shipped.unwrap().vehicle().unwrap();
         let [planned, ahead] = both(&campaigns.join(&vehicle.name), &vehicle);
         let [measured, as_measured] = both(&campaigns.join("drive").join(&vehicle.name), &vehicle);
         assert_eq!(measured, as_measured, "gauges are believed");
