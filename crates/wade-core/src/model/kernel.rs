@@ -101,10 +101,12 @@ impl Live {
             }
         }
         let mut live = Self { rows: rows.len(), inputs: [0; MAX_WIDTH], count: 0 };
-        for (input, largest) in (0..=u8::MAX).zip(largest.iter().flat_map(|line| line.0)) {
-            // without a branch: a dead input's place is written over by the next
-            live.inputs[live.count] = input;
-            live.count += usize::from(largest > 0.0);
+        for line in 0..LINES {
+            for lane in 0..LANES {
+                // without a branch: a dead input's place is written over by the next
+                live.inputs[live.count] = (line * LANES + lane) as u8;
+                live.count += usize::from(largest[line].0[lane] > 0.0);
+            }
         }
         live
     }
@@ -241,7 +243,7 @@ impl Kernel {
     ///
     /// # Panics
     /// When the network has no dynamic features, more of them or of outputs than there is room for, or a width that is not one
-    /// of [`WIDTHS`](super::network::WIDTHS).
+    /// of [`WIDTHS`].
     pub fn new(network: &Network, (fixed, dynamic): (usize, usize), isa: Isa) -> Self {
         assert!(
             (1..=MAX_DYNAMIC).contains(&dynamic)
