@@ -29,7 +29,7 @@ use crate::forces::SurfaceForce;
 use crate::frame::{GRAVITY, VISCOSITY, Vec3};
 use crate::geometry::mesh::Bounds;
 use crate::geometry::wetting::{Wetting, WettingTable};
-use crate::real::{Real, norm};
+use crate::real::{Real, norm, smoothstep};
 use crate::vehicle::Vehicle;
 use crate::wrench::Wrench;
 
@@ -513,8 +513,7 @@ impl Anchor {
 
 /// 0 to 1 over the first [`RAMP`] of a height, with no kink.
 fn ramp<T: Real>(height: T) -> T {
-    let x = (height / RAMP).clamp(0.0, 1.0);
-    x * x * (-(x * 2.0) + 3.0)
+    smoothstep(height / RAMP)
 }
 
 /// `x / (1 + x)`: a Froude number of any size, in 0 to 1.

@@ -84,6 +84,12 @@ impl Real for f64 {
     }
 }
 
+/// 0 up to 0, 1 from 1, `x^2 (3 - 2 x)` between: with no kink.
+pub fn smoothstep<T: Real>(x: T) -> T {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (-(x * 2.0) + 3.0)
+}
+
 /// Length of a vector.
 pub fn norm<T: Real>(vector: &Vector3<T>) -> T {
     vector.dot(vector).sqrt()

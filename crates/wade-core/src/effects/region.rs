@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::frame::GRAVITY;
+use crate::real::smoothstep;
 
 /// Depth below which the Froude number of a depth is that of this depth [m].
 const LEAST_DEPTH: f64 = 0.01;
@@ -69,8 +70,9 @@ pub struct RegionLimit {
 impl RegionLimit {
     /// The share of the effect that acts at a value of the quantity, 0 to 1.
     fn share(&self, value: f64) -> f64 {
-        let above = self.above.map_or(1.0, |border| smoothstep(border, value));
-        let below = self.at_most.map_or(1.0, |border| 1.0 - smoothstep(border, value));
+        let beyond = |[from, to]: [f64; 2]| smoothstep((value - from) / (to - from));
+        let above = self.above.map_or(1.0, beyond);
+        let below = self.at_most.map_or(1.0, |border| 1.0 - beyond(border));
         above * below
     }
 
@@ -84,12 +86,6 @@ impl RegionLimit {
         };
         apart && [self.above, self.at_most].into_iter().flatten().all(sound)
     }
-}
-
-/// 0 below an interval, 1 above it, `s^2 (3 - 2 s)` within.
-fn smoothstep([from, to]: [f64; 2], value: f64) -> f64 {
-    let s = ((value - from) / (to - from)).clamp(0.0, 1.0);
-    s * s * (3.0 - 2.0 * s)
 }
 
 /// The region of an effect: within all of its limits. Without one it is everywhere.

@@ -3,7 +3,7 @@
 use crate::anchor::{Anchor, COORDINATES, GLOBAL, OUTPUTS as ANCHORED_OUTPUTS, Reading, Remainder};
 use crate::condition::GroundContact;
 use crate::model::network::{Network, OUTPUTS, Scaling};
-use crate::real::{Dual, Real};
+use crate::real::{Dual, Real, smoothstep};
 use crate::vehicle::Vehicle;
 
 /// What the weights are and where they come from.
@@ -126,7 +126,7 @@ impl Anchored {
 
     /// How much of the learnt part counts at a distance: all of it up to 2, nothing from 4, smooth between.
     pub fn trust<T: Real>(distance: T) -> T {
-        smooth((-distance + FADES[1]) / (FADES[1] - FADES[0]))
+        smoothstep((-distance + FADES[1]) / (FADES[1] - FADES[0]))
     }
 
     /// How much of the learnt part may be wrong because the state is a stranger: none as near to a case as is usual, all of it
@@ -143,15 +143,9 @@ impl Anchored {
     }
 }
 
-/// 0 up to 0, 1 from 1, with no kink between.
-fn smooth<T: Real>(x: T) -> T {
-    let x = x.clamp(0.0, 1.0);
-    x * x * (-(x * 2.0) + 3.0)
-}
-
 /// What is added to the distance of a hull whose up has such a component along body z: nothing up to a tilt of 60 degrees.
 fn overturned<T: Real>(upright: T) -> T {
-    smooth((-upright + 0.5) / 0.5) * FADES[1]
+    smoothstep((-upright + 0.5) / 0.5) * FADES[1]
 }
 
 /// Where the coordinates stand that change their sign in the mirror across y = 0: those of direction and of up along y.
