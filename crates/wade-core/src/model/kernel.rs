@@ -345,17 +345,7 @@ impl Kernel {
         wet: &[WetSurface],
         buffers: &mut Buffers,
     ) {
-        self.layer1::<true, LINES>(global, statics, wet, buffers);
-        buffers.find_live::<LINES>(wet.len());
-        let Buffers { h1, h2, live, .. } = buffers;
-        let (h1, h2, bias) = (rows(h1), h2.as_chunks_mut().0, &rows(&self.b2)[0]);
-        // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
-        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width() * LINES).enumerate() {
-            for_row_blocks!(h1, h2, live, |a, block, out| {
-                x86::tile_avx512(a, block, weights, bias, tile, out);
-            });
-        }
-        self.layer3::<true, LINES>(wet.len(), buffers);
+        layers!(self, true, (global, statics, wet, buffers), x86::tile_avx512);
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -367,17 +357,7 @@ impl Kernel {
         wet: &[WetSurface],
         buffers: &mut Buffers,
     ) {
-        self.layer1::<true, LINES>(global, statics, wet, buffers);
-        buffers.find_live::<LINES>(wet.len());
-        let Buffers { h1, h2, live, .. } = buffers;
-        let (h1, h2, bias) = (rows(h1), h2.as_chunks_mut().0, &rows(&self.b2)[0]);
-        // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
-        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width() * LINES).enumerate() {
-            for_row_blocks!(h1, h2, live, |a, block, out| {
-                x86::tile_avx2(a, block, weights, bias, tile, out);
-            });
-        }
-        self.layer3::<true, LINES>(wet.len(), buffers);
+        layers!(self, true, (global, statics, wet, buffers), x86::tile_avx2);
     }
 
     fn forward_plain<const FUSED: bool, const LINES: usize>(
@@ -387,17 +367,7 @@ impl Kernel {
         wet: &[WetSurface],
         buffers: &mut Buffers,
     ) {
-        self.layer1::<FUSED, LINES>(global, statics, wet, buffers);
-        buffers.find_live::<LINES>(wet.len());
-        let Buffers { h1, h2, live, .. } = buffers;
-        let (h1, h2, bias) = (rows(h1), h2.as_chunks_mut().0, &rows(&self.b2)[0]);
-        // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
-        for (tile, weights) in self.w2.chunks_exact(self.isa.tile_width() * LINES).enumerate() {
-            for_row_blocks!(h1, h2, live, |a, block, out| {
-                tile_plain::<FUSED, _, _>(a, block, weights, bias, tile, out);
-            });
-        }
-        self.layer3::<FUSED, LINES>(wet.len(), buffers);
+        layers!(self, FUSED, (global, statics, wet, buffers), tile_plain::<FUSED, _, _>);
     }
 
     #[inline(always)]
@@ -446,6 +416,24 @@ impl Kernel {
         }
     }
 }
+
+/// The three layers, layer 2 by tiles of one instruction set.
+macro_rules! layers {
+    ($kernel:ident, $fused:tt, ($global:ident, $statics:ident, $wet:ident, $buffers:ident), $tile:expr) => {{
+        $kernel.layer1::<$fused, LINES>($global, $statics, $wet, $buffers);
+        $buffers.find_live::<LINES>($wet.len());
+        let Buffers { h1, h2, live, .. } = $buffers;
+        let (h1, h2, bias) = (rows(h1), h2.as_chunks_mut().0, &rows(&$kernel.b2)[0]);
+        // tiles outside: a tile's weights stay in the first-level cache while all blocks use them
+        for (tile, weights) in $kernel.w2.chunks_exact($kernel.isa.tile_width() * LINES).enumerate() {
+            for_row_blocks!(h1, h2, live, |a, block, out| {
+                $tile(a, block, weights, bias, tile, out);
+            });
+        }
+        $kernel.layer3::<$fused, LINES>($wet.len(), $buffers);
+    }};
+}
+use layers;
 
 /// Runs the body for each block of rows with its live inputs, the length of the block as a constant.
 macro_rules! for_row_blocks {
